@@ -1,0 +1,10 @@
+//! Writes libtorch's folder into the binary's library search path, so that it runs without LD_LIBRARY_PATH.
+use std::path::Path;
+
+fn main() {
+    println!("cargo:rerun-if-env-changed=LIBTORCH");
+    let libtorch = std::env::var("LIBTORCH").unwrap_or_else(|_| ".libtorch".into());
+    let lib = Path::new(&libtorch).join("lib");
+    let lib = lib.canonicalize().unwrap_or(lib);
+    println!("cargo:rustc-link-arg=-Wl,-rpath,{}", lib.display());
+}

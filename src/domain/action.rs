@@ -1,0 +1,106 @@
+//! The 12 low-level actions of ALFRED-RL.
+
+use serde::{Deserialize, Serialize};
+
+use super::world::Instance;
+
+/// The kind of a low-level action: five to move about, seven that act on an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub enum ActionType {
+    MoveAhead,
+    RotateLeft,
+    RotateRight,
+    LookUp,
+    LookDown,
+    Pickup,
+    Put,
+    Open,
+    Close,
+    ToggleOn,
+    ToggleOff,
+    Slice,
+}
+
+impl ActionType {
+    /// In the order of the policy's action head.
+    pub const ALL: [ActionType; 12] = [
+        ActionType::MoveAhead,
+        ActionType::RotateLeft,
+        ActionType::RotateRight,
+        ActionType::LookUp,
+        ActionType::LookDown,
+        ActionType::Pickup,
+        ActionType::Put,
+        ActionType::Open,
+        ActionType::Close,
+        ActionType::ToggleOn,
+        ActionType::ToggleOff,
+        ActionType::Slice,
+    ];
+    /// Entries of the policy's action head.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// Position in the action head.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The kind at that position of the action head.
+    pub fn from_index(index: usize) -> Option<ActionType> {
+        Self::ALL.get(index).copied()
+    }
+
+    /// Whether it acts on an object.
+    pub fn is_interaction(self) -> bool {
+        self.index() >= ActionType::Pickup.index()
+    }
+
+    /// The name as the screens show it.
+    pub fn name(self) -> &'static str {
+        match self {
+            ActionType::MoveAhead => "MoveAhead",
+            ActionType::RotateLeft => "RotateLeft",
+            ActionType::RotateRight => "RotateRight",
+            ActionType::LookUp => "LookUp",
+            ActionType::LookDown => "LookDown",
+            ActionType::Pickup => "Pickup",
+            ActionType::Put => "Put",
+            ActionType::Open => "Open",
+            ActionType::Close => "Close",
+            ActionType::ToggleOn => "ToggleOn",
+            ActionType::ToggleOff => "ToggleOff",
+            ActionType::Slice => "Slice",
+        }
+    }
+}
+
+impl std::fmt::Display for ActionType {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A low-level action: its kind and, for an interaction, the instance it acts on (the receptacle, for a Put).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Action {
+    /// What is done.
+    #[serde(rename = "do")]
+    pub kind: ActionType,
+    /// To what; `None` for the five navigation actions.
+    #[serde(rename = "to", default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<Instance>,
+}
+
+impl Action {
+    /// A navigation action.
+    pub fn navigate(kind: ActionType) -> Action {
+        Action { kind, target: None }
+    }
+
+    /// An interaction with `target`.
+    pub fn interact(kind: ActionType, target: Instance) -> Action {
+        Action { kind, target: Some(target) }
+    }
+}

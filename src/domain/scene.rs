@@ -1,0 +1,155 @@
+//! A scene: the floor plan. Cells to stand on, fixed furniture, and where things may stand.
+
+use serde::{Deserialize, Serialize};
+
+use super::class::{Class, Shape};
+use super::place::{Cell, Cuboid, Heading, Point, Pose, Rect};
+use super::world::Object;
+
+/// The kind of a room; ALFRED numbers its floor plans by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs)]
+pub enum Room {
+    Kitchen,
+    LivingRoom,
+    Bedroom,
+    Bathroom,
+}
+
+impl Room {
+    /// In ALFRED's order.
+    pub const ALL: [Room; 4] = [Room::Kitchen, Room::LivingRoom, Room::Bedroom, Room::Bathroom];
+
+    /// The room of ALFRED's floor plan of that number: 1 to 30 kitchens, 201 to 230 living rooms, and so on.
+    pub fn of_floor_plan(number: u32) -> Option<Room> {
+        match number {
+            1..=30 => Some(Room::Kitchen),
+            201..=230 => Some(Room::LivingRoom),
+            301..=330 => Some(Room::Bedroom),
+            401..=430 => Some(Room::Bathroom),
+            _ => None,
+        }
+    }
+
+    /// The name in a sentence.
+    pub fn spoken(self) -> &'static str {
+        match self {
+            Room::Kitchen => "kitchen",
+            Room::LivingRoom => "living room",
+            Room::Bedroom => "bedroom",
+            Room::Bathroom => "bathroom",
+        }
+    }
+}
+
+/// A height at which things may stand, and where.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// World height of the support in millimetres.
+    pub height: i32,
+    /// The rectangles that things may stand on, pivots included.
+    pub areas: Vec<Rect>,
+}
+
+/// A piece of fixed furniture.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fixture {
+    /// A name that is unique in the scene: ALFRED's object id, or the generator's.
+    pub id: String,
+    /// Its class.
+    pub class: Class,
+    /// The pivot, from which distances are measured.
+    pub pivot: Point,
+    /// Where its front looks: out of the furniture, into the room.
+    pub facing: Heading,
+    /// What it fills: one box, or several for an L-shaped counter. An openable one's first box is its shell.
+    pub body: Vec<Cuboid>,
+    /// Where its contents stand, lowest first. Empty when it holds nothing.
+    pub surfaces: Vec<Surface>,
+    /// The recorded best place to stand for using it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stand: Option<Pose>,
+}
+
+/// The measured shape of one mesh of the scene. Lengths in millimetres, in the object's own frame.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// ALFRED's `objectName`.
+    pub name: String,
+    /// Its shape.
+    pub shape: Shape,
+    /// Width, height, depth.
+    pub size: [i32; 3],
+    /// The centre from the pivot.
+    pub offset: [i32; 3],
+}
+
+/// A floor plan.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Version of this format.
+    pub format_version: u32,
+    /// `FloorPlan7`, or `kitchen-42` for a generated one.
+    pub name: String,
+    /// The kind of room.
+    pub room: Room,
+    /// The agent's y in millimetres: 900 above the floor, 675 below the camera.
+    pub agent_y: i32,
+    /// Where the agent may stand, sorted.
+    pub cells: Vec<Cell>,
+    /// The fixed furniture.
+    pub fixtures: Vec<Fixture>,
+    /// The walls.
+    pub walls: Vec<Cuboid>,
+    /// Shapes of meshes that were measured in this scene.
+    #[serde(default)]
+    pub meshes: Vec<Mesh>,
+}
+
+impl Scene {
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+    const THINNEST_SLICE: i32 = 15;
+
+    /// World height of the floor in millimetres.
+    pub fn floor(&self) -> i32 {
+        self.agent_y - 900
+    }
+
+    /// World height of the camera in millimetres.
+    pub fn camera_y(&self) -> i32 {
+        self.agent_y + 675
+    }
+
+    /// Whether the agent may stand there.
+    pub fn has_cell(&self, cell: Cell) -> bool {
+        self.cells.binary_search(&cell).is_ok()
+    }
+
+    /// The fixture of that number.
+    pub fn fixture(&self, index: u16) -> Option<&Fixture> {
+        self.fixtures.get(usize::from(index))
+    }
+
+    /// Shape, size and offset of a movable object, in millimetres in its own frame. A slice is a disc of what it was cut from.
+    pub fn shape_of(&self, object: &Object) -> (Shape, [i32; 3], [i32; 3]) {
+        let info = object.class.info();
+        let whole = match object.mesh.and_then(|index| self.meshes.get(usize::from(index))) {
+            Some(mesh) => (mesh.shape, mesh.size, mesh.offset),
+            None => (info.shape, info.size, info.offset),
+        };
+        match object.slice_of {
+            None => whole,
+            Some(_) => {
+                let (shape, [width, height, depth], _) = whole;
+                let thickness = (width / i32::from(info.slices.max(1))).max(Self::THINNEST_SLICE);
+                (shape, [thickness, height * 9 / 10, depth * 9 / 10], [0, 0, 0])
+            }
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Tasks: where an episode starts, what is asked, and for how long.
+
+use serde::{Deserialize, Serialize};
+
+use super::scene::Room;
+use super::skill::{Goal, Role, Subtask};
+use super::world::World;
+
+/// Which scene a task plays in.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum SceneRef {
+    /// The house that the generator makes of this room and seed.
+    Generated {
+        /// The kind of room.
+        room: Room,
+        /// The generator's seed.
+        seed: u64,
+    },
+    /// A scene file of the dataset, by name.
+    Named(String),
+}
+
+/// One task.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Task {
+    /// A name that is unique in its set.
+    pub id: String,
+    /// Where it plays.
+    pub scene: SceneRef,
+    /// The state at the start; `None` for the state that the generator gives its house.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<World>,
+    /// What the agent is told.
+    pub instruction: String,
+    /// One sentence for each subtask, when there are any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sentences: Vec<String>,
+    /// The parts that instances play.
+    pub roles: Vec<Role>,
+    /// The steps, in order.
+    pub subtasks: Vec<Subtask>,
+    /// How many actions the expert takes.
+    pub expert_steps: u32,
+    /// After how many actions the episode ends: twice the expert's.
+    pub horizon: u32,
+    /// The goal of the whole ALFRED trajectory, for strict grading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<Goal>,
+    /// The trajectory that it was cut from, and the subtask it starts at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<(String, u8)>,
+    /// The instruction is not the authors' own text (which only their file holds).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reworded: bool,
+}
+
+/// A file of tasks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskSet {
+    /// Version of this format.
+    pub format_version: u32,
+    /// What the set is called in reports.
+    pub name: String,
+    /// The folder of scene files, relative to this file; needed when a task names a scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenes: Option<String>,
+    /// The tasks.
+    pub tasks: Vec<Task>,
+}
+
+impl TaskSet {
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+}

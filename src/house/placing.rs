@@ -1,0 +1,122 @@
+//! Where a Put leaves an object: the free point of the receptacle that is nearest to the agent.
+
+use crate::domain::place::Rect;
+use crate::domain::world::{Instance, Object, Parent, World};
+use crate::domain::{Point, Scene};
+
+/// The raster of points that are tried, in millimetres.
+const RASTER: i32 = 50;
+/// How far a drawer's contents slide out with it, in millimetres (the median of recorded pickups).
+pub const DRAWER_TRAVEL: i32 = 170;
+
+/// The outline that an object covers on the floor plan when its pivot is at `at`, turned by whole quarter turns.
+fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
+    let (_, size, offset) = scene.shape_of(object);
+    let yaw = i32::from(object.turn[1]);
+    let (width, depth) = if (yaw + 450).rem_euclid(1800) >= 900 { (size[2], size[0]) } else { (size[0], size[2]) };
+    let (right, ahead) = match (yaw + 450).rem_euclid(3600) / 900 {
+        0 => (offset[0], offset[2]),
+        1 => (offset[2], -offset[0]),
+        2 => (-offset[0], -offset[2]),
+        _ => (-offset[2], offset[0]),
+    };
+    let centre = [at.x + right, at.z + ahead];
+    Rect {
+        min: [centre[0] - width / 2, centre[1] - depth / 2],
+        max: [centre[0] + width / 2, centre[1] + depth / 2],
+    }
+}
+
+fn overlap(a: &Rect, b: &Rect) -> bool {
+    (0..2).all(|axis| a.min[axis] < b.max[axis] && b.min[axis] < a.max[axis])
+}
+
+/// The pivot that `object` gets in `receptacle`, or `None` when there is no room. `object.turn` is already what it will be.
+///
+/// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. Two passes: first a point
+/// where the whole outline is free and on the surface, then one where only the pivot is. In a movable receptacle: at its
+/// pivot, moved aside for each thing that already lies there.
+pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
+    match receptacle {
+        Instance::Object(holder) => {
+            let holder = world.object(holder)?;
+            let already = world.objects.iter().filter(|other| other.parent == Parent::In(receptacle)).count() as i32;
+            let radius = holder.class.info().content_radius;
+            // Fixed small steps around the middle: first the middle, then four sides, then the middle again, higher.
+            let (dx, dz) = [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)][already as usize % 5];
+            let lift = 20 * (already / 5);
+            let floor = holder.at.y - holder.class.info().rest + 10;
+            let rest = object.class.info().rest.min(object_height(scene, object));
+            Some(Point::new(holder.at.x + dx * radius / 2, floor + rest + lift, holder.at.z + dz * radius / 2))
+        }
+        Instance::Fixture(index) => {
+            let fixture = scene.fixture(index)?;
+            let taken: Vec<(i32, Rect)> = world
+                .objects
+                .iter()
+                .filter(|other| other.parent == Parent::In(receptacle) && !other.sliced)
+                .map(|other| (other.at.y, outline(scene, other, other.at)))
+                .collect();
+            let shift = if world.is_open(receptacle) { drawer_shift(scene, index) } else { Point::default() };
+            let agent = world.agent.cell.centre(0);
+            let mut points: Vec<(usize, i64, Point)> = Vec::new();
+            for (level, surface) in fixture.surfaces.iter().enumerate() {
+                for area in &surface.areas {
+                    for (x, z) in raster(area) {
+                        let at = Point::new(x + shift.x, surface.height + object.class.info().rest, z + shift.z);
+                        let (dx, dz) = (i64::from(at.x - agent.x), i64::from(at.z - agent.z));
+                        points.push((level, dx * dx + dz * dz, at));
+                    }
+                }
+            }
+            points.sort_by_key(|&(level, distance, at)| (level, distance, at));
+            let fits = |level: usize, at: Point, whole: bool| {
+                let surface = &fixture.surfaces[level];
+                let ground = outline(scene, object, at);
+                let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
+                let clear = taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| {
+                    if whole { !overlap(&ground, other) } else { !other.contains(at.x, at.z) }
+                });
+                clear && (!whole || surface.areas.iter().any(|area| area.grown(RASTER).contains(at.x, at.z)))
+            };
+            [true, false]
+                .into_iter()
+                .find_map(|whole| points.iter().find(|&&(level, _, at)| fits(level, at, whole)).map(|&(_, _, at)| at))
+        }
+    }
+}
+
+fn object_height(scene: &Scene, object: &Object) -> i32 {
+    scene.shape_of(object).1[1]
+}
+
+/// The points of the 5 cm raster in a rectangle; its middle when it is smaller than that.
+fn raster(area: &Rect) -> impl Iterator<Item = (i32, i32)> + use<> {
+    let axis = |min: i32, max: i32| -> Vec<i32> {
+        let steps = (max - min) / RASTER;
+        let first = (min + max - steps * RASTER) / 2;
+        (0..=steps).map(|step| first + step * RASTER).collect()
+    };
+    let (xs, zs) = (axis(area.min[0], area.max[0]), axis(area.min[1], area.max[1]));
+    xs.into_iter().flat_map(move |x| zs.clone().into_iter().map(move |z| (x, z)))
+}
+
+/// How far a fixture's contents move when it is opened: drawers slide, doors do not.
+pub fn drawer_shift(scene: &Scene, fixture: u16) -> Point {
+    match scene.fixture(fixture) {
+        Some(fixture) if fixture.class.name() == "Drawer" => {
+            let (dx, dz) = fixture.facing.step();
+            Point::new(i32::from(dx) * DRAWER_TRAVEL, 0, i32::from(dz) * DRAWER_TRAVEL)
+        }
+        _ => Point::default(),
+    }
+}
+
+/// Moves an object's contents, at any depth, by `by`.
+pub fn carry_contents(world: &mut World, carrier: Instance, by: Point) {
+    let moved: Vec<u16> = world.contents(carrier).collect();
+    for index in moved {
+        let at = &mut world.objects[usize::from(index)].at;
+        *at = Point::new(at.x + by.x, at.y + by.y, at.z + by.z);
+    }
+}

@@ -1,0 +1,168 @@
+//! What the agent sees and could act on: sight follows from the drawn frame, reach from distance.
+
+use serde::{Deserialize, Serialize};
+
+use super::outcome::Reason;
+use crate::domain::world::{Instance, World};
+use crate::domain::{Action, ActionType, Class, Point, Scene};
+
+/// How far the agent reaches, horizontally, in millimetres.
+pub const REACH: f32 = 1500.0;
+/// Fewer pixels than this of a 300 x 300 frame do not count as seen.
+pub const FEWEST_PIXELS: u32 = 12;
+
+/// A drawn frame: colour, depth and instance in one pass. Row-major, top left first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Three bytes a pixel: red, green, blue.
+    pub rgb: Vec<u8>,
+    /// Distance along the optical axis in metres; infinite where nothing is.
+    pub depth: Vec<f32>,
+    /// What each pixel shows: see [`code`].
+    pub ids: Vec<u16>,
+}
+
+/// The number of an instance in [`Frame::ids`]; 0 is structure (walls, floor, nothing).
+pub fn code(instance: Instance) -> u16 {
+    match instance {
+        Instance::Fixture(i) => 1 + i,
+        Instance::Object(i) => 0x8000 | i,
+    }
+}
+
+/// The instance that a number in [`Frame::ids`] stands for.
+pub fn decode(code: u16) -> Option<Instance> {
+    match code {
+        0 => None,
+        fixture if fixture < 0x8000 => Some(Instance::Fixture(fixture - 1)),
+        object => Some(Instance::Object(object & 0x7fff)),
+    }
+}
+
+/// An instance in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sighting {
+    /// What is seen.
+    pub instance: Instance,
+    /// How many pixels show it.
+    pub pixels: u32,
+    /// The edges of those pixels: left, top, right, bottom (right and bottom inclusive).
+    pub bounds: [u16; 4],
+}
+
+/// Everything in a frame that counts as seen, in the order of instances.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct View {
+    /// The sightings.
+    pub sightings: Vec<Sighting>,
+}
+
+impl View {
+    /// Reads a frame. Every pixel counts as one of a 300 x 300 frame, whatever the frame's size.
+    pub fn of(frame: &Frame) -> View {
+        let mut found: std::collections::BTreeMap<u16, Sighting> = std::collections::BTreeMap::new();
+        for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
+            let mut x = 0;
+            while x < row.len() {
+                let id = row[x];
+                let run = row[x..].iter().take_while(|&&other| other == id).count();
+                if let Some(instance) = decode(id) {
+                    let (left, right, y) = (x as u16, (x + run - 1) as u16, y as u16);
+                    let seen = found.entry(id).or_insert(Sighting { instance, pixels: 0, bounds: [left, y, right, y] });
+                    seen.pixels += run as u32;
+                    let [l, t, r, b] = seen.bounds;
+                    seen.bounds = [l.min(left), t.min(y), r.max(right), b.max(y)];
+                }
+                x += run;
+            }
+        }
+        let scale = 90_000.0 / (frame.width * frame.height).max(1) as f32;
+        let enough = |sighting: &Sighting| sighting.pixels as f32 * scale >= FEWEST_PIXELS as f32;
+        View { sightings: found.into_values().filter(enough).collect() }
+    }
+
+    /// The sighting of an instance, if it is seen.
+    pub fn sighting(&self, instance: Instance) -> Option<&Sighting> {
+        self.sightings.iter().find(|sighting| sighting.instance == instance)
+    }
+}
+
+/// Horizontal distance from the agent to an instance in millimetres: to the pivot, or to the nearest point of a fixture's
+/// body or surfaces when that is nearer.
+pub fn distance(scene: &Scene, world: &World, instance: Instance) -> Option<f32> {
+    let agent = world.agent.cell.centre(scene.agent_y);
+    let pivot = agent.floor_distance(world.position(scene, instance)?);
+    let Instance::Fixture(index) = instance else { return Some(pivot) };
+    let fixture = scene.fixture(index)?;
+    let body = fixture.body.iter().map(|part| part.footprint());
+    let areas = fixture.surfaces.iter().flat_map(|surface| surface.areas.iter().copied());
+    Some(body.chain(areas).map(|rect| agent.floor_distance(rect.nearest(agent))).fold(pivot, f32::min))
+}
+
+/// Distance in space from the agent's own point to the pivot, in millimetres: what "nearest" of a class means (paper's code).
+pub fn nearness(scene: &Scene, world: &World, instance: Instance) -> f32 {
+    let agent: Point = world.agent.cell.centre(scene.agent_y);
+    world.position(scene, instance).map_or(f32::INFINITY, |pivot| agent.distance(pivot))
+}
+
+/// Whether the agent could act on an instance from where it stands: it sees it and reaches it.
+pub fn reachable(scene: &Scene, world: &World, view: &View, instance: Instance) -> Result<(), Reason> {
+    let class = world.class_of(scene, instance).ok_or(Reason::UnknownTarget)?;
+    if view.sighting(instance).is_none() {
+        return Err(Reason::NotVisible(class));
+    }
+    let away = distance(scene, world, instance).ok_or(Reason::UnknownTarget)?;
+    if away > REACH {
+        return Err(Reason::TooFar { class, millimetres: away as i32 });
+    }
+    Ok(())
+}
+
+/// An interaction that is possible now.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// What would be done.
+    pub kind: ActionType,
+    /// To what.
+    pub instance: Instance,
+    /// Its class.
+    pub class: Class,
+    /// From the agent's own point to its pivot, in millimetres.
+    pub distance: f32,
+}
+
+impl Candidate {
+    /// The action.
+    pub fn action(&self) -> Action {
+        Action::interact(self.kind, self.instance)
+    }
+}
+
+/// Every interaction that is possible now, by action and then by distance: the target's class can be named, it is seen and in
+/// reach, and the rules would carry it out.
+pub fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    for sighting in &view.sightings {
+        let instance = sighting.instance;
+        let Some(class) = world.class_of(scene, instance).filter(|class| class.in_vocabulary()) else { continue };
+        if reachable(scene, world, view, instance).is_err() {
+            continue;
+        }
+        for kind in ActionType::ALL.into_iter().filter(|kind| kind.is_interaction()) {
+            if super::rules::check(scene, world, Action::interact(kind, instance)).is_ok() {
+                found.push(Candidate { kind, instance, class, distance: nearness(scene, world, instance) });
+            }
+        }
+    }
+    found.sort_by(|a, b| (a.kind, a.distance).partial_cmp(&(b.kind, b.distance)).unwrap_or(std::cmp::Ordering::Equal));
+    found
+}
+
+/// The candidate that a policy means by an action and a class: the nearest one.
+pub fn nearest(candidates: &[Candidate], kind: ActionType, class: Class) -> Option<&Candidate> {
+    candidates.iter().find(|candidate| candidate.kind == kind && candidate.class == class)
+}
