@@ -2,13 +2,13 @@
 //!
 //! The floors, ground floor first; imports point down only.
 
+pub mod agent;
+pub mod algo;
+pub mod cli;
+pub mod data;
 pub mod domain;
 pub mod house;
 pub mod language;
-pub mod data;
 pub mod nets;
-pub mod algo;
-pub mod agent;
 pub mod run;
 pub mod tui;
-pub mod cli;

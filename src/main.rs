@@ -1,1 +1,7 @@
-fn main(){ println!("{:?}", tch::Tensor::from_slice(&[1f32,2.]).sum(tch::Kind::Float)); }
+//! The `sprint` program: parse, run, print the error chain once, exit.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sprint_explorer::cli::main()
+}

@@ -1,1 +1,5 @@
-//! 
+//! Agents: what decides the next action.
+
+pub mod policy;
+
+pub use policy::{Decision, Mind, Policy, Situation};

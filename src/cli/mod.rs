@@ -1,1 +1,63 @@
-//! 
+//! The command line: clap structs become configs; one file a subcommand opens inputs, calls the library, prints.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Explore, train and evaluate household agents that follow typed instructions.
+#[derive(Parser)]
+#[command(name = "sprint", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// One variant a subcommand; each carries the arguments that its own file defines.
+#[derive(Subcommand)]
+enum Command {}
+
+/// How the program ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// All went well.
+    Ok,
+    /// A threshold that the user set was missed.
+    BelowThreshold,
+    /// Some items failed; the rest is complete.
+    SomeFailed,
+    /// Stopped by a signal, with a valid partial result.
+    Interrupted,
+}
+
+impl From<Ending> for ExitCode {
+    fn from(ending: Ending) -> ExitCode {
+        ExitCode::from(match ending {
+            Ending::Ok => 0,
+            Ending::BelowThreshold => 2,
+            Ending::SomeFailed => 3,
+            Ending::Interrupted => 130,
+        })
+    }
+}
+
+/// Parses the command line, runs the command, and prints an error's chain once.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(cli.command) {
+        Ok(ending) => ending.into(),
+        Err(error) => {
+            complain(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<Ending> {
+    match command {}
+}
+
+/// The one place that prints an error: its chain, outermost first.
+#[allow(clippy::print_stderr)]
+fn complain(error: &anyhow::Error) {
+    eprintln!("error: {error:#}");
+}

@@ -229,9 +229,6 @@ impl Rect {
 
     /// The same rectangle with every edge moved out by `margin`.
     pub fn grown(&self, margin: i32) -> Rect {
-        Rect {
-            min: [self.min[0] - margin, self.min[1] - margin],
-            max: [self.max[0] + margin, self.max[1] + margin],
-        }
+        Rect { min: [self.min[0] - margin, self.min[1] - margin], max: [self.max[0] + margin, self.max[1] + margin] }
     }
 }

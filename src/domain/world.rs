@@ -131,7 +131,8 @@ impl World {
     /// The chain of receptacles around an instance, innermost first.
     pub fn containers_of(&self, instance: Instance) -> impl Iterator<Item = Instance> {
         // Containment has no cycles; the bound only keeps a malformed file from looping.
-        std::iter::successors(self.container_of(instance), |holder| self.container_of(*holder)).take(self.objects.len() + 1)
+        std::iter::successors(self.container_of(instance), |holder| self.container_of(*holder))
+            .take(self.objects.len() + 1)
     }
 
     /// Whether `content` lies in `receptacle`, directly or in something that does.

@@ -1,8 +1,13 @@
 //! House: the simulator. Rules, what is seen, graders, the expert, and generated floor plans.
 
+pub mod camera;
+pub mod grading;
 pub mod outcome;
 pub mod placing;
+pub mod render;
 pub mod rules;
+pub mod session;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};
+pub use session::House;

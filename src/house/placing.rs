@@ -21,10 +21,7 @@ fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
         _ => (-offset[2], offset[0]),
     };
     let centre = [at.x + right, at.z + ahead];
-    Rect {
-        min: [centre[0] - width / 2, centre[1] - depth / 2],
-        max: [centre[0] + width / 2, centre[1] + depth / 2],
-    }
+    Rect { min: [centre[0] - width / 2, centre[1] - depth / 2], max: [centre[0] + width / 2, centre[1] + depth / 2] }
 }
 
 fn overlap(a: &Rect, b: &Rect) -> bool {
@@ -74,9 +71,10 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
                 let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
-                let clear = taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| {
-                    if whole { !overlap(&ground, other) } else { !other.contains(at.x, at.z) }
-                });
+                let clear = taken
+                    .iter()
+                    .filter(|(y, _)| same_level(*y))
+                    .all(|(_, other)| if whole { !overlap(&ground, other) } else { !other.contains(at.x, at.z) });
                 clear && (!whole || surface.areas.iter().any(|area| area.grown(RASTER).contains(at.x, at.z)))
             };
             [true, false]

@@ -1,1 +1,3 @@
-//! 
+//! Runs: episodes, evaluations, trainings, and the folders they write.
+
+pub mod rollout;

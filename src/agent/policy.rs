@@ -1,0 +1,53 @@
+//! The seam between a house and whatever acts in it.
+
+use crate::domain::{Action, ActionType, Class};
+use crate::house::grading::Grader;
+use crate::house::session::House;
+
+/// What a policy decides from.
+pub struct Situation<'a> {
+    /// The house; looking draws the frame once.
+    pub house: &'a mut House,
+    /// What is asked.
+    pub instruction: &'a str,
+    /// How far the task has come, where there is a task. Only the expert reads it.
+    pub grader: Option<&'a Grader>,
+}
+
+/// The next action, and what led to it.
+#[derive(Clone, Debug)]
+pub struct Decision {
+    /// What to do.
+    pub action: Action,
+    /// The distribution behind it, where the policy has one.
+    pub mind: Option<Mind>,
+}
+
+/// A policy's distribution over what it could do now.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mind {
+    /// Probability of each action in the order of [`ActionType::ALL`], after masking; `None` where masked.
+    pub actions: [Option<f32>; ActionType::COUNT],
+    /// Object classes by falling probability (before restriction to candidates), with whether one of that class is a
+    /// candidate of the chosen or likeliest interaction.
+    pub objects: Vec<(Class, f32, bool)>,
+    /// Entropy of the masked action distribution, in nats.
+    pub entropy: f32,
+    /// The action that argmax would choose.
+    pub greedy: Action,
+}
+
+/// Something that acts: a trained agent, the expert, chance.
+pub trait Policy: Send {
+    /// A short name for reports.
+    fn name(&self) -> &str;
+
+    /// Forgets the past: a new episode starts. `seed` drives whatever the policy draws by chance.
+    fn begin(&mut self, seed: u64);
+
+    /// Decides the next action.
+    ///
+    /// # Errors
+    /// When the policy cannot go on (the expert sees no way, a forward pass fails); the episode then ends with that reason.
+    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision>;
+}
