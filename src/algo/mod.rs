@@ -1,1 +1,5 @@
-//!
+//! Algorithms: how a policy learns from trajectories.
+
+pub mod adamw;
+pub mod bc;
+pub mod schedule;
