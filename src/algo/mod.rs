@@ -2,4 +2,5 @@
 
 pub mod adamw;
 pub mod bc;
+pub mod learner;
 pub mod schedule;

@@ -4,3 +4,4 @@ pub mod film;
 pub mod policy;
 pub mod shrink;
 pub mod visual;
+pub mod weights;
