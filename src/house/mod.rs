@@ -8,6 +8,8 @@ pub mod placing;
 pub mod render;
 pub mod rules;
 pub mod session;
+#[cfg(test)]
+pub mod testing;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};
