@@ -1,5 +1,6 @@
 //! House: the simulator. Rules, what is seen, graders, the expert, and generated floor plans.
 
+pub mod bounds;
 pub mod camera;
 pub mod goals;
 pub mod grading;
