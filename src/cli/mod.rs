@@ -4,6 +4,11 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod doctor;
+mod logging;
+mod shell;
+mod terminal;
+
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
 #[command(name = "sprint", version, about, arg_required_else_help = true)]
@@ -14,7 +19,14 @@ struct Cli {
 
 /// One variant a subcommand; each carries the arguments that its own file defines.
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    /// Print what was found on this machine; exits 1 with the remedy when something is missing
+    Doctor(doctor::Doctor),
+    /// Print a completion script for a shell
+    Completions(shell::Completions),
+    /// Print the manual page (roff)
+    Man,
+}
 
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +55,11 @@ impl From<Ending> for ExitCode {
 /// Parses the command line, runs the command, and prints an error's chain once.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    logging::start();
     match run(cli.command) {
         Ok(ending) => ending.into(),
         Err(error) => {
+            tracing::error!("{error:#}");
             complain(&error);
             ExitCode::FAILURE
         }
@@ -53,7 +67,11 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> anyhow::Result<Ending> {
-    match command {}
+    match command {
+        Command::Doctor(doctor) => doctor.run(),
+        Command::Completions(completions) => completions.run(),
+        Command::Man => shell::man(),
+    }
 }
 
 /// The one place that prints an error: its chain, outermost first.
