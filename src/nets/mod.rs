@@ -1,7 +1,20 @@
-//! Nets: what is learned or loaded as weights. `tch` starts here.
+//! Networks: weights files, sentence encoders, the visual encoder and the policy, and where they compute.
+
+pub mod device;
+pub mod home;
+pub mod weights;
+
+pub mod embedding_cache;
+pub mod sentence;
 
 pub mod film;
 pub mod policy;
 pub mod shrink;
+pub mod sight_heads;
 pub mod visual;
-pub mod weights;
+
+mod bert;
+mod encoder_stack;
+mod mpnet;
+mod pooling;
+mod transformer;

@@ -103,6 +103,11 @@ impl VisualEncoder {
         &self.spec
     }
 
+    /// Where it computes.
+    pub fn device(&self) -> Device {
+        self.device
+    }
+
     /// `pixels` [n, 3, input, input] in 0..255, any kind, to [n, features, 7, 7].
     pub fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
         let x = (pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0;

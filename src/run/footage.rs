@@ -52,6 +52,12 @@ impl Footage {
         self.firsts[self.firsts.len() - 1]
     }
 
+    /// Whether a frame belongs to a held-out trajectory: every `hold_out`th is.
+    pub fn is_held_out(&self, frame: usize, hold_out: usize) -> bool {
+        let trajectory = self.firsts.partition_point(|&first| first <= frame) - 1;
+        hold_out > 0 && trajectory % hold_out == hold_out - 1
+    }
+
     /// The scene of a trajectory.
     ///
     /// # Errors
