@@ -11,17 +11,17 @@ use tch::{Device, Kind, Tensor};
 use super::checkpoint::{Config, Networks};
 use super::policy::{Decision, Policy, Situation};
 use super::select::{self, Selection};
-use crate::nets::sentence::SentenceEncoder;
+use crate::nets::embedding_cache::Embedder;
 
-/// A sentence encoder that several policies share.
-pub type SharedEncoder = Arc<Mutex<SentenceEncoder>>;
+/// A sentence encoder with its cache, which several policies may share.
+pub type SharedEmbedder = Arc<Mutex<Embedder>>;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
     name: String,
     config: Config,
     networks: Networks,
-    sentences: SharedEncoder,
+    sentences: SharedEmbedder,
     device: Device,
     /// The maps of the last frames, oldest first, and the step that the last one belongs to.
     seen: VecDeque<Tensor>,
@@ -37,10 +37,11 @@ impl LearnedPolicy {
     ///
     /// # Errors
     /// When the checkpoint is malformed, or was trained with another sentence encoder.
-    pub fn load(folder: &Path, sentences: SharedEncoder, device: Device) -> anyhow::Result<LearnedPolicy> {
+    pub fn load(folder: &Path, sentences: SharedEmbedder, device: Device) -> anyhow::Result<LearnedPolicy> {
         let config = Config::read(folder)?;
         {
-            let encoder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+            let embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+            let encoder = embedder.encoder();
             let (wanted, found) = (config.policy.embedding, encoder.width() as i64);
             anyhow::ensure!(
                 wanted == found,
@@ -61,7 +62,7 @@ impl LearnedPolicy {
     }
 
     /// A policy of networks at hand.
-    pub fn with(name: String, config: Config, networks: Networks, sentences: SharedEncoder, device: Device) -> LearnedPolicy {
+    pub fn with(name: String, config: Config, networks: Networks, sentences: SharedEmbedder, device: Device) -> LearnedPolicy {
         LearnedPolicy {
             name,
             config,
@@ -110,8 +111,8 @@ impl LearnedPolicy {
         {
             return Ok(embedding.shallow_clone());
         }
-        let encoder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-        let embedding = encoder.encode(&[instruction])?.to_device(self.device).to_kind(Kind::Float);
+        let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        let embedding = embedder.embed(&[instruction])?.to_device(self.device).to_kind(Kind::Float);
         self.read = Some((instruction.to_string(), embedding.shallow_clone()));
         Ok(embedding)
     }

@@ -8,7 +8,7 @@ use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::domain::Trajectory;
+use crate::domain::{Scene, Trajectory};
 
 /// `dataset.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,6 +60,16 @@ impl Dataset {
     /// `dataset.json`.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
+    }
+
+    /// A scene by name.
+    ///
+    /// # Errors
+    /// When its file is missing or malformed.
+    pub fn scene(&self, name: &str) -> anyhow::Result<Scene> {
+        let path = self.folder.join("scenes").join(format!("{name}.json"));
+        let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+        serde_json::from_str(&text).with_context(|| format!("{} is malformed", path.display()))
     }
 
     /// Every trajectory, in the order of the file.
