@@ -89,7 +89,7 @@ impl LearnedPolicy {
 
     /// The last frames' maps as one observation. Before the first frames there was the first one.
     fn observe(&mut self, situation: &mut Situation<'_>) -> Tensor {
-        let image = self.networks.visual.image(situation.house.frame());
+        let image = self.networks.visual.spec().image(situation.house.frame());
         let map = self.networks.visual.encode(&[image]);
         let history = self.config.policy.history as usize;
         if self.seen_at == Some(situation.step) {

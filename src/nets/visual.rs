@@ -31,6 +31,11 @@ impl VisualSpec {
     pub fn map(&self) -> i64 {
         self.features() * SIDE * SIDE
     }
+
+    /// What the encoder reads of a frame: planes of bytes.
+    pub fn image(&self, frame: &Frame) -> Vec<u8> {
+        shrink(&frame.rgb, frame.width, self.input as usize)
+    }
 }
 
 #[derive(Debug)]
@@ -115,16 +120,11 @@ impl VisualEncoder {
         self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train))
     }
 
-    /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualEncoder::image`]), without gradients.
+    /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualSpec::image`]), without gradients.
     pub fn encode(&self, images: &[Vec<u8>]) -> Tensor {
         let side = self.spec.input;
         let pixels = Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]);
         tch::no_grad(|| self.forward(&pixels, false))
-    }
-
-    /// What the encoder reads of a frame: planes of bytes.
-    pub fn image(&self, frame: &Frame) -> Vec<u8> {
-        shrink(&frame.rgb, frame.width, self.spec.input as usize)
     }
 }
 

@@ -108,10 +108,11 @@ fn frames(footage: &Footage, preset: &Preset, step: u64, count: usize, held_out:
 
 /// Draws frames: what the encoder reads and what is known of them.
 fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, Known)> {
+    let spec = encoder.spec();
     let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, Sight)> {
         let (scene, world) = footage.state(frame)?;
         let frame = renderer.draw(scene, &world);
-        Ok((encoder.image(frame), Sight::of(scene, &world, frame)))
+        Ok((spec.image(frame), Sight::of(scene, &world, frame)))
     };
     let drawn: Vec<(Vec<u8>, Sight)> =
         frames.par_iter().map_init(|| Renderer::new(House::FRAME), draw).collect::<anyhow::Result<_>>()?;
@@ -148,6 +149,7 @@ pub fn encode(
     let mut writer = Writer::create(folder, header.clone())?;
     let mut pending: Vec<Vec<u8>> = Vec::new();
     let mut done = 0;
+    let spec = encoder.spec();
     let trajectories: Vec<usize> = (0..footage.trajectories.len()).collect();
     for group in trajectories.chunks(16) {
         if stop.load(Ordering::Relaxed) {
@@ -156,7 +158,7 @@ pub fn encode(
         let draw = |renderer: &mut Renderer, &trajectory: &usize| -> anyhow::Result<Vec<Vec<u8>>> {
             let mut images = Vec::new();
             footage.replay(trajectory, |scene, world, _| {
-                images.push(encoder.image(renderer.draw(scene, world)));
+                images.push(spec.image(renderer.draw(scene, world)));
                 Ok(())
             })?;
             Ok(images)
