@@ -34,10 +34,10 @@ impl Footage {
         wanted.dedup();
         let made = wanted.into_par_iter().map(|reference| {
             let scene = match &reference {
-                SceneRef::Generated { room, seed } => generate::house(*room, *seed).0,
+                SceneRef::Generated { room, seed } => Arc::new(generate::house(*room, *seed).0),
                 SceneRef::Named(name) => dataset.scene(name)?,
             };
-            Ok((reference, Arc::new(scene)))
+            Ok((reference, scene))
         });
         let scenes = made.collect::<anyhow::Result<_>>()?;
         let mut firsts = vec![0];

@@ -5,6 +5,7 @@ pub mod footage;
 pub mod presets;
 pub mod pretrain;
 pub mod progress;
+pub mod replay;
 pub mod rollout;
 pub mod sights;
 pub mod visual_training;
