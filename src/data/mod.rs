@@ -1,1 +1,4 @@
-//!
+//! Files: task sets, datasets, and how they are read and written.
+
+pub mod json;
+pub mod taskset;

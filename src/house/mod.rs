@@ -7,6 +7,7 @@ pub mod placing;
 pub mod render;
 pub mod rules;
 pub mod session;
+pub mod validate;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};
