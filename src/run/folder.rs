@@ -53,7 +53,9 @@ impl Manifest {
         let others = fields(other);
         let differing = fields(self).into_iter().filter(|(field, value)| others.get(field) != Some(value));
         differing
-            .map(|(field, value)| format!("{field}: {value}, not {}", others.get(&field).unwrap_or(&serde_json::Value::Null)))
+            .map(|(field, value)| {
+                format!("{field}: {value}, not {}", others.get(&field).unwrap_or(&serde_json::Value::Null))
+            })
             .collect()
     }
 }

@@ -1,7 +1,6 @@
-//! What a run came to: rates and means with their intervals, as JSON, as a page, and as a table for spreadsheets.
+//! What a run came to: rates and means with their intervals.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
@@ -148,87 +147,12 @@ impl Summary {
             expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
             interval_methods: IntervalMethods {
                 rates: "Wilson score, 95 %".into(),
-                means: format!("percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}", stats::RESAMPLES),
+                means: format!(
+                    "percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}",
+                    stats::RESAMPLES
+                ),
             },
         }
-    }
-
-    /// The page that people read.
-    pub fn markdown(&self) -> String {
-        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let between = |[low, high]: Interval| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high);
-        let mut page = format!("# {} on {}\n\n", self.policy, self.task_set);
-        if self.partial {
-            page += "**Partial: the run was interrupted. Give the same command with this folder as --out to continue.**\n\n";
-        }
-        let mut row = |cells: &[String]| {
-            // Writing to a String cannot fail.
-            let _ = writeln!(page, "| {} |", cells.join(" | "));
-        };
-        let text = |text: &str| text.to_owned();
-        row(&[text("measure"), text("value"), text("95 % interval")]);
-        row(&[text("---"), text("---:"), text("---:")]);
-        row(&[text("episodes"), self.episodes.to_string(), text("")]);
-        row(&[text("errors (counted as failures)"), self.errors.to_string(), text("")]);
-        row(&[text("success"), percent(self.success), between(self.success_interval)]);
-        let [low, high] = self.completed_subtasks.interval;
-        let mean = format!("{:.2}", self.completed_subtasks.mean);
-        row(&[text("completed subtasks"), mean, format!("{low:.2} to {high:.2}")]);
-        row(&[text("progress"), percent(self.progress.mean), between(self.progress.interval)]);
-        let expert = format!("the expert's: {:.1}", self.expert_steps_mean);
-        row(&[text("steps"), format!("{:.1}", self.steps_mean), expert]);
-        row(&[]);
-        row(&[text("subtasks of the task"), text("episodes"), text("success"), text("progress")]);
-        row(&[text("---:"), text("---:"), text("---:"), text("---:")]);
-        for (length, episodes) in &self.episodes_by_length {
-            let share = |map: &BTreeMap<u32, f64>| percent(map.get(length).copied().unwrap_or_default());
-            let (success, progress) = (share(&self.success_by_length), share(&self.progress_by_length));
-            row(&[length.to_string(), episodes.to_string(), success, progress]);
-        }
-        row(&[]);
-        row(&[text("skill"), text("reached"), text("completed"), text("rate"), text("95 % interval")]);
-        row(&[text("---"), text("---:"), text("---:"), text("---:"), text("---:")]);
-        for (kind, skill) in &self.skills {
-            let (reached, completed) = (skill.reached.to_string(), skill.completed.to_string());
-            row(&[format!("{kind:?}"), reached, completed, percent(skill.rate), between(skill.interval)]);
-        }
-        let page = page.replace("|  |\n", "\n");
-        let grader = match self.grader {
-            Grading::Class => "class",
-            Grading::Strict => "strict",
-        };
-        let methods = &self.interval_methods;
-        format!("{page}\nGrader: {grader}. Intervals: rates by {}; means by {}.\n", methods.rates, methods.means)
-    }
-
-    /// One row for the whole, for each length, and for each kind of skill.
-    ///
-    /// # Errors
-    /// Never in practice: it writes to memory.
-    pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        table.write_record(["group", "measure", "count", "value", "low", "high"])?;
-        let mut row = |group: &str, measure: &str, count: usize, value: f64, interval: Option<Interval>| {
-            let [low, high] = interval.map_or_else(Default::default, |ends| ends.map(|end| end.to_string()));
-            table.write_record([group, measure, &count.to_string(), &value.to_string(), &low, &high])
-        };
-        row("all", "success", self.episodes, self.success, Some(self.success_interval))?;
-        let (completed, progress) = (self.completed_subtasks, self.progress);
-        row("all", "completed_subtasks", self.episodes, completed.mean, Some(completed.interval))?;
-        row("all", "progress", self.episodes, progress.mean, Some(progress.interval))?;
-        row("all", "errors", self.episodes, self.errors as f64, None)?;
-        row("all", "steps", self.episodes, self.steps_mean, None)?;
-        row("all", "expert_steps", self.episodes, self.expert_steps_mean, None)?;
-        for (length, &count) in &self.episodes_by_length {
-            let group = format!("length {length}");
-            let value = |map: &BTreeMap<u32, f64>| map.get(length).copied().unwrap_or_default();
-            row(&group, "success", count, value(&self.success_by_length), None)?;
-            row(&group, "progress", count, value(&self.progress_by_length), None)?;
-        }
-        for (kind, skill) in &self.skills {
-            row(&format!("{kind:?}"), "completed", skill.reached, skill.rate, Some(skill.interval))?;
-        }
-        Ok(table.into_inner()?)
     }
 }
 
@@ -253,72 +177,13 @@ fn skill_rates(episodes: &[(&Task, &Episode)]) -> BTreeMap<SkillKind, SkillRate>
     rates
 }
 
-/// A figure that a run must reach, as `METRIC=X`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Threshold {
-    metric: String,
-    least: f64,
-}
-
-impl Threshold {
-    /// What may stand left of the equals sign.
-    pub const METRICS: &str = "success, completed_subtasks, progress, success_by_length.N, progress_by_length.N";
-
-    /// The measured figure when it falls short; `None` when it is reached.
-    ///
-    /// # Errors
-    /// When no episode has that many subtasks.
-    pub fn missed_by(&self, summary: &Summary) -> anyhow::Result<Option<f64>> {
-        let of_length = |map: &BTreeMap<u32, f64>, length: &str| length.parse().ok().and_then(|n: u32| map.get(&n).copied());
-        let measured = match self.metric.split_once('.') {
-            None => match self.metric.as_str() {
-                "success" => Some(summary.success),
-                "completed_subtasks" => Some(summary.completed_subtasks.mean),
-                _ => Some(summary.progress.mean),
-            },
-            Some(("success_by_length", length)) => of_length(&summary.success_by_length, length),
-            Some((_, length)) => of_length(&summary.progress_by_length, length),
-        };
-        let measured = measured.ok_or_else(|| anyhow::anyhow!("no episode tells {}: no task is that long", self.metric))?;
-        Ok((measured < self.least).then_some(measured))
-    }
-}
-
-impl std::fmt::Display for Threshold {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}={}", self.metric, self.least)
-    }
-}
-
-impl std::str::FromStr for Threshold {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Threshold, String> {
-        let (metric, least) = text.split_once('=').ok_or("write METRIC=X, for example success=0.8")?;
-        let known = match metric.split_once('.') {
-            None => matches!(metric, "success" | "completed_subtasks" | "progress"),
-            Some((map, length)) => {
-                matches!(map, "success_by_length" | "progress_by_length") && length.parse::<u32>().is_ok()
-            }
-        };
-        if !known {
-            return Err(format!("{metric:?} is not one of {}", Threshold::METRICS));
-        }
-        let least: f64 = least.parse().map_err(|_| format!("{least:?} is not a number"))?;
-        if !least.is_finite() {
-            return Err(format!("{least} is not a finite number"));
-        }
-        Ok(Threshold { metric: metric.to_owned(), least })
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
     use crate::run::folder::tests::{episode, manifest};
 
-    fn sample() -> (Vec<Task>, Vec<Episode>) {
+    pub(crate) fn sample() -> (Vec<Task>, Vec<Episode>) {
         let tasks = sample_set().tasks;
         let done = |task: &str, seed, completed| Episode {
             seed,
@@ -374,29 +239,6 @@ mod tests {
         }
         for name in ["/completed_subtasks/interval/0", "/progress_by_length/2", "/steps_mean", "/skills/Put/rate"] {
             assert!(summary.pointer(name).is_some_and(serde_json::Value::is_number), "{name}");
-        }
-    }
-
-    #[test]
-    fn the_page_and_the_table_look_as_agreed() {
-        let (tasks, episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, true);
-        insta::assert_snapshot!(summary.markdown());
-        insta::assert_snapshot!(String::from_utf8(summary.csv().unwrap()).unwrap());
-    }
-
-    #[test]
-    fn a_threshold_is_missed_only_below_it() {
-        let (tasks, episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
-        let missed = |text: &str| text.parse::<Threshold>().unwrap().missed_by(&summary);
-        assert_eq!(missed("success=0.5").unwrap(), None);
-        assert_eq!(missed("success=0.51").unwrap(), Some(0.5));
-        assert_eq!(missed("completed_subtasks=2").unwrap(), Some(1.25));
-        assert_eq!(missed("progress_by_length.2=0.7").unwrap(), Some(0.625));
-        assert!(missed("success_by_length.3=0.7").unwrap_err().to_string().contains("no task is that long"));
-        for nonsense in ["success", "succes=1", "success=x", "success=NaN", "progress_by_length.x=1", "steps.2=1"] {
-            assert!(nonsense.parse::<Threshold>().is_err(), "{nonsense}");
         }
     }
 }

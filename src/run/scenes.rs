@@ -60,7 +60,8 @@ impl Scenes {
         }
         let Some(folder) = &self.folder else { bail!("no folder of scenes is known, so there is no scene {name:?}") };
         let path = folder.join(format!("{name}.json"));
-        let scene = json::read::<Scene>(&path, Scene::FORMAT).with_context(|| format!("there is no scene {name:?}"))?.value;
+        let scene =
+            json::read::<Scene>(&path, Scene::FORMAT).with_context(|| format!("there is no scene {name:?}"))?.value;
         validate::scene(&scene).with_context(|| format!("{}", path.display()))?;
         if scene.name != name {
             bail!("{}: name: {:?}, which is not the file's name", path.display(), scene.name);
