@@ -1,4 +1,8 @@
-//! Files: task sets, datasets, and how they are read and written.
+//! Data: task files, dataset folders, and the importer that makes one of ALFRED's published files.
 
+pub mod alfred;
+pub mod dataset;
 pub mod json;
 pub mod taskset;
+
+pub use dataset::Dataset;
