@@ -4,12 +4,16 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod bar;
+mod collect;
 mod doctor;
 mod embed;
 mod import;
 mod logging;
+mod pretrain;
 mod replay;
 mod shell;
+mod stop;
 mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
@@ -27,6 +31,10 @@ enum Command {
     Doctor(doctor::Doctor),
     /// Make a dataset folder of ALFRED's published files
     Import(import::Import),
+    /// Collect demonstrations in generated houses
+    Collect(collect::Collect),
+    /// Train an agent on a dataset
+    Pretrain(pretrain::Pretrain),
     /// Re-run recorded demonstrations in the simulator
     Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
@@ -80,6 +88,8 @@ fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
         Command::Doctor(doctor) => doctor.run(),
         Command::Import(import) => import.run(),
+        Command::Collect(collect) => collect.run(),
+        Command::Pretrain(pretrain) => pretrain.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),
