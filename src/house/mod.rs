@@ -1,6 +1,7 @@
 //! House: the simulator. Rules, what is seen, graders, the expert, and generated floor plans.
 
 pub mod camera;
+pub mod generate;
 pub mod grading;
 pub mod outcome;
 pub mod placing;
