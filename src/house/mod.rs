@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod camera;
+pub mod doors;
 pub mod grading;
 pub mod outcome;
 pub mod placing;
