@@ -3,12 +3,15 @@
 pub mod bounds;
 pub mod camera;
 pub mod doors;
+pub mod goals;
 pub mod grading;
 pub mod outcome;
 pub mod placing;
 pub mod render;
 pub mod rules;
 pub mod session;
+#[cfg(test)]
+pub mod testing;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};
