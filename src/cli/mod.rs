@@ -4,6 +4,12 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod doctor;
+mod embed;
+mod logging;
+mod shell;
+mod terminal;
+
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
 #[command(name = "sprint", version, about, arg_required_else_help = true)]
@@ -14,7 +20,16 @@ struct Cli {
 
 /// One variant a subcommand; each carries the arguments that its own file defines.
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    /// Print what was found on this machine; exits 1 with the remedy when something is missing
+    Doctor(doctor::Doctor),
+    /// Embed sentences: a sentence a line in, a JSON array a line out
+    Embed(embed::Embed),
+    /// Print a completion script for a shell
+    Completions(shell::Completions),
+    /// Print the manual page (roff)
+    Man,
+}
 
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +58,12 @@ impl From<Ending> for ExitCode {
 /// Parses the command line, runs the command, and prints an error's chain once.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    logging::start();
     match run(cli.command) {
         Ok(ending) => ending.into(),
+        Err(error) if reader_left(&error) => Ending::Ok.into(),
         Err(error) => {
+            tracing::error!("{error:#}");
             complain(&error);
             ExitCode::FAILURE
         }
@@ -53,7 +71,18 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> anyhow::Result<Ending> {
-    match command {}
+    match command {
+        Command::Doctor(doctor) => doctor.run(),
+        Command::Embed(embed) => embed.run(),
+        Command::Completions(completions) => completions.run(),
+        Command::Man => shell::man(),
+    }
+}
+
+/// Whether all that went wrong is that whoever reads the output (`| head`) has seen enough.
+fn reader_left(error: &anyhow::Error) -> bool {
+    let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
+    kind == Some(std::io::ErrorKind::BrokenPipe)
 }
 
 /// The one place that prints an error: its chain, outermost first.
