@@ -99,7 +99,7 @@ pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn
         number += 1;
         let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
         let start = task.start.clone().unwrap_or(world);
-        let mut solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
+        let solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
             let house = House::new(scene.clone(), start.clone());
             let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon));
@@ -204,7 +204,12 @@ fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> 
 
 impl Pair {
     /// The class that the policy picks up first when it is told to take one of the two.
-    fn first_pickup(&self, policy: &mut dyn Policy, told: usize, rng: &mut ChaCha8Rng) -> anyhow::Result<Option<Class>> {
+    fn first_pickup(
+        &self,
+        policy: &mut dyn Policy,
+        told: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Option<Class>> {
         let (roles, subtasks) = pickup(self.objects[told]);
         let instruction = phrases::sentence(&roles, &subtasks[0], rng);
         let house = House::new(self.scene.clone(), self.world.clone());

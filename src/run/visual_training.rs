@@ -1,5 +1,6 @@
 //! Trains the visual encoder on drawn frames of a dataset, and computes the feature maps of all its frames.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,7 +51,8 @@ pub fn train(
             return Ok(false);
         }
         let step = learner.step();
-        let (images, known) = batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
+        let (images, known) =
+            batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
         learner.begin_step();
         let loss = heads.loss(&encoder.forward(&images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
@@ -124,7 +126,10 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
     let depth: Vec<f32> = sights.iter().flat_map(|sight| sight.depth.iter().copied()).collect();
     let device = encoder.device();
     let known = Known {
-        marks: Tensor::from_slice(&gather(|sight| &sight.marks)).view([n, MARKS as i64, SIDE, SIDE]).to_device(device).to_kind(Kind::Float),
+        marks: Tensor::from_slice(&gather(|sight| &sight.marks))
+            .view([n, MARKS as i64, SIDE, SIDE])
+            .to_device(device)
+            .to_kind(Kind::Float),
         depth: Tensor::from_slice(&depth).view([n, 1, SIDE, SIDE]).to_device(device),
         held: Tensor::from_slice(&held).to_device(device),
     };
@@ -134,13 +139,14 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
 /// Frames that are encoded at once.
 const CHUNK: usize = 256;
 
-/// Computes the feature map of every frame into `folder`. Returns false when it was stopped; nothing is written then.
+/// Computes the feature map of every frame of some trajectories into `folder`. Returns false when it was stopped; nothing is written then.
 ///
 /// # Errors
 /// When a frame cannot be drawn or the file not be written.
 pub fn encode(
     encoder: &VisualEncoder,
     footage: &Footage,
+    trajectories: Range<usize>,
     folder: &Path,
     header: &Header,
     report: &mut dyn Report,
@@ -150,7 +156,8 @@ pub fn encode(
     let mut pending: Vec<Vec<u8>> = Vec::new();
     let mut done = 0;
     let spec = encoder.spec();
-    let trajectories: Vec<usize> = (0..footage.trajectories.len()).collect();
+    let frames = footage.frames_of(&trajectories);
+    let trajectories: Vec<usize> = trajectories.collect();
     for group in trajectories.chunks(16) {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
@@ -166,13 +173,13 @@ pub fn encode(
         let drawn: Vec<Vec<Vec<u8>>> =
             group.par_iter().map_init(|| Renderer::new(House::FRAME), draw).collect::<anyhow::Result<_>>()?;
         pending.extend(drawn.into_iter().flatten());
-        let whole = if done + pending.len() == footage.frames() { pending.len() } else { pending.len() / CHUNK * CHUNK };
+        let whole = if done + pending.len() == frames { pending.len() } else { pending.len() / CHUNK * CHUNK };
         for chunk in pending[..whole].chunks(CHUNK) {
             writer.add(&half_bytes(&encoder.encode(chunk))?)?;
         }
         pending.drain(..whole);
         done += whole;
-        report.step(&Scalars::new("features", done as u64, footage.frames() as u64))?;
+        report.step(&Scalars::new("features", done as u64, frames as u64))?;
     }
     writer.finish()?;
     Ok(true)
@@ -266,7 +273,7 @@ mod tests {
             maps: 10,
             numbers: preset.visual.map() as u64,
         };
-        assert!(encode(&encoder, &footage, folder.path(), &header, &mut notes, &stop).unwrap());
+        assert!(encode(&encoder, &footage, 0..2, folder.path(), &header, &mut notes, &stop).unwrap());
         let features = Features::read(folder.path(), &header).unwrap().unwrap();
         let map = |frame| {
             let mut bytes = Vec::new();
