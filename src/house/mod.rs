@@ -3,6 +3,7 @@
 pub mod bounds;
 pub mod camera;
 pub mod doors;
+pub mod expert;
 pub mod goals;
 pub mod grading;
 pub mod outcome;
