@@ -1,5 +1,9 @@
 //! Agents: what decides the next action.
 
+pub mod checkpoint;
+pub mod learned;
 pub mod policy;
+pub mod select;
 
+pub use learned::LearnedPolicy;
 pub use policy::{Decision, Mind, Policy, Situation};
