@@ -126,7 +126,7 @@ def unfit(folder, fetched=False):
         return "which does not hold libtorch with its headers"
     if version.split("+")[0] != VERSION:
         return f"which holds libtorch {version} where {VERSION} is needed"
-    libraries = ["libtorch.so", "libtorch_cpu.so", "libc10.so"]
+    libraries = ["libtorch_cpu.so", "libc10.so", "libtorch.so"]
     if fetched:
         libraries += ["libgomp.so.1"] + ([] if version.endswith("+cpu") else list(CUDA_PARTS))
     for name in libraries:
@@ -190,7 +190,7 @@ def fetch_libtorch(work, folder):
     (new / "build-version").write_text(VERSION + ("" if cuda else "+cpu") + "\n")
     reason = unfit(new, fetched=True)
     if reason:
-        raise Trouble(f"the download of libtorch is not whole ({reason}); run `make setup` again")
+        raise Trouble(f"the download of libtorch is not whole ({reason.split(' ', 1)[1]}); run `make setup` again")
     move_into_place(new, folder, work)
 
 
@@ -208,9 +208,24 @@ def find_encoder(home):
 
 
 def whole_encoder(folder):
-    """Whether all files are there and those that matter are the published ones."""
-    there = all((folder / name).is_file() for name in ENCODER_PARTS)
-    return there and all(sha256(folder / name) == known for name, known in ENCODER_FILES.items())
+    """Whether all files are there and those that matter are the published ones.
+
+    Files that were found right are not hashed again until their size or time changes.
+    """
+    if not all((folder / name).is_file() for name in (*ENCODER_PARTS, *ENCODER_FILES)):
+        return False
+    marks = [f"{known} {os.stat(folder / name).st_size} {os.stat(folder / name).st_mtime_ns} {name}"
+             for name, known in ENCODER_FILES.items()]
+    checked = folder / ".checked"
+    if checked.is_file() and checked.read_text().splitlines() == marks:
+        return True
+    if not all(sha256(folder / name) == known for name, known in ENCODER_FILES.items()):
+        return False
+    try:
+        checked.write_text("\n".join(marks) + "\n")
+    except OSError:
+        pass
+    return True
 
 
 def sha256(path):
