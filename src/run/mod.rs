@@ -8,6 +8,7 @@ pub mod report;
 pub mod rollout;
 pub mod scenes;
 pub mod stats;
+pub mod tasks;
 pub mod threshold;
 
 pub use evaluate::evaluate;
