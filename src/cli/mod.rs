@@ -6,7 +6,9 @@ use clap::{Parser, Subcommand};
 
 mod doctor;
 mod embed;
+mod import;
 mod logging;
+mod replay;
 mod shell;
 mod terminal;
 
@@ -23,6 +25,10 @@ struct Cli {
 enum Command {
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
+    /// Make a dataset folder of ALFRED's published files
+    Import(import::Import),
+    /// Re-run recorded demonstrations in the simulator
+    Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
     Embed(embed::Embed),
     /// Print a completion script for a shell
@@ -73,6 +79,8 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
         Command::Doctor(doctor) => doctor.run(),
+        Command::Import(import) => import.run(),
+        Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),
         Command::Man => shell::man(),

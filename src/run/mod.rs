@@ -5,6 +5,7 @@ pub mod evaluate;
 pub mod folder;
 pub mod page;
 pub mod report;
+pub mod replay;
 pub mod rollout;
 pub mod scenes;
 pub mod stats;
