@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub mod camera;
+pub mod expert;
 pub mod goals;
 pub mod grading;
 pub mod outcome;
