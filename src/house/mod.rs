@@ -1,12 +1,16 @@
 //! House: the simulator. Rules, what is seen, graders, the expert, and generated floor plans.
 
+pub mod bounds;
 pub mod camera;
+pub mod goals;
 pub mod grading;
 pub mod outcome;
 pub mod placing;
 pub mod render;
 pub mod rules;
 pub mod session;
+#[cfg(test)]
+pub mod testing;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};

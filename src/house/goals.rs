@@ -1,0 +1,57 @@
+//! ALFRED's seven goal conditions: names are matched by their parts, and containment is transitive.
+
+use crate::domain::skill::{Goal, GoalKind};
+use crate::domain::world::{Instance, Object};
+use crate::domain::{Class, Scene, World};
+
+/// Whether the goal of a whole trajectory is met in this world.
+pub fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
+    let is_in = |content: u16, holder: Instance| world.is_in(Instance::Object(content), holder);
+    let placed = |content: u16| receptacles(goal.receptacle, scene, world).any(|holder| is_in(content, holder));
+    let mut targets = objects(goal, world);
+    match goal.kind {
+        GoalKind::LookAtObjInLight => {
+            let lit = (0u16..)
+                .zip(&scene.fixtures)
+                .any(|(index, fixture)| names(goal.lamp, fixture.class) && world.is_on(Instance::Fixture(index)));
+            lit && targets.any(|(index, _)| world.held == Some(index))
+        }
+        GoalKind::PickAndPlaceSimple => targets.any(|(index, _)| placed(index)),
+        GoalKind::PickCleanThenPlaceInRecep => targets.any(|(index, object)| object.clean && placed(index)),
+        GoalKind::PickCoolThenPlaceInRecep => targets.any(|(index, object)| object.cold && placed(index)),
+        GoalKind::PickHeatThenPlaceInRecep => targets.any(|(index, object)| object.hot && placed(index)),
+        GoalKind::PickAndPlaceWithMovableRecep => {
+            let carries = |movable: u16, content: u16| is_in(content, Instance::Object(movable)) && placed(movable);
+            targets.any(|(content, _)| movables(goal.movable, world).any(|movable| carries(movable, content)))
+        }
+        GoalKind::PickTwoObjAndPlace => {
+            let targets: Vec<u16> = targets.map(|(index, _)| index).collect();
+            let inside = |holder: Instance| targets.iter().filter(|&&index| is_in(index, holder)).count();
+            receptacles(goal.receptacle, scene, world).any(|holder| inside(holder) >= 2)
+        }
+    }
+}
+
+/// Whether `wanted`'s name is part of `class`'s, as ALFRED matches: a "Knife" is also a "ButterKnife".
+fn names(wanted: Option<Class>, class: Class) -> bool {
+    wanted.is_some_and(|wanted| class.name().contains(wanted.name()))
+}
+
+/// The objects that the goal is about: those that can be picked up, and only slices where slices are meant.
+fn objects<'a>(goal: &'a Goal, world: &'a World) -> impl Iterator<Item = (u16, &'a Object)> {
+    (0u16..).zip(&world.objects).filter(|(_, object)| {
+        names(Some(goal.object), object.class) && !object.sliced && (!goal.sliced || object.slice_of.is_some())
+    })
+}
+
+fn receptacles(wanted: Option<Class>, scene: &Scene, world: &World) -> impl Iterator<Item = Instance> {
+    let fits = move |class: Class| names(wanted, class) && class.info().receptacle;
+    let fixtures = (0u16..).zip(&scene.fixtures).filter(move |(_, fixture)| fits(fixture.class));
+    let movable = (0u16..).zip(&world.objects).filter(move |(_, object)| fits(object.class));
+    fixtures.map(|(index, _)| Instance::Fixture(index)).chain(movable.map(|(index, _)| Instance::Object(index)))
+}
+
+fn movables(wanted: Option<Class>, world: &World) -> impl Iterator<Item = u16> {
+    let carriers = (0u16..).zip(&world.objects).filter(move |(_, object)| names(wanted, object.class));
+    carriers.filter(|(_, object)| object.class.info().receptacle).map(|(index, _)| index)
+}

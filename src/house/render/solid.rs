@@ -1,0 +1,70 @@
+//! The bodies that everything is built of.
+
+use glam::{Mat3, Vec3};
+
+use crate::domain::class::Shape;
+use crate::house::bounds::Extent;
+
+/// A colour before lighting: red, green, blue from 0 to 1.
+pub type Colour = [f32; 3];
+
+/// The outline that a round body turns about its y axis: rings of (height, radius) from bottom to top, each from -1 or 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lathe {
+    /// The rings.
+    pub rings: &'static [[f32; 2]],
+    /// The top is open and one looks inside.
+    pub hollow: bool,
+}
+
+/// What kind of body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A box; the bits of `missing` leave out faces (-x, +x, -y, +y, -z, +z from the lowest), and then one looks inside.
+    Box {
+        /// Which faces are left out.
+        missing: u8,
+    },
+    /// A body of revolution.
+    Lathe(Lathe),
+    /// An ellipsoid.
+    Ellipsoid,
+}
+
+/// A body in space. Lengths in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solid {
+    /// What kind.
+    pub kind: Kind,
+    /// Its middle.
+    pub centre: Vec3,
+    /// Columns: its half axes, at right angles to each other.
+    pub axes: Mat3,
+    /// Outside.
+    pub colour: Colour,
+    /// Inside, where one can look inside.
+    pub inner: Colour,
+    /// It shines: no shading.
+    pub glows: bool,
+}
+
+/// A plain upright cylinder.
+pub const CYLINDER: Lathe = Lathe { rings: &[[-1.0, 1.0], [1.0, 1.0]], hollow: false };
+
+impl Solid {
+    /// A closed body of the given extent in one colour.
+    pub fn filling(extent: &Extent, colour: Colour) -> Solid {
+        let kind = match extent.shape {
+            Shape::Box => Kind::Box { missing: 0 },
+            Shape::Cylinder => Kind::Lathe(CYLINDER),
+            Shape::Ellipsoid => Kind::Ellipsoid,
+        };
+        Solid { kind, centre: extent.centre, axes: extent.axes, colour, inner: colour.map(|c| 0.6 * c), glows: false }
+    }
+
+    /// The radius of a ball around the middle that holds it.
+    pub fn radius(&self) -> f32 {
+        let squared = |axis: Vec3| axis.length_squared();
+        (squared(self.axes.x_axis) + squared(self.axes.y_axis) + squared(self.axes.z_axis)).sqrt()
+    }
+}
