@@ -151,7 +151,7 @@ mod tests {
     fn every_class_of_a_scene_has_a_letter_of_its_own() {
         let objects = Class::all().filter(|class| class.info().pickupable).map(|class| Object { class, ..Object::default() });
         let world = World { objects: objects.collect(), ..World::default() };
-        let scene = crate::tui::sample::scene();
+        let (scene, _) = crate::house::testing::kitchen();
         let letters = Letters::of(&scene, &world);
         let mut dealt: Vec<char> = letters.0.values().copied().filter(|c| c.is_ascii_alphanumeric()).collect();
         dealt.sort_unstable();

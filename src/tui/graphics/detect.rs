@@ -18,9 +18,8 @@ pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
     if get("NO_COLOR").is_some() {
         return (Protocol::Ascii, "NO_COLOR is set".into());
     }
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(get).unwrap_or_default();
-    if !locale.is_empty() && !locale.to_lowercase().replace('-', "").contains("utf8") {
-        return (Protocol::Ascii, format!("the locale is {locale:?}, not UTF-8"));
+    if !shows_unicode(&variable) {
+        return (Protocol::Ascii, "the locale is not UTF-8".into());
     }
     for (inside, name) in [("TMUX", "tmux"), ("STY", "screen"), ("ZELLIJ", "zellij"), ("MOSH_CONNECTION", "mosh")] {
         if get(inside).is_some() || term.starts_with(name) {
@@ -53,6 +52,14 @@ pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
         return (Protocol::Sixel, format!("TERM is {term}"));
     }
     (Protocol::HalfBlocks, UNKNOWN.into())
+}
+
+/// Whether characters beyond ASCII may be sent: the locale does not say otherwise.
+pub fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let get = |name: &str| variable(name).filter(|value| !value.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(get).unwrap_or_default();
+    let dumb = get("TERM").is_none_or(|term| term == "dumb");
+    !dumb && (locale.is_empty() || locale.to_lowercase().replace('-', "").contains("utf8"))
 }
 
 /// The reason for half-blocks where nothing tells the terminal apart.
