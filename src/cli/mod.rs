@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod doctor;
+mod embed;
 mod logging;
 mod shell;
 mod terminal;
@@ -22,6 +23,8 @@ struct Cli {
 enum Command {
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
+    /// Embed sentences: a sentence a line in, a JSON array a line out
+    Embed(embed::Embed),
     /// Print a completion script for a shell
     Completions(shell::Completions),
     /// Print the manual page (roff)
@@ -58,6 +61,7 @@ pub fn main() -> ExitCode {
     logging::start();
     match run(cli.command) {
         Ok(ending) => ending.into(),
+        Err(error) if reader_left(&error) => Ending::Ok.into(),
         Err(error) => {
             tracing::error!("{error:#}");
             complain(&error);
@@ -69,9 +73,16 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
         Command::Doctor(doctor) => doctor.run(),
+        Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),
         Command::Man => shell::man(),
     }
+}
+
+/// Whether all that went wrong is that whoever reads the output (`| head`) has seen enough.
+fn reader_left(error: &anyhow::Error) -> bool {
+    let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
+    kind == Some(std::io::ErrorKind::BrokenPipe)
 }
 
 /// The one place that prints an error: its chain, outermost first.

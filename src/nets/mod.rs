@@ -2,4 +2,13 @@
 
 pub mod device;
 pub mod home;
+pub mod weights;
+
+pub mod embedding_cache;
 pub mod sentence;
+
+mod bert;
+mod encoder_stack;
+mod mpnet;
+mod pooling;
+mod transformer;

@@ -1,0 +1,302 @@
+//! The whole import: find the files, read them, build scenes, resolve trajectories, write the dataset.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use anyhow::{Context, bail};
+use rayon::prelude::*;
+
+use super::files::{SceneOnly, TrajData};
+use super::layout::Layout;
+use super::recording::{Recording, Setting};
+use super::tasks::{self, OFFICIAL};
+use super::{parents, scenes, trajectories};
+use crate::data::dataset::{Counts, Manifest, Skipped, Writer};
+use crate::domain::{Scene, Trajectory};
+
+/// What can be chosen about an import.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// A folder with the authors' lists of the official task sets.
+    pub eval_lists: Option<PathBuf>,
+}
+
+/// How far an import has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Files read, of how many.
+    Reading(u64, u64),
+    /// Scenes built, of how many.
+    Building(u64, u64),
+    /// Trajectories written, of how many.
+    Writing(u64, u64),
+}
+
+/// What became of an official task set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SetBuilt {
+    /// Its name.
+    pub name: &'static str,
+    /// How many tasks it has, or why it was left out.
+    pub tasks: Result<usize, String>,
+}
+
+/// What an import came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// What was written.
+    pub manifest: Manifest,
+    /// The official task sets.
+    pub sets: Vec<SetBuilt>,
+}
+
+struct Source {
+    path: PathBuf,
+    /// Relative to the checkout, for messages.
+    shown: String,
+    split: String,
+    id: String,
+}
+
+enum Parsed {
+    Recording(Box<Recording>),
+    Setting(Setting),
+}
+
+/// Imports the ALFRED checkout `source` into the dataset folder `out`.
+///
+/// # Errors
+/// When `source` is no checkout, no file of it can be used, or `out` cannot be written. Single files that cannot be used are
+/// listed in the summary instead.
+pub fn import(
+    source: &Path,
+    out: &Path,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> anyhow::Result<Summary> {
+    let files = find(source)?;
+    let mut entries = Vec::new();
+    for set in OFFICIAL {
+        let listed = options.eval_lists.as_deref().map(|folder| tasks::listed(set, folder)).transpose()?.flatten();
+        entries.push(listed.unwrap_or_else(|| tasks::indexed(set)));
+    }
+    let mut writer = Writer::new(out)?;
+    let (recordings, settings, mut skipped) = read(&files, progress);
+    if recordings.is_empty() {
+        let why = skipped.first().map(|skip| format!("; {}: {}", skip.file, skip.reason)).unwrap_or_default();
+        bail!("{}: none of {} files could be used{why}", source.display(), files.len());
+    }
+    let built = build_all(source, &recordings, &settings, progress);
+    let mut plans = Vec::new();
+    let mut found = Vec::new();
+    for (scene, resolved, bad) in built {
+        plans.extend(scene);
+        found.extend(resolved);
+        skipped.extend(bad);
+    }
+    skipped.sort_by(|a, b| a.file.cmp(&b.file));
+    found.sort_by(|a, b| (split_rank(&a.split), &a.split, &a.id).cmp(&(split_rank(&b.split), &b.split, &b.id)));
+    for scene in &plans {
+        writer.scene(scene)?;
+    }
+    for (number, trajectory) in found.iter().enumerate() {
+        writer.trajectory(trajectory)?;
+        progress(Progress::Writing(number as u64 + 1, found.len() as u64));
+    }
+    let by_id: BTreeMap<&str, &Trajectory> = found.iter().map(|trajectory| (&*trajectory.id, trajectory)).collect();
+    let by_name: BTreeMap<&str, &Scene> = plans.iter().map(|scene| (&*scene.name, scene)).collect();
+    let mut sets = Vec::new();
+    for (set, entries) in OFFICIAL.into_iter().zip(&entries) {
+        let tasks = tasks::build(set, entries, &by_id, &by_name);
+        if let Ok(built) = &tasks {
+            writer.tasks(set.file, built)?;
+        }
+        sets.push(SetBuilt { name: set.name, tasks: tasks.map(|set| set.tasks.len()) });
+    }
+    let chain = tasks::indexed(OFFICIAL[1]);
+    let held_out = chain.iter().map(tasks::Entry::trajectory).filter(|id| by_id.contains_key(id));
+    let held_out: Vec<String> = held_out.map(str::to_owned).collect();
+    let manifest = Manifest {
+        format_version: Manifest::FORMAT,
+        source: "alfred".to_owned(),
+        counts: counts(&found, &held_out),
+        scenes: plans.len() as u64,
+        held_out,
+        skipped,
+    };
+    writer.finish(&manifest)?;
+    Ok(Summary { manifest, sets })
+}
+
+/// Order of splits in the dataset.
+fn split_rank(split: &str) -> usize {
+    ["train", "valid_seen", "valid_unseen"].iter().position(|&known| known == split).unwrap_or(3)
+}
+
+/// Every `traj_data.json` of the checkout.
+fn find(source: &Path) -> anyhow::Result<Vec<Source>> {
+    let folders = ["data/json_2.1.0", "data/full_2.1.0", "data/json_feat_2.1.0"];
+    let Some(data) = folders.iter().map(|folder| source.join(folder)).find(|folder| folder.is_dir()) else {
+        bail!(
+            "{} is no ALFRED checkout: it has no folder data/json_2.1.0 (see the dataset's download script)",
+            source.display()
+        );
+    };
+    let mut files = Vec::new();
+    for split in folders_in(&data)? {
+        let name = split.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let mut open = vec![(split.clone(), 0)];
+        while let Some((folder, depth)) = open.pop() {
+            let path = folder.join("traj_data.json");
+            if path.is_file() {
+                let shown = path.strip_prefix(source).unwrap_or(&path).display().to_string();
+                let id = folder.strip_prefix(&split).unwrap_or(&folder).to_string_lossy().replace('\\', "/");
+                files.push(Source { path, shown, split: name.clone(), id });
+            } else if depth < 3 {
+                open.extend(folders_in(&folder)?.into_iter().map(|inner| (inner, depth + 1)));
+            }
+        }
+    }
+    if files.is_empty() {
+        bail!("{} holds no traj_data.json", data.display());
+    }
+    files.sort_by(|a, b| a.shown.cmp(&b.shown));
+    Ok(files)
+}
+
+fn folders_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let mut folders = Vec::new();
+    for entry in entries {
+        let path = entry.with_context(|| folder.display().to_string())?.path();
+        if path.is_dir() {
+            folders.push(path);
+        }
+    }
+    folders.sort();
+    Ok(folders)
+}
+
+/// Reads and checks all files, on all cores.
+fn read(files: &[Source], progress: &(dyn Fn(Progress) + Sync)) -> (Vec<Recording>, Vec<Setting>, Vec<Skipped>) {
+    let done = AtomicU64::new(0);
+    let parsed: Vec<Result<Parsed, Skipped>> = files
+        .par_iter()
+        .map(|file| {
+            let parsed = parse(file).map_err(|reason| Skipped { file: file.shown.clone(), reason });
+            progress(Progress::Reading(done.fetch_add(1, Ordering::Relaxed) + 1, files.len() as u64));
+            parsed
+        })
+        .collect();
+    let (mut recordings, mut settings, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
+    for item in parsed {
+        match item {
+            Ok(Parsed::Recording(recording)) => recordings.push(*recording),
+            Ok(Parsed::Setting(setting)) => settings.push(setting),
+            Err(skip) => skipped.push(skip),
+        }
+    }
+    (recordings, settings, skipped)
+}
+
+fn parse(file: &Source) -> Result<Parsed, String> {
+    let text = std::fs::read(&file.path).map_err(|error| error.to_string())?;
+    // The test splits publish no plan: further states of their scenes.
+    if file.split.starts_with("tests") {
+        let data: SceneOnly = serde_json::from_slice(&text).map_err(|error| error.to_string())?;
+        return Ok(Parsed::Setting(Setting::new(&data.scene)?));
+    }
+    parse_recording(&text, &file.id, &file.split).map(|recording| Parsed::Recording(Box::new(recording)))
+}
+
+/// Reads and checks one `traj_data.json`.
+///
+/// # Errors
+/// What is wrong with it, naming the field.
+pub fn parse_recording(text: &[u8], id: &str, split: &str) -> Result<Recording, String> {
+    let data: TrajData = serde_json::from_slice(text).map_err(|error| error.to_string())?;
+    Recording::new(id.to_owned(), split.to_owned(), data)
+}
+
+type BuiltScene = (Option<Scene>, Vec<Trajectory>, Vec<Skipped>);
+
+/// Builds every scene and resolves its recordings, on all cores.
+fn build_all(
+    source: &Path,
+    recordings: &[Recording],
+    settings: &[Setting],
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Vec<BuiltScene> {
+    let mut plans: BTreeMap<&str, (Vec<&Recording>, Vec<&Setting>)> = BTreeMap::new();
+    for recording in recordings {
+        let plan = plans.entry(&recording.setting.floor_plan).or_default();
+        plan.0.push(recording);
+        plan.1.push(&recording.setting);
+    }
+    for setting in settings {
+        plans.entry(&setting.floor_plan).or_default().1.push(setting);
+    }
+    let total = plans.len() as u64;
+    let done = AtomicU64::new(0);
+    let folder = source.join("gen/layouts");
+    let plans: Vec<_> = plans.into_iter().collect();
+    plans
+        .par_iter()
+        .map(|(name, (recordings, settings))| {
+            let built = build_one(&folder, name, recordings, settings);
+            progress(Progress::Building(done.fetch_add(1, Ordering::Relaxed) + 1, total));
+            built
+        })
+        .collect()
+}
+
+fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&Setting]) -> BuiltScene {
+    let mut skipped = Vec::new();
+    let layout = Layout::read(folder, name).unwrap_or_else(|error| {
+        skipped.push(Skipped { file: format!("gen/layouts/{name}"), reason: format!("{error:#}") });
+        Layout::default()
+    });
+    let skip = |recording: &&Recording, reason: String| Skipped {
+        file: format!("data/json_2.1.0/{}/{}/traj_data.json", recording.split, recording.id),
+        reason,
+    };
+    let Some(room) = settings.first().map(|setting| setting.room) else { return (None, vec![], skipped) };
+    let built = match scenes::build(name, room, &layout, recordings, settings) {
+        Ok(built) => built,
+        Err(reason) => {
+            skipped.extend(recordings.iter().map(|recording| skip(recording, reason.clone())));
+            return (None, vec![], skipped);
+        }
+    };
+    let mut resolved = Vec::new();
+    for recording in recordings {
+        let parents = parents::parents(recording, &built.inventory, &built.recorded, &built.scene.fixtures);
+        match trajectories::resolve(recording, &built.scene, &built.inventory, &parents) {
+            Ok(trajectory) => resolved.push(trajectory),
+            Err(reason) => skipped.push(skip(recording, reason)),
+        }
+    }
+    (Some(built.scene), resolved, skipped)
+}
+
+/// How much of each split there is.
+fn counts(trajectories: &[Trajectory], held_out: &[String]) -> BTreeMap<String, Counts> {
+    let mut counts: BTreeMap<String, Counts> = BTreeMap::new();
+    for trajectory in trajectories {
+        let count = counts.entry(trajectory.split.clone()).or_default();
+        let skills = trajectory.skills.len() as u64;
+        let spans = skills * (skills - 1) / 2;
+        let whole = u64::from(skills > 1 && held_out.contains(&trajectory.id));
+        count.trajectories += 1;
+        for annotation in &trajectory.annotations {
+            count.annotated_primitives += skills;
+            count.spans += spans;
+            if annotation.steps.len() as u64 == skills {
+                count.aligned_primitives += skills;
+                count.spans_after_holdout += spans - whole;
+            }
+        }
+    }
+    counts
+}

@@ -1,0 +1,86 @@
+//! A floor plan put together from everything that is recorded of it.
+
+use super::fixtures::Inventory;
+use super::layout::Layout;
+use super::recording::{Recording, Setting};
+use super::support::{self, Standing};
+use super::{bodies, facing, walls};
+use crate::domain::{Cell, Fixture, Room, Scene};
+
+/// A floor plan and what is needed to resolve recordings against it.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The scene.
+    pub scene: Scene,
+    /// Names of its fixtures.
+    pub inventory: Inventory,
+    /// Points that recordings assign to fixtures.
+    pub recorded: Vec<Standing>,
+}
+
+/// Builds one floor plan from its layout, its recordings, and further states of it.
+///
+/// # Errors
+/// When there is no cell to stand on.
+pub fn build(
+    name: &str,
+    room: Room,
+    layout: &Layout,
+    recordings: &[&Recording],
+    settings: &[&Setting],
+) -> Result<Built, String> {
+    let inventory = Inventory::gather(layout, recordings);
+    let cells = cells(layout, recordings, settings);
+    if cells.is_empty() {
+        return Err(format!("{name}: no file says where the agent can stand"));
+    }
+    let agent_y = support::median(settings.iter().map(|setting| setting.agent_y));
+    let floor = agent_y - 900;
+    let recorded = support::recorded(recordings, &inventory);
+    let assigned = support::assigned(settings, &recorded);
+    let fixture = |number: usize| {
+        let found = &inventory.found[number];
+        let facing = facing::facing(found, &cells);
+        let surfaces = support::surfaces(&inventory, number as u16, &assigned, &cells, facing, floor);
+        Fixture {
+            id: found.name.text(),
+            class: found.name.class,
+            pivot: found.pivot,
+            facing,
+            body: bodies::body(found, &surfaces, facing, floor),
+            surfaces,
+            stand: found.vetted.or_else(|| found.walked_to.first().copied()),
+        }
+    };
+    let fixtures: Vec<Fixture> = (0..inventory.found.len()).map(fixture).collect();
+    let walls = walls::around(&cells, &fixtures, floor);
+    let scene = Scene {
+        format_version: Scene::FORMAT,
+        name: name.to_owned(),
+        room,
+        agent_y,
+        cells,
+        fixtures,
+        walls,
+        meshes: Vec::new(),
+    };
+    Ok(Built { scene, inventory, recorded })
+}
+
+/// The published cells and all that anybody stood on.
+fn cells(layout: &Layout, recordings: &[&Recording], settings: &[&Setting]) -> Vec<Cell> {
+    let mut cells = layout.cells.clone();
+    cells.extend(settings.iter().map(|setting| setting.agent.cell));
+    for recording in recordings {
+        let poses = recording.poses();
+        cells.extend(poses.iter().map(|pose| pose.cell));
+        if let (Some(last), Some(step)) = (poses.last(), recording.steps.last())
+            && step.kind == crate::domain::ActionType::MoveAhead
+        {
+            cells.push(last.cell.ahead(last.heading));
+        }
+    }
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}

@@ -1,0 +1,256 @@
+//! The three official task sets, rebuilt from trajectories: which spans they are lies in an index of identifiers.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Context;
+use serde::Deserialize;
+
+use crate::domain::skill::Original;
+use crate::domain::task::{Task, TaskSet};
+use crate::domain::world::{Instance, World};
+use crate::domain::{Role, Scene, Subtask, Trajectory};
+use crate::house::rules;
+
+/// One of the official sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Official {
+    /// What it is called in reports.
+    pub name: &'static str,
+    /// Its file under `tasks/`, without the ending.
+    pub file: &'static str,
+    /// The authors' file.
+    pub list: &'static str,
+}
+
+/// The three sets.
+pub const OFFICIAL: [Official; 3] = [
+    Official { name: "EVAL_100", file: "eval_100", list: "eval_instruct_ann_human.json" },
+    Official { name: "EVAL_CHAIN", file: "eval_chain", list: "eval_length_ann_human.json" },
+    Official { name: "EVAL_UNSEEN", file: "eval_unseen", list: "eval_scene_ann_human.json" },
+];
+
+/// Which text tells the agent what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Wording {
+    /// The annotator's sentence for the whole trajectory.
+    Goal,
+    /// The annotator's sentences for the skills.
+    Steps,
+    /// A text that only the authors' file holds: the annotator's sentences stand in.
+    Elsewhere,
+    /// The text itself.
+    Given(String),
+}
+
+/// One task of an official set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    trajectory: String,
+    annotator: usize,
+    first: usize,
+    skills: usize,
+    wording: Wording,
+}
+
+impl Entry {
+    /// The trajectory's id.
+    pub fn trajectory(&self) -> &str {
+        &self.trajectory
+    }
+}
+
+/// The entries of a set by the index that the program carries.
+pub fn indexed(set: Official) -> Vec<Entry> {
+    let index = include_str!("../../../assets/eval_index.tsv");
+    let rows = index.lines().map(|line| line.split('\t').collect::<Vec<_>>());
+    let entry = |row: Vec<&str>| match row[..] {
+        [name, _, trajectory, annotator, first, skills, wording] if name == set.name => Some(Entry {
+            trajectory: trajectory.to_owned(),
+            annotator: annotator.parse().ok()?,
+            first: first.parse().ok()?,
+            skills: skills.parse().ok()?,
+            wording: match wording {
+                "task_desc" => Wording::Goal,
+                "high_desc" => Wording::Steps,
+                _ => Wording::Elsewhere,
+            },
+        }),
+        _ => None,
+    };
+    rows.filter_map(entry).collect()
+}
+
+/// One item of the authors' file.
+#[derive(Deserialize)]
+struct Listed {
+    task: String,
+    repeat_id: usize,
+    subgoal_ids: Vec<usize>,
+    annotation: String,
+}
+
+/// The entries of a set by the authors' own file in `folder`; `None` where it is absent.
+///
+/// # Errors
+/// When the file is there but malformed.
+pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Entry>>> {
+    let path = folder.join(set.list);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    let mut items: Vec<Listed> = serde_json::from_slice(&text).with_context(|| path.display().to_string())?;
+    // The task number on the authors' command line is the position in this order.
+    items.sort_by_key(|item| std::cmp::Reverse(item.subgoal_ids.len()));
+    let entry = |(number, item): (usize, Listed)| {
+        let first = item.subgoal_ids.first().copied();
+        let adjacent = item.subgoal_ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));
+        let first = first.filter(|_| adjacent).with_context(|| {
+            format!("{}: item {number}: subgoal_ids: {:?} is no span", path.display(), item.subgoal_ids)
+        })?;
+        Ok(Entry {
+            trajectory: item.task,
+            annotator: item.repeat_id,
+            first,
+            skills: item.subgoal_ids.len(),
+            wording: Wording::Given(item.annotation.trim().to_owned()),
+        })
+    };
+    items.into_iter().enumerate().map(entry).collect::<anyhow::Result<Vec<_>>>().map(Some)
+}
+
+/// Builds a set. `find` gives a trajectory and its scene by id.
+///
+/// # Errors
+/// Names the first entry that cannot be built.
+pub fn build<'a>(
+    set: Official,
+    entries: &[Entry],
+    trajectories: &BTreeMap<&str, &'a Trajectory>,
+    scenes: &BTreeMap<&str, &'a Scene>,
+) -> Result<TaskSet, String> {
+    let task = |(number, entry): (usize, &Entry)| {
+        let wrong = |what: &str| format!("task {number} ({}): {what}", entry.trajectory);
+        let trajectory = trajectories.get(entry.trajectory.as_str()).ok_or_else(|| wrong("its trajectory is absent"))?;
+        let crate::domain::task::SceneRef::Named(scene) = &trajectory.scene else {
+            return Err(wrong("its scene has no name"));
+        };
+        let scene = scenes.get(scene.as_str()).ok_or_else(|| wrong("its scene is absent"))?;
+        let id = format!("{}-{number}", set.name);
+        cut(id, trajectory, scene, entry).map_err(|error| wrong(&error))
+    };
+    let tasks = entries.iter().enumerate().map(task).collect::<Result<Vec<_>, _>>()?;
+    Ok(TaskSet {
+        format_version: TaskSet::FORMAT,
+        name: set.name.to_owned(),
+        scenes: Some("../scenes".to_owned()),
+        tasks,
+    })
+}
+
+/// Cuts a span out of a trajectory: the expert's actions before it are replayed, and what they handled stays bound.
+fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Result<Task, String> {
+    let span = entry.first..entry.first.saturating_add(entry.skills);
+    let skills = trajectory.skills.get(span.clone()).filter(|skills| !skills.is_empty()).ok_or_else(|| {
+        format!("skills {span:?} do not exist; there are {}", trajectory.skills.len())
+    })?;
+    let annotation = trajectory.annotations.get(entry.annotator);
+    let annotation = annotation.ok_or_else(|| format!("annotator {} does not exist", entry.annotator))?;
+    let sentences = annotation.steps.get(span.clone()).map(<[String]>::to_vec).unwrap_or_default();
+    let from = trajectory.skill_range(span.start).start;
+    let until = trajectory.skill_range(span.end - 1).end;
+    let mut start = trajectory.start.clone();
+    for (number, &action) in trajectory.actions[..from].iter().enumerate() {
+        if let crate::house::Outcome::Impossible(reason) = rules::apply(scene, &mut start, action) {
+            return Err(format!("the expert's action {number} is not possible: {reason}"));
+        }
+    }
+    let (roles, subtasks) = roles(trajectory, span.clone(), &start);
+    let joined = || sentences.join(" ");
+    let (instruction, reworded) = match &entry.wording {
+        Wording::Goal => (annotation.goal.clone(), false),
+        Wording::Steps => (joined(), false),
+        Wording::Elsewhere => (joined(), true),
+        Wording::Given(text) => (text.clone(), false),
+    };
+    if instruction.is_empty() {
+        return Err(format!("annotator {} has no sentence for it", entry.annotator));
+    }
+    debug_assert_eq!(skills.len(), subtasks.len());
+    let expert_steps = (until - from) as u32;
+    Ok(Task {
+        id,
+        scene: trajectory.scene.clone(),
+        start: Some(start),
+        instruction,
+        sentences,
+        roles,
+        subtasks,
+        expert_steps,
+        horizon: 2 * expert_steps,
+        goal: trajectory.goal.clone(),
+        source: Some((trajectory.id.clone(), span.start as u8)),
+        reworded,
+    })
+}
+
+/// The roles that a span is about, renumbered; those that the skills before it handled carry what they are bound to.
+fn roles(trajectory: &Trajectory, span: std::ops::Range<usize>, start: &World) -> (Vec<Role>, Vec<Subtask>) {
+    let used = |skill: &Subtask| std::iter::once(skill.object).chain(skill.receptacle);
+    let before: Vec<u8> = trajectory.skills[..span.start].iter().flat_map(used).collect();
+    let mut numbers: Vec<u8> = Vec::new();
+    let mut subtasks = trajectory.skills[span].to_vec();
+    let mut renumber = |old: u8| {
+        let known = numbers.iter().position(|&number| number == old);
+        known.unwrap_or_else(|| {
+            numbers.push(old);
+            numbers.len() - 1
+        }) as u8
+    };
+    for subtask in &mut subtasks {
+        subtask.object = renumber(subtask.object);
+        subtask.receptacle = subtask.receptacle.map(&mut renumber);
+    }
+    let role = |number: &u8| {
+        let role = trajectory.roles[usize::from(*number)].clone();
+        let bound = role.expert.filter(|_| before.contains(number)).and_then(|expert| now(expert, start));
+        Role { bound, ..role }
+    };
+    (numbers.iter().map(role).collect(), subtasks)
+}
+
+/// The instance that an original is in a world.
+fn now(original: Original, world: &World) -> Option<Instance> {
+    match (original.instance, original.slice) {
+        (instance, None) => Some(instance),
+        (Instance::Object(whole), Some(slice)) => {
+            let cut = world.objects.iter().position(|object| object.slice_of == Some((whole, slice)));
+            cut.map(|number| Instance::Object(number as u16))
+        }
+        (Instance::Fixture(_), Some(_)) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_index_holds_the_three_sets_with_25_instructions_elsewhere() {
+        let counts = OFFICIAL.map(|set| indexed(set).len());
+        assert_eq!(counts, [100, 20, 10]);
+        let elsewhere = indexed(OFFICIAL[0]).iter().filter(|entry| entry.wording == Wording::Elsewhere).count();
+        assert_eq!(elsewhere, 25);
+    }
+
+    #[test]
+    fn a_list_that_is_absent_is_none_and_one_without_a_span_names_file_and_field() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(listed(OFFICIAL[0], folder.path()).unwrap(), None);
+        let item = r#"[{"task": "a/b", "repeat_id": 0, "subgoal_ids": [0, 2], "annotation": "x"}]"#;
+        std::fs::write(folder.path().join(OFFICIAL[0].list), item).unwrap();
+        let error = format!("{:#}", listed(OFFICIAL[0], folder.path()).unwrap_err());
+        assert!(error.contains(OFFICIAL[0].list) && error.contains("subgoal_ids"), "{error}");
+    }
+}

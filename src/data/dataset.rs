@@ -1,0 +1,326 @@
+//! A dataset folder: `dataset.json`, `scenes/*.json`, `trajectories.jsonl.zst`, `tasks/*.json`.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, bail, ensure};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::domain::{Scene, TaskSet, Trajectory};
+
+/// How much of a split there is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Counts {
+    /// Trajectories.
+    pub trajectories: u64,
+    /// Skills, once for each annotation of their trajectory.
+    pub annotated_primitives: u64,
+    /// Those whose annotation has one sentence a skill.
+    pub aligned_primitives: u64,
+    /// Runs of two or more skills, once for each annotation.
+    pub spans: u64,
+    /// Those with aligned annotations, without the held-out whole trajectories of EVAL_CHAIN.
+    pub spans_after_holdout: u64,
+}
+
+/// A file that was passed over.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Skipped {
+    /// The file, relative to what was imported.
+    pub file: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// `dataset.json`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of this format.
+    pub format_version: u32,
+    /// Where it came from: `alfred`, `generated`.
+    pub source: String,
+    /// By split.
+    pub counts: BTreeMap<String, Counts>,
+    /// How many scenes there are.
+    pub scenes: u64,
+    /// Trajectories of which the whole must not be trained on as one span.
+    pub held_out: Vec<String>,
+    /// Files that were passed over when it was made.
+    pub skipped: Vec<Skipped>,
+}
+
+impl Manifest {
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+}
+
+/// A dataset folder, opened.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    folder: PathBuf,
+    manifest: Manifest,
+}
+
+impl Dataset {
+    /// Opens a dataset folder.
+    ///
+    /// # Errors
+    /// When `dataset.json` is absent, malformed, or of another version.
+    pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
+        let path = folder.join("dataset.json");
+        let manifest: Manifest = read(&path, Manifest::FORMAT)
+            .with_context(|| format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display()))?;
+        Ok(Dataset { folder: folder.to_owned(), manifest })
+    }
+
+    /// What `dataset.json` says.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Reads the scene of that name.
+    ///
+    /// # Errors
+    /// When its file is absent, malformed, of another version, or without cells.
+    pub fn scene(&self, name: &str) -> anyhow::Result<Arc<Scene>> {
+        read_scene(&self.folder.join("scenes"), name).map(Arc::new)
+    }
+
+    /// The names of all scenes, sorted.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn scene_names(&self) -> anyhow::Result<Vec<String>> {
+        let folder = self.folder.join("scenes");
+        let mut names = Vec::new();
+        for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|extension| extension == "json") {
+                names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+            }
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    /// Reads all scenes, by name.
+    ///
+    /// # Errors
+    /// As [`Dataset::scene`].
+    pub fn scenes(&self) -> anyhow::Result<BTreeMap<String, Arc<Scene>>> {
+        self.scene_names()?.into_iter().map(|name| Ok((name.clone(), self.scene(&name)?))).collect()
+    }
+
+    /// Reads the trajectories one after another.
+    ///
+    /// # Errors
+    /// When the file is absent; each item can also fail, naming the line.
+    pub fn trajectories(&self) -> anyhow::Result<impl Iterator<Item = anyhow::Result<Trajectory>> + Send + use<>> {
+        let path = self.folder.join("trajectories.jsonl.zst");
+        let file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
+        let reader = BufReader::new(zstd::Decoder::new(file)?);
+        Ok(reader.lines().enumerate().map(move |(number, line)| {
+            let place = || format!("{}, line {}", path.display(), number + 1);
+            serde_json::from_str(&line.with_context(place)?).with_context(place)
+        }))
+    }
+
+    /// Reads a task set of the dataset, e.g. `eval_100`.
+    ///
+    /// # Errors
+    /// When its file is absent, malformed, or of another version.
+    pub fn tasks(&self, name: &str) -> anyhow::Result<TaskSet> {
+        read(&self.folder.join("tasks").join(format!("{name}.json")), TaskSet::FORMAT)
+    }
+}
+
+/// Reads the scene of that name from a folder of scene files.
+///
+/// # Errors
+/// When its file is absent, malformed, of another version, or without cells.
+pub fn read_scene(folder: &Path, name: &str) -> anyhow::Result<Scene> {
+    let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+    ensure!(plain, "{name:?} is not the name of a scene");
+    let path = folder.join(format!("{name}.json"));
+    let mut scene: Scene = read(&path, Scene::FORMAT)?;
+    ensure!(!scene.cells.is_empty(), "{}: cells: is empty; the agent has nowhere to stand", path.display());
+    scene.cells.sort_unstable();
+    scene.cells.dedup();
+    Ok(scene)
+}
+
+/// Reads a JSON file whose `format_version` must be `version`.
+///
+/// # Errors
+/// When it is absent, malformed, or of another version.
+pub fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<T> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        format_version: u32,
+    }
+    let text = std::fs::read(path).with_context(|| path.display().to_string())?;
+    let found: Versioned = serde_json::from_slice(&text).with_context(|| path.display().to_string())?;
+    if found.format_version != version {
+        bail!("{}: format_version: {} was found, this program reads {version}", path.display(), found.format_version);
+    }
+    serde_json::from_slice(&text).with_context(|| path.display().to_string())
+}
+
+/// Writes a dataset folder. `dataset.json` comes last: a folder without it is not a dataset.
+pub struct Writer {
+    folder: PathBuf,
+    trajectories: zstd::Encoder<'static, tempfile::NamedTempFile>,
+}
+
+impl Writer {
+    /// Starts a dataset in `folder`, which is made when absent. An earlier dataset there is replaced.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or written.
+    pub fn new(folder: &Path) -> anyhow::Result<Writer> {
+        for part in ["scenes", "tasks"] {
+            let part = folder.join(part);
+            std::fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
+        }
+        let old = folder.join("dataset.json");
+        if old.exists() {
+            std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
+        }
+        let file = tempfile::NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
+        Ok(Writer { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
+    }
+
+    /// Writes a scene.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn scene(&self, scene: &Scene) -> anyhow::Result<()> {
+        write(&self.folder.join("scenes").join(format!("{}.json", scene.name)), scene)
+    }
+
+    /// Appends a trajectory.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn trajectory(&mut self, trajectory: &Trajectory) -> anyhow::Result<()> {
+        serde_json::to_writer(&mut self.trajectories, trajectory)?;
+        self.trajectories.write_all(b"\n")?;
+        Ok(())
+    }
+
+    /// Writes a task set under `tasks/`.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn tasks(&self, file: &str, set: &TaskSet) -> anyhow::Result<()> {
+        write(&self.folder.join("tasks").join(format!("{file}.json")), set)
+    }
+
+    /// Completes the dataset.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn finish(self, manifest: &Manifest) -> anyhow::Result<()> {
+        let path = self.folder.join("trajectories.jsonl.zst");
+        let file = self.trajectories.finish()?;
+        keep(file, &path)?;
+        write(&self.folder.join("dataset.json"), manifest)
+    }
+}
+
+/// Writes a value as JSON to a file that appears complete or not at all.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
+    let mut text = serde_json::to_vec(value)?;
+    text.push(b'\n');
+    file.write_all(&text).with_context(|| path.display().to_string())?;
+    keep(file, path)
+}
+
+/// Gives a temporary file its name, readable as other files are.
+fn keep(file: tempfile::NamedTempFile, path: &Path) -> anyhow::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    }
+    file.as_file().sync_all().with_context(|| path.display().to_string())?;
+    file.persist(path).with_context(|| path.display().to_string())?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{Cell, Room};
+
+    fn scene() -> Scene {
+        Scene {
+            format_version: Scene::FORMAT,
+            name: "hall".into(),
+            room: Room::Bedroom,
+            agent_y: 900,
+            cells: vec![Cell::new(0, 0)],
+            fixtures: vec![],
+            walls: vec![],
+            meshes: vec![],
+        }
+    }
+
+    fn manifest() -> Manifest {
+        let counts = BTreeMap::from([("train".to_owned(), Counts { trajectories: 1, ..Counts::default() })]);
+        Manifest { format_version: 1, source: "alfred".into(), counts, scenes: 1, held_out: vec![], skipped: vec![] }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let writer = Writer::new(folder.path()).unwrap();
+        writer.scene(&scene()).unwrap();
+        writer.finish(&manifest()).unwrap();
+        let dataset = Dataset::open(folder.path()).unwrap();
+        assert_eq!(dataset.manifest(), &manifest());
+        assert_eq!(*dataset.scene("hall").unwrap(), scene());
+        assert_eq!(dataset.scene_names().unwrap(), ["hall"]);
+        assert_eq!(dataset.trajectories().unwrap().count(), 0);
+    }
+
+    #[test]
+    fn an_unfinished_dataset_is_no_dataset() {
+        let folder = tempfile::tempdir().unwrap();
+        Writer::new(folder.path()).unwrap().scene(&scene()).unwrap();
+        assert!(Dataset::open(folder.path()).is_err());
+    }
+
+    #[test]
+    fn another_version_an_unknown_field_and_a_scene_without_cells_are_errors_that_name_file_and_field() {
+        let folder = tempfile::tempdir().unwrap();
+        let empty = Scene { cells: vec![], ..scene() };
+        write(&folder.path().join("hall.json"), &empty).unwrap();
+        let text = |error: anyhow::Error| format!("{error:#}");
+        let error = text(read_scene(folder.path(), "hall").unwrap_err());
+        assert!(error.contains("hall.json") && error.contains("cells"), "{error}");
+        write(&folder.path().join("hall.json"), &Scene { format_version: 9, ..scene() }).unwrap();
+        let error = text(read_scene(folder.path(), "hall").unwrap_err());
+        assert!(error.contains("hall.json") && error.contains("format_version") && error.contains('9'), "{error}");
+        std::fs::write(folder.path().join("hall.json"), r#"{"format_version": 1, "colour": 3}"#).unwrap();
+        let error = text(read_scene(folder.path(), "hall").unwrap_err());
+        assert!(error.contains("hall.json") && error.contains("colour"), "{error}");
+        assert!(read_scene(folder.path(), "../hall").is_err());
+    }
+}

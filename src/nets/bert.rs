@@ -1,0 +1,62 @@
+//! BERT as an encoder of tokens (Devlin et al. 2019), with the names that its published weights use.
+
+use std::collections::BTreeMap;
+
+use tch::{Kind, Tensor};
+
+use super::encoder_stack::{LayerNames, Norm, Shelf, Stack, padding_bias};
+use super::transformer::TransformerConfig;
+use super::weights::Form;
+
+const NAMES: LayerNames = LayerNames {
+    query: "attention.self.query",
+    key: "attention.self.key",
+    value: "attention.self.value",
+    output: "attention.output.dense",
+    attention_norm: "attention.output.LayerNorm",
+};
+
+/// BERT's embeddings and layers; its pooler is not used.
+pub(super) struct Bert {
+    words: Tensor,
+    /// Position embeddings with the first segment's embedding added: every text is one segment.
+    positions: Tensor,
+    norm: Norm,
+    stack: Stack,
+}
+
+impl Bert {
+    /// The forms of the tensors that are used.
+    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, Form> {
+        let hidden = config.hidden_size;
+        let mut forms = BTreeMap::from([
+            ("embeddings.word_embeddings.weight".into(), Form::float(&[config.vocab_size, hidden])),
+            ("embeddings.position_embeddings.weight".into(), Form::float(&[config.max_position_embeddings, hidden])),
+            ("embeddings.token_type_embeddings.weight".into(), Form::float(&[config.type_vocab_size, hidden])),
+            ("embeddings.LayerNorm.weight".into(), Form::float(&[hidden])),
+            ("embeddings.LayerNorm.bias".into(), Form::float(&[hidden])),
+        ]);
+        forms.extend((0..config.num_hidden_layers).flat_map(|n| NAMES.forms(n, hidden, config.intermediate_size)));
+        forms
+    }
+
+    pub(super) fn take(shelf: &Shelf<'_>, config: &TransformerConfig) -> anyhow::Result<Bert> {
+        let segments = shelf.tensor("embeddings.token_type_embeddings.weight")?;
+        Ok(Bert {
+            words: shelf.tensor("embeddings.word_embeddings.weight")?,
+            positions: shelf.tensor("embeddings.position_embeddings.weight")? + segments.get(0),
+            norm: shelf.norm("embeddings.LayerNorm")?,
+            stack: Stack::take(shelf, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
+        })
+    }
+
+    /// Hidden states `[batch, tokens, hidden]` of token ids and their mask, both `[batch, tokens]`.
+    pub(super) fn forward(&self, ids: &Tensor, mask: &Tensor) -> Tensor {
+        let words = Tensor::embedding(&self.words, ids, -1, false, false);
+        let positions = self.positions.narrow(0, 0, ids.size()[1]);
+        let padded = mask.min().int64_value(&[]) == 0;
+        let bias = padded.then(|| padding_bias(mask));
+        debug_assert_eq!(ids.kind(), Kind::Int64);
+        self.stack.forward(self.norm.forward(&(words + positions)), bias.as_ref())
+    }
+}

@@ -1,0 +1,153 @@
+//! The transformer encoder that BERT and MPNet share: post-norm layers of self-attention and a GELU network.
+
+use tch::{Kind, Tensor};
+
+use super::weights::{Form, Tensors};
+
+/// A fully connected layer's weights.
+pub(super) struct Dense {
+    weight: Tensor,
+    bias: Tensor,
+}
+
+impl Dense {
+    pub(super) fn forward(&self, input: &Tensor) -> Tensor {
+        input.linear(&self.weight, Some(&self.bias))
+    }
+}
+
+/// A layer normalisation over the last dimension.
+pub(super) struct Norm {
+    weight: Tensor,
+    bias: Tensor,
+    epsilon: f64,
+}
+
+impl Norm {
+    pub(super) fn forward(&self, input: &Tensor) -> Tensor {
+        input.layer_norm(self.weight.size(), Some(&self.weight), Some(&self.bias), self.epsilon, false)
+    }
+}
+
+/// Hands out the tensors of a weights file by name. The file was checked against the model's forms before.
+pub(super) struct Shelf<'a> {
+    pub(super) tensors: &'a Tensors,
+    pub(super) epsilon: f64,
+}
+
+impl Shelf<'_> {
+    pub(super) fn tensor(&self, name: &str) -> anyhow::Result<Tensor> {
+        let tensor = self.tensors.get(name);
+        tensor.map(Tensor::shallow_clone).ok_or_else(|| anyhow::anyhow!("the tensor {name} is missing"))
+    }
+
+    pub(super) fn dense(&self, name: &str) -> anyhow::Result<Dense> {
+        Ok(Dense { weight: self.tensor(&format!("{name}.weight"))?, bias: self.tensor(&format!("{name}.bias"))? })
+    }
+
+    pub(super) fn norm(&self, name: &str) -> anyhow::Result<Norm> {
+        let (weight, bias) = (self.tensor(&format!("{name}.weight"))?, self.tensor(&format!("{name}.bias"))?);
+        Ok(Norm { weight, bias, epsilon: self.epsilon })
+    }
+}
+
+/// The names, below `encoder.layer.N`, that an architecture gives to the parts of a layer.
+pub(super) struct LayerNames {
+    pub(super) query: &'static str,
+    pub(super) key: &'static str,
+    pub(super) value: &'static str,
+    pub(super) output: &'static str,
+    pub(super) attention_norm: &'static str,
+}
+
+impl LayerNames {
+    /// The forms of one layer's tensors, for `hidden` and `inner` units.
+    pub(super) fn forms(&self, layer: i64, hidden: i64, inner: i64) -> Vec<(String, Form)> {
+        let dense = |name: &str, to: i64, from: i64| {
+            let name = format!("encoder.layer.{layer}.{name}");
+            [(format!("{name}.weight"), Form::float(&[to, from])), (format!("{name}.bias"), Form::float(&[to]))]
+        };
+        let norm = |name: &str| {
+            let name = format!("encoder.layer.{layer}.{name}");
+            [(format!("{name}.weight"), Form::float(&[hidden])), (format!("{name}.bias"), Form::float(&[hidden]))]
+        };
+        [
+            dense(self.query, hidden, hidden),
+            dense(self.key, hidden, hidden),
+            dense(self.value, hidden, hidden),
+            dense(self.output, hidden, hidden),
+            norm(self.attention_norm),
+            dense("intermediate.dense", inner, hidden),
+            dense("output.dense", hidden, inner),
+            norm("output.LayerNorm"),
+        ]
+        .concat()
+    }
+}
+
+/// One layer; queries, keys and values are one matrix so that a short sentence costs one product instead of three.
+struct Layer {
+    query_key_value: Dense,
+    attention_output: Dense,
+    attention_norm: Norm,
+    inner: Dense,
+    outer: Dense,
+    norm: Norm,
+}
+
+/// The layers of an encoder.
+pub(super) struct Stack {
+    layers: Vec<Layer>,
+    heads: i64,
+}
+
+impl Stack {
+    pub(super) fn take(shelf: &Shelf<'_>, names: &LayerNames, layers: i64, heads: i64) -> anyhow::Result<Stack> {
+        let layers = (0..layers).map(|layer| {
+            let at = |name: &str| format!("encoder.layer.{layer}.{name}");
+            let parts = [names.query, names.key, names.value].map(|name| shelf.dense(&at(name)));
+            let [query, key, value] = parts;
+            let (query, key, value) = (query?, key?, value?);
+            Ok(Layer {
+                query_key_value: Dense {
+                    weight: Tensor::cat(&[query.weight, key.weight, value.weight], 0),
+                    bias: Tensor::cat(&[query.bias, key.bias, value.bias], 0),
+                },
+                attention_output: shelf.dense(&at(names.output))?,
+                attention_norm: shelf.norm(&at(names.attention_norm))?,
+                inner: shelf.dense(&at("intermediate.dense"))?,
+                outer: shelf.dense(&at("output.dense"))?,
+                norm: shelf.norm(&at("output.LayerNorm"))?,
+            })
+        });
+        Ok(Stack { layers: layers.collect::<anyhow::Result<_>>()?, heads })
+    }
+
+    /// Hidden states `[batch, tokens, hidden]` after all layers; `bias` is added to the attention scores and broadcasts
+    /// to `[batch, heads, tokens, tokens]`.
+    pub(super) fn forward(&self, embedded: Tensor, bias: Option<&Tensor>) -> Tensor {
+        self.layers.iter().fold(embedded, |states, layer| layer.forward(&states, bias, self.heads))
+    }
+}
+
+impl Layer {
+    fn forward(&self, states: &Tensor, bias: Option<&Tensor>, heads: i64) -> Tensor {
+        let attended = self.attention_output.forward(&self.attend(states, bias, heads));
+        let states = self.attention_norm.forward(&(attended + states));
+        let widened = self.inner.forward(&states).gelu("none");
+        self.norm.forward(&(self.outer.forward(&widened) + states))
+    }
+
+    fn attend(&self, states: &Tensor, bias: Option<&Tensor>, heads: i64) -> Tensor {
+        let (batch, tokens) = (states.size()[0], states.size()[1]);
+        let split = self.query_key_value.forward(states).view([batch, tokens, 3, heads, -1]).permute([2, 0, 3, 1, 4]);
+        let (query, key, value) = (split.get(0), split.get(1), split.get(2));
+        let attended = Tensor::scaled_dot_product_attention(&query, &key, &value, bias, 0.0, false, None, false);
+        attended.transpose(1, 2).reshape([batch, tokens, -1])
+    }
+}
+
+/// Scores to add so that no token attends to padding: 0 where `mask` `[batch, tokens]` is 1, the lowest float where 0.
+pub(super) fn padding_bias(mask: &Tensor) -> Tensor {
+    (mask.to_kind(Kind::Float) * -1.0 + 1.0).unsqueeze(1).unsqueeze(1) * f64::from(f32::MIN)
+}
