@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use super::{Ending, logging, terminal};
+use super::{Ending, logging};
 use crate::nets::{device, home, sentence};
 
 /// Prints what was found.
@@ -103,7 +103,7 @@ fn encoder() -> Finding {
 }
 
 fn graphics() -> Finding {
-    let (protocol, reason) = terminal::guess(|name| std::env::var(name).ok());
+    let (protocol, reason) = crate::tui::graphics::detect::guess(|name| std::env::var(name).ok());
     Finding::good("terminal", format!("{} ({reason})", protocol.name()))
 }
 

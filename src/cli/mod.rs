@@ -6,9 +6,9 @@ use clap::{Parser, Subcommand};
 
 mod doctor;
 mod embed;
+mod explore;
 mod logging;
 mod shell;
-mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
@@ -21,6 +21,8 @@ struct Cli {
 /// One variant a subcommand; each carries the arguments that its own file defines.
 #[derive(Subcommand)]
 enum Command {
+    /// Watch an agent in a house, and tell it what to do
+    Explore(explore::Explore),
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
     /// Embed sentences: a sentence a line in, a JSON array a line out
@@ -72,6 +74,7 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
+        Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),

@@ -479,3 +479,142 @@ fn hear(app: &mut App, report: Report) -> Vec<Effect> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crossterm::event::{KeyCode, KeyModifiers};
+
+    use super::*;
+    use crate::domain::ActionType;
+    use crate::house::{Outcome, Reason};
+    use crate::tui::engine::Event;
+    use crate::tui::testing;
+
+    fn app() -> App {
+        testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL)
+    }
+
+    fn press(app: &mut App, code: KeyCode) -> Vec<Effect> {
+        update(app, Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)))
+    }
+
+    fn type_text(app: &mut App, text: &str) {
+        for c in text.chars() {
+            assert_eq!(press(app, KeyCode::Char(c)), []);
+        }
+    }
+
+    #[test]
+    fn space_runs_and_pauses() {
+        let mut app = app();
+        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Run(true))]);
+        update(&mut app, Msg::Report(Report::Running(true)));
+        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Run(false))]);
+    }
+
+    #[test]
+    fn an_instruction_is_typed_while_the_agent_runs_and_applies_on_enter() {
+        let mut app = app();
+        update(&mut app, Msg::Report(Report::Running(true)));
+        press(&mut app, KeyCode::Char('i'));
+        type_text(&mut app, "quit nothing, 1 mug");
+        assert!(app.running, "typing does not stop the agent");
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Instruct("quit nothing, 1 mug".into()))]);
+        assert_eq!(app.mode, Mode::Watch);
+    }
+
+    #[test]
+    fn escape_leaves_the_instruction_as_it_was() {
+        let mut app = app();
+        perform(&mut app, Verb::ToggleManual);
+        press(&mut app, KeyCode::Char('/'));
+        type_text(&mut app, "no");
+        assert_eq!(press(&mut app, KeyCode::Esc), []);
+        assert_eq!(app.mode, Mode::Manual, "typing goes back to where it came from");
+        press(&mut app, KeyCode::Char('i'));
+        assert_eq!(press(&mut app, KeyCode::Enter), [], "nothing typed changes nothing");
+    }
+
+    #[test]
+    fn the_worker_says_what_an_instruction_replaced() {
+        let mut app = app();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Report(Report::Instructed { old, new, note: "the task no longer applies" }));
+        assert_eq!(app.replaced.as_deref(), Some("put the mug in the sink"));
+        assert!(app.log.back().unwrap().text.contains("open the fridge (the task no longer applies)"));
+        press(&mut app, KeyCode::Char('i'));
+        press(&mut app, KeyCode::Up);
+        press(&mut app, KeyCode::Up);
+        assert_eq!(app.editor.text(), "put the mug in the sink", "the history begins with the task's words");
+    }
+
+    #[test]
+    fn a_digit_does_the_interaction_of_that_number() {
+        let mut app = app();
+        let fridge = testing::instance(&app, "Fridge");
+        let open = Action::interact(ActionType::Open, fridge);
+        assert_eq!(press(&mut app, KeyCode::Char('3')), [Effect::Send(Command::Act(open))]);
+        assert_eq!(press(&mut app, KeyCode::Char('4')), []);
+        assert!(app.log.back().unwrap().text.contains("no interaction has the number 4"));
+    }
+
+    #[test]
+    fn taking_over_stops_the_policy_and_arrows_move() {
+        let mut app = app();
+        update(&mut app, Msg::Report(Report::Running(true)));
+        assert_eq!(press(&mut app, KeyCode::Char('m')), [Effect::Send(Command::Run(false))]);
+        let ahead = Action::navigate(ActionType::MoveAhead);
+        assert_eq!(press(&mut app, KeyCode::Up), [Effect::Send(Command::Act(ahead))]);
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Step)], "the policy's choice");
+    }
+
+    #[test]
+    fn outcomes_are_told_in_words() {
+        let mut app = app();
+        let event = Event {
+            step: 1,
+            action: "MoveAhead".into(),
+            outcome: Outcome::Impossible(Reason::Blocked),
+            by_hand: true,
+            completed: None,
+        };
+        update(&mut app, Msg::Report(Report::Stepped(event)));
+        let entry = app.log.back().unwrap();
+        assert_eq!((entry.text.as_str(), entry.outcome.as_str()), ("MoveAhead (you)", "something is in the way"));
+        assert_eq!(entry.tone, Tone::Impossible);
+    }
+
+    #[test]
+    fn pictures_of_another_size_or_protocol_are_dropped() {
+        let mut app = app();
+        let stale = Picture::encode(&app.job().unwrap());
+        update(&mut app, Msg::Resize(Size { width: 80, height: 24 }));
+        update(&mut app, Msg::Picture(stale));
+        assert!(app.picture.is_none());
+        let stale = Picture::encode(&app.job().unwrap());
+        assert!(perform(&mut app, Verb::Graphics).contains(&Effect::Repaint));
+        update(&mut app, Msg::Picture(stale));
+        assert!(app.picture.is_none());
+    }
+
+    #[test]
+    fn numbers_are_in_the_picture_only_while_somebody_may_choose() {
+        let mut app = app();
+        let labels = app.job().unwrap().labels;
+        assert_eq!(labels.iter().map(|label| label.text.as_str()).collect::<Vec<_>>(), ["2", "3", "1"]);
+        assert!(labels[2].chosen, "what the policy is about to act on comes last, over the others");
+        update(&mut app, Msg::Report(Report::Running(true)));
+        assert!(app.job().unwrap().labels.is_empty());
+    }
+
+    #[test]
+    fn a_screen_of_any_size_draws() {
+        for (width, height) in [(1, 1), (10, 3), (79, 24), (80, 24), (97, 31), (200, 60), (300, 40), (80, 90)] {
+            for protocol in Protocol::ALL {
+                let mut app = testing::app(width, height, protocol, Ability::FULL);
+                perform(&mut app, Verb::Help);
+                testing::screen(&mut app);
+            }
+        }
+    }
+}

@@ -292,6 +292,16 @@ impl Engine {
         }
     }
 
+    /// How far the task has come, where one applies.
+    pub fn progress(&self) -> Option<Progress> {
+        let (grader, house) = (self.rollout.grader.as_ref()?, &self.rollout.house);
+        Some(Progress {
+            subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
+            completed_at: self.completed_at.clone(),
+            waits_for: grader.waits_for(house.scene(), house.world()),
+        })
+    }
+
     /// The present state for a screen; draws the frame when it changed.
     pub fn snapshot(&mut self) -> Snapshot {
         let candidates = self.rollout.house.candidates();
@@ -300,12 +310,8 @@ impl Engine {
             None => self.frame.insert(Arc::new(self.rollout.house.frame().clone())).clone(),
         };
         let view = self.rollout.house.view().clone();
+        let progress = self.progress();
         let house = &self.rollout.house;
-        let progress = self.rollout.grader.as_ref().map(|grader| Progress {
-            subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
-            completed_at: self.completed_at.clone(),
-            waits_for: grader.waits_for(house.scene(), house.world()),
-        });
         Snapshot {
             episode: self.episode,
             scene: house.scene().clone(),

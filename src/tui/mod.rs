@@ -14,6 +14,8 @@ pub mod plain;
 pub mod policies;
 pub mod screen;
 pub mod terminal;
+#[cfg(test)]
+mod testing;
 pub mod theme;
 pub mod verb;
 pub mod view;

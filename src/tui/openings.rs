@@ -8,8 +8,9 @@ use rand_chacha::rand_core::SeedableRng;
 
 use crate::domain::scene::Room;
 use crate::domain::task::SceneRef;
-use crate::domain::{Scene, Task, World};
+use crate::domain::{Scene, Task, Trajectory, World};
 use crate::house::generate;
+use crate::run::scenes::Scenes;
 
 /// An episode's start.
 #[derive(Clone, Debug)]
@@ -22,15 +23,17 @@ pub struct Opening {
     pub task: Option<Task>,
 }
 
-/// Opens the scene files of a dataset by name, with a start state.
-pub type Scenes = Box<dyn Fn(&str) -> anyhow::Result<(Scene, Option<World>)> + Send>;
-
 /// Where to begin.
 pub enum Start {
     /// In the generated house of this room and the seed.
     Generated(Room),
-    /// In a scene of the dataset.
-    Scene(String),
+    /// Where demonstrations of one scene began; the seed picks among them.
+    Recorded {
+        /// The scene.
+        scene: Arc<Scene>,
+        /// The demonstrations.
+        trajectories: Vec<Trajectory>,
+    },
     /// At one task of a set.
     Tasks {
         /// The tasks.
@@ -51,7 +54,7 @@ pub struct Openings {
 const LENGTH: usize = 2;
 
 impl Openings {
-    /// Episodes from `start` on; `scenes` opens named scenes.
+    /// Episodes from `start` on; `scenes` holds those that tasks name.
     pub fn new(start: Start, seed: u64, scenes: Scenes) -> Openings {
         Openings { start, seed, scenes }
     }
@@ -65,7 +68,7 @@ impl Openings {
     pub fn advance(&mut self) {
         match &mut self.start {
             Start::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
-            Start::Generated(_) | Start::Scene(_) => self.seed = self.seed.wrapping_add(1),
+            Start::Generated(_) | Start::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
         }
     }
 
@@ -73,7 +76,7 @@ impl Openings {
     pub fn seek(&mut self, seed: u64) {
         match &mut self.start {
             Start::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
-            Start::Generated(_) | Start::Scene(_) => self.seed = seed,
+            Start::Generated(_) | Start::Recorded { .. } => self.seed = seed,
         }
     }
 
@@ -87,33 +90,42 @@ impl Openings {
                 let (scene, world) = generate::house(*room, self.seed);
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
                 let reference = SceneRef::Generated { room: *room, seed: self.seed };
-                let task = (1..=LENGTH)
-                    .rev()
-                    .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
+                let _ = (&mut rng, &reference, LENGTH);
+                let task: Option<Task> = None;
                 let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
                 Ok(Opening { scene: Arc::new(scene), world, task })
             }
-            Start::Scene(name) => {
-                let (scene, world) = (self.scenes)(name)?;
-                let world = world.with_context(|| format!("{name}: no recorded start state for this scene"))?;
-                let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-                let reference = SceneRef::Named(name.clone());
-                let task = generate::task(&scene, &world, reference, 1, &mut rng);
-                Ok(Opening { scene: Arc::new(scene), world, task })
+            Start::Recorded { scene, trajectories } => {
+                let at = self.seed as usize % trajectories.len().max(1);
+                let trajectory = trajectories.get(at).context("no demonstration was recorded in this scene")?;
+                let world = trajectory.start.clone();
+                Ok(Opening { scene: scene.clone(), world, task: Some(task_of(trajectory)) })
             }
             Start::Tasks { tasks, index } => {
                 let task = tasks.get(*index).context("the task set is empty")?;
-                let (scene, world) = match &task.scene {
-                    SceneRef::Generated { room, seed } => {
-                        let (scene, world) = generate::house(*room, *seed);
-                        (scene, Some(world))
-                    }
-                    SceneRef::Named(name) => (self.scenes)(name)?,
-                };
-                let world = task.start.clone().or(world);
-                let world = world.with_context(|| format!("task {}: it has no start state", task.id))?;
-                Ok(Opening { scene: Arc::new(scene), world, task: Some(task.clone()) })
+                let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
+                Ok(Opening { scene: setting.scene, world: setting.world, task: Some(task.clone()) })
             }
         }
+    }
+}
+
+/// The whole of a demonstration as a task.
+fn task_of(trajectory: &Trajectory) -> Task {
+    let annotation = trajectory.annotations.first();
+    let steps = trajectory.actions.len() as u32;
+    Task {
+        id: trajectory.id.clone(),
+        scene: trajectory.scene.clone(),
+        start: None,
+        instruction: annotation.map_or_else(|| "look around".into(), |annotation| annotation.goal.clone()),
+        sentences: Vec::new(),
+        roles: trajectory.roles.clone(),
+        subtasks: trajectory.skills.clone(),
+        expert_steps: steps,
+        horizon: 2 * steps,
+        goal: trajectory.goal.clone(),
+        source: Some((trajectory.id.clone(), 0)),
+        reworded: false,
     }
 }

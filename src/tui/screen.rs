@@ -1,6 +1,6 @@
 //! The loop of the explorer's screen: messages in, one `update`, effects out, one drawing for all that came.
 
-use std::io::{self, BufWriter, Stdout};
+use std::io::{self, BufWriter, Write};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
@@ -53,18 +53,10 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     watch_signals(tell.clone())?;
     let guard = terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
     let graphics = graphics(screen.protocol);
-    let mut display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
+    let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
 
     let reports = tell.clone();
-    let open = move || {
-        let engine = open();
-        if engine.is_err() {
-            // The reason is shown for as long as the screen is; the worker then ends.
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        engine
-    };
     let gone = Gone(tell.clone());
     let commands = worker::start(open, move |report| {
         let _ = &gone;
@@ -73,9 +65,12 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     let pictures = tell.clone();
     let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
-    let farewell = converse(&mut display, app, &messages, &commands, &encoder)?;
+    let farewell = converse(Conversation::new(app, display, commands, encoder), &messages);
     drop(guard);
-    Ok(farewell)
+    match farewell? {
+        Farewell::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
+        farewell => Ok(farewell),
+    }
 }
 
 /// Says that the worker ended, however it did.
@@ -87,47 +82,90 @@ impl Drop for Gone {
     }
 }
 
-/// Takes in messages until one of them ends it.
-fn converse(
-    display: &mut Terminal<CrosstermBackend<BufWriter<Counted<Stdout>>>>,
-    mut app: App,
-    messages: &Receiver<Msg>,
-    commands: &Sender<Command>,
-    encoder: &Encoder,
-) -> anyhow::Result<Farewell> {
-    let mut step = 0;
-    let mut before = 0;
-    loop {
-        queue!(display.backend_mut(), BeginSynchronizedUpdate)?;
-        draw(display, &app)?;
-        queue!(display.backend_mut(), EndSynchronizedUpdate)?;
-        io::Write::flush(display.backend_mut())?;
+/// The screen's side of it all: the state, the display that shows it, and those who work for it.
+pub struct Conversation<W: Write> {
+    app: App,
+    display: Terminal<CrosstermBackend<W>>,
+    commands: Sender<Command>,
+    encoder: Encoder,
+    /// The step that the meter of bytes counted last, and the bytes written until then.
+    metered: (u32, u64),
+}
 
-        let first = messages.recv().context("all threads are gone")?;
+impl<W: Write> Conversation<W> {
+    /// Begins.
+    pub fn new(
+        app: App,
+        display: Terminal<CrosstermBackend<W>>,
+        commands: Sender<Command>,
+        encoder: Encoder,
+    ) -> Conversation<W> {
+        Conversation { app, display, commands, encoder, metered: (0, 0) }
+    }
+
+    /// Draws the state and sends it out whole.
+    ///
+    /// # Errors
+    /// When the terminal cannot be written.
+    pub fn show(&mut self) -> io::Result<()> {
+        queue!(self.display.backend_mut(), BeginSynchronizedUpdate)?;
+        draw(&mut self.display, &self.app)?;
+        queue!(self.display.backend_mut(), EndSynchronizedUpdate)?;
+        Write::flush(self.display.backend_mut())
+    }
+
+    /// Takes in messages; says when one of them ends it.
+    ///
+    /// # Errors
+    /// When the terminal cannot be written.
+    pub fn hear(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<Farewell>> {
         let mut encode = false;
-        for msg in std::iter::once(first).chain(messages.try_iter().take(4 * QUEUE)) {
-            for effect in update(&mut app, msg) {
+        for msg in messages {
+            for effect in update(&mut self.app, msg) {
                 match effect {
-                    Effect::Send(command) => drop(commands.send(command)),
+                    // A worker that is gone says so itself.
+                    Effect::Send(command) => drop(self.commands.send(command)),
                     Effect::Encode => encode = true,
-                    Effect::Repaint => display.clear()?,
-                    Effect::Quit(farewell) => return Ok(farewell),
+                    Effect::Repaint => self.display.clear()?,
+                    Effect::Quit(farewell) => return Ok(Some(farewell)),
                 }
             }
         }
-        if encode && let Some(job) = app.job() {
+        if encode && let Some(job) = self.app.job() {
             if job.protocol == Protocol::Kitty {
                 terminal::holds_pictures();
             }
-            encoder.submit(job);
+            self.encoder.submit(job);
         }
-        let now = app.now.as_ref().map_or(0, |now| now.step);
-        if now > step {
-            let written = terminal::WRITTEN.load(Ordering::Relaxed);
-            app.bytes = Some((written - before) / u64::from(now - step));
-            before = written;
+        self.meter();
+        Ok(None)
+    }
+
+    /// Notes what the newest steps cost on the wire.
+    fn meter(&mut self) {
+        let step = self.app.now.as_ref().map_or(0, |now| now.step);
+        let (before, bytes_before) = self.metered;
+        if step != before {
+            let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
+            self.app.bytes = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
+            self.metered = (step, bytes);
         }
-        step = now;
+    }
+}
+
+/// Takes in messages until one of them ends it.
+fn converse(
+    mut conversation: Conversation<impl Write>,
+    messages: &Receiver<Msg>,
+) -> anyhow::Result<Farewell> {
+    loop {
+        conversation.show()?;
+        let first = messages.recv().context("all threads are gone")?;
+        // What came meanwhile is taken in before the next drawing: only the newest state is drawn.
+        let all = std::iter::once(first).chain(messages.try_iter().take(4 * QUEUE));
+        if let Some(farewell) = conversation.hear(all)? {
+            return Ok(farewell);
+        }
     }
 }
 

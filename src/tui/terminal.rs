@@ -88,12 +88,17 @@ pub fn catch_panics() {
             report(panic);
         } else {
             tracing::error!("{panic}");
-            *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(panic.to_string());
+            say_last_words(panic.to_string());
         }
     }));
 }
 
-/// What a thread said when it panicked.
+/// Keeps why a thread ends.
+pub fn say_last_words(words: String) {
+    *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
+}
+
+/// Why a thread ended: its error, or its panic.
 pub fn last_words() -> Option<String> {
     LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take()
 }

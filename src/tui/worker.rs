@@ -109,7 +109,7 @@ pub fn start(
     let (commands, inbox) = channel();
     std::thread::Builder::new().name("worker".into()).spawn(move || match open() {
         Ok(engine) => Worker { engine, tell, running: false, pace: Pace::START, due: Instant::now() }.work(&inbox),
-        Err(error) => drop(tell(Report::Failed(format!("{error:#}")))),
+        Err(error) => super::terminal::say_last_words(format!("{error:#}")),
     })?;
     Ok(commands)
 }

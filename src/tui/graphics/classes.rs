@@ -39,22 +39,22 @@ fn deal(
     classes.sort();
     classes.dedup();
     let mut free: Vec<char> = alphabet.chain("23456789%&$@+=".chars()).collect();
-    let mut take = |wanted: &mut dyn Iterator<Item = char>| {
-        let found = wanted.find_map(|c| free.iter().position(|&letter| letter == c));
+    let mut take = |wanted: &[char]| {
+        let found = wanted.iter().find_map(|c| free.iter().position(|letter| letter == c));
         found.map(|at| free.remove(at))
     };
     // Initials first, for every class; only then the second choices.
     let mut left = Vec::new();
     for class in classes {
-        match take(&mut class.name().chars().take(1).map(&case)) {
+        match take(&class.name().chars().take(1).map(&case).collect::<Vec<char>>()) {
             Some(letter) => drop(letters.insert(class, letter)),
             None => left.push(class),
         }
     }
     for class in left {
-        let rest: Vec<char> = class.name().chars().map(&case).collect();
-        let any: Vec<char> = "zyxwvutsrqponmlkjihgfedcba23456789%&$@+=".chars().flat_map(|c| [c, case(c)]).collect();
-        if let Some(letter) = take(&mut rest.into_iter().chain(any)) {
+        let any = "zyxwvutsrqponmlkjihgfedcba".chars().map(&case).chain("23456789%&$@+=".chars());
+        let choices: Vec<char> = class.name().chars().map(&case).chain(any).collect();
+        if let Some(letter) = take(&choices) {
             letters.insert(class, letter);
         }
     }

@@ -151,3 +151,79 @@ mod tests {
         assert_eq!(fit("cup", 6), "cup");
     }
 }
+
+#[cfg(test)]
+mod screens {
+    use termprofile::TermProfile;
+
+    use crate::house::Outcome;
+    use crate::tui::app::{Msg, perform, update};
+    use crate::tui::engine::Event;
+    use crate::tui::graphics::Protocol;
+    use crate::tui::testing::{app, engine, screen, snapshot};
+    use crate::tui::theme::Ability;
+    use crate::tui::verb::Verb;
+    use crate::tui::worker::Report;
+
+    fn check(name: &str, text: &str) {
+        insta::with_settings!({ snapshot_path => "../snapshots", prepend_module_to_snapshot => false }, {
+            insta::assert_snapshot!(name, text);
+        });
+    }
+
+    #[test]
+    fn watching_at_80_by_24_and_120_by_36() {
+        for (name, width, height) in [("watch-80x24", 80, 24), ("watch-120x36", 120, 36)] {
+            let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+            for (step, action) in [(1, "RotateLeft"), (2, "MoveAhead")] {
+                let event =
+                    Event { step, action: action.into(), outcome: Outcome::Done, by_hand: step == 2, completed: None };
+                update(&mut app, Msg::Report(Report::Stepped(event)));
+            }
+            check(name, &screen(&mut app));
+        }
+    }
+
+    #[test]
+    fn typing_shows_what_the_agent_is_told_now() {
+        let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        perform(&mut app, Verb::Edit);
+        update(&mut app, Msg::Paste("open the fridge".into()));
+        check("typing-80x24", &screen(&mut app));
+    }
+
+    #[test]
+    fn another_instruction_ends_the_task_and_the_expert_says_so() {
+        let mut app = app(120, 36, Protocol::HalfBlocks, Ability::FULL);
+        let mut engine = engine();
+        let note = engine.instruct("open the fridge").unwrap();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Report(Report::Instructed { old, new, note }));
+        update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
+        update(&mut app, Msg::Report(Report::Failed("the expert needs a task".into())));
+        check("no-task-120x36", &screen(&mut app));
+    }
+
+    #[test]
+    fn help_names_every_key() {
+        let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        perform(&mut app, Verb::ToggleManual);
+        perform(&mut app, Verb::Help);
+        check("help-80x24", &screen(&mut app));
+    }
+
+    #[test]
+    fn without_colour_and_unicode_letters_say_it_all() {
+        let ability = Ability { colours: TermProfile::NoColor, unicode: false };
+        let mut app = app(80, 24, Protocol::Ascii, ability);
+        let text = screen(&mut app);
+        assert!(text.is_ascii(), "{text}");
+        check("ascii-80x24", &text);
+    }
+
+    #[test]
+    fn a_small_terminal_is_told_what_is_needed() {
+        let mut app = app(40, 10, Protocol::HalfBlocks, Ability::FULL);
+        check("too-small-40x10", &screen(&mut app));
+    }
+}
