@@ -6,10 +6,13 @@ use clap::{Parser, Subcommand};
 
 mod doctor;
 mod embed;
+mod eval;
 mod import;
 mod logging;
+mod policies;
 mod replay;
 mod shell;
+mod tasks;
 mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
@@ -25,6 +28,10 @@ struct Cli {
 enum Command {
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
+    /// Play a task set, and write a run folder with every episode and a summary
+    Eval(eval::Eval),
+    /// Sample, check and show task sets
+    Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
     Import(import::Import),
     /// Re-run recorded demonstrations in the simulator
@@ -79,6 +86,8 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
         Command::Doctor(doctor) => doctor.run(),
+        Command::Eval(eval) => eval.run(),
+        Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
@@ -91,6 +100,11 @@ fn run(command: Command) -> anyhow::Result<Ending> {
 fn reader_left(error: &anyhow::Error) -> bool {
     let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
     kind == Some(std::io::ErrorKind::BrokenPipe)
+}
+
+/// How many threads: what was asked for, or one a core.
+fn threads(asked: Option<u16>) -> usize {
+    asked.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
 }
 
 /// The one place that prints an error: its chain, outermost first.

@@ -1,7 +1,7 @@
 //! Task files: read strictly, so that a mistake is found before the first episode and not in the middle of a night's run.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 
@@ -34,6 +34,24 @@ pub fn read(path: &Path) -> anyhow::Result<Document<TaskSet>> {
 pub fn write(path: &Path, set: &TaskSet) -> anyhow::Result<()> {
     check(set).with_context(|| format!("cannot write {}", path.display()))?;
     json::write(path, set)
+}
+
+/// Splits `FILE#TASK` into the file and the task; the whole is the file where no `#` is.
+pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
+    match text.rsplit_once('#') {
+        Some((file, task)) => (PathBuf::from(file), Some(task)),
+        None => (PathBuf::from(text), None),
+    }
+}
+
+/// The task of that number, from 0, or of that id.
+///
+/// # Errors
+/// When there is none; says what there is.
+pub fn pick<'a>(set: &'a TaskSet, wanted: &str) -> anyhow::Result<&'a Task> {
+    let numbered = wanted.parse().ok().and_then(|number: usize| set.tasks.get(number));
+    let found = numbered.or_else(|| set.tasks.iter().find(|task| task.id == wanted));
+    found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 0 to {}", set.tasks.len() - 1))
 }
 
 /// Checks what the types alone do not: texts, indices and classes. Whether a task fits its scene is seen when that is loaded.
@@ -241,6 +259,16 @@ pub(crate) mod tests {
         assert!(complaint(|set| set.tasks[0].horizon = 0).contains("horizon"));
         let long_name = complaint(|set| set.tasks[0].id = "x".repeat(9_000));
         assert!(long_name.len() < 300, "the error itself stays short");
+    }
+
+    #[test]
+    fn a_task_is_picked_by_its_number_or_its_id() {
+        let set = sample_set();
+        assert_eq!(split_reference("a/b.json#1"), (PathBuf::from("a/b.json"), Some("1")));
+        assert_eq!(split_reference("a/b.json"), (PathBuf::from("a/b.json"), None));
+        assert_eq!(pick(&set, "1").unwrap().id, "second");
+        assert_eq!(pick(&set, "first").unwrap().id, "first");
+        assert!(pick(&set, "2").unwrap_err().to_string().contains("0 to 1"));
     }
 
     proptest! {

@@ -104,7 +104,9 @@ pub fn sample_dataset(
         if split.is_some_and(|split| split != trajectory.split) || !fits(&trajectory) {
             continue;
         }
-        let said = |first: &usize| phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty();
+        let said = |first: &usize| {
+            phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty()
+        };
         let firsts = (0..=trajectory.skills.len()).take_while(|first| first + wish.length <= trajectory.skills.len());
         spans.extend(firsts.filter(said).map(|first| (number, first)));
     }
@@ -158,7 +160,9 @@ pub fn sample_dataset(
 
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
 fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
-    let said = |steps: &[String]| steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty());
+    let said = |steps: &[String]| {
+        steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty())
+    };
     (0..).zip(&trajectory.annotations).filter(|(_, annotation)| said(&annotation.steps)).map(|(i, _)| i).collect()
 }
 
