@@ -275,8 +275,8 @@ mod tests {
     #[test]
     fn what_is_not_there_is_refused_in_words() {
         let mut house = kitchen_house();
-        let grader = Grader::new(Grading::Class, &[role("Television")], &[subtask(SkillKind::Pickup, 0)], None);
+        let grader = Grader::new(Grading::Class, &[role("Watch")], &[subtask(SkillKind::Pickup, 0)], None);
         let no_way = Expert::new().next(&mut house, &grader).unwrap_err();
-        assert_eq!(no_way.to_string(), "there is no way to pick up the television: nothing here would serve for it");
+        assert_eq!(no_way.to_string(), "there is no way to pick up the watch: nothing here would serve for it");
     }
 }
