@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod bar;
+mod collect;
 mod doctor;
 mod embed;
 mod eval;
@@ -13,6 +15,10 @@ mod policies;
 mod replay;
 mod shell;
 mod tasks;
+mod pretrain;
+mod replay;
+mod shell;
+mod stop;
 mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
@@ -34,6 +40,10 @@ enum Command {
     Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
     Import(import::Import),
+    /// Collect demonstrations in generated houses
+    Collect(collect::Collect),
+    /// Train an agent on a dataset
+    Pretrain(pretrain::Pretrain),
     /// Re-run recorded demonstrations in the simulator
     Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
@@ -89,6 +99,8 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Eval(eval) => eval.run(),
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
+        Command::Collect(collect) => collect.run(),
+        Command::Pretrain(pretrain) => pretrain.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),
