@@ -2,8 +2,6 @@
 
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
@@ -77,7 +75,7 @@ impl Eval {
             folder::default_path(&format!("{}-{}", set.value.name, chosen.name), now.as_secs())
         });
         let mut run = RunFolder::open(&path, evaluation.manifest())?;
-        let stop = stop_on_signals()?;
+        let stop = super::stop::on_signals()?;
         let mut meter = Meter::new();
         let summary =
             crate::run::evaluate(&evaluation, &*chosen.make, &mut run, &stop, &mut |progress| meter.show(progress))?;
@@ -104,21 +102,6 @@ impl Eval {
         Ok(ending)
     }
 }
-
-/// A flag that the first SIGINT or SIGTERM sets; the second ends the program at once.
-fn stop_on_signals() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        let status = i32::from(INTERRUPTED);
-        signal_hook::flag::register_conditional_shutdown(signal, status, stop.clone())
-            .context("cannot handle signals")?;
-        signal_hook::flag::register(signal, stop.clone()).context("cannot handle signals")?;
-    }
-    Ok(stop)
-}
-
-/// What the shell gets when a signal ended the program.
-const INTERRUPTED: u8 = 130;
 
 /// Progress on standard error: a bar in a terminal, else a plain line now and then.
 struct Meter {

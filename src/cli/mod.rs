@@ -12,13 +12,11 @@ mod eval;
 mod import;
 mod logging;
 mod policies;
-mod replay;
-mod shell;
-mod tasks;
 mod pretrain;
 mod replay;
 mod shell;
 mod stop;
+mod tasks;
 mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.

@@ -9,9 +9,8 @@ use super::json::{self, Document};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, Role, SkillKind, Subtask, Task, TaskSet};
 use crate::house::validate::Misfit;
+use crate::language::instruction;
 
-/// The longest instruction that is taken, in characters; a sentence encoder reads far less.
-pub const LONGEST_INSTRUCTION: usize = 2_000;
 /// The longest horizon that is taken, in steps.
 pub const LONGEST_HORIZON: u32 = 100_000;
 /// The most subtasks (and roles) that a task may have; steps and roles are counted in bytes.
@@ -121,14 +120,7 @@ pub fn check_task(task: &Task) -> Result<(), Misfit> {
 }
 
 fn text(field: &str, text: &str) -> Result<(), Misfit> {
-    let length = text.chars().count();
-    if length > LONGEST_INSTRUCTION {
-        return Err(Misfit::new(field, format!("{length} characters are more than {LONGEST_INSTRUCTION}")));
-    }
-    if let Some(control) = text.chars().find(|c| c.is_control()) {
-        return Err(Misfit::new(field, format!("it holds the control character U+{:04X}", control as u32)));
-    }
-    if text.trim().is_empty() { Err(Misfit::new(field, "it is empty")) } else { Ok(()) }
+    instruction::parse(text).map(drop).map_err(|problem| Misfit::new(field, problem.to_string()))
 }
 
 fn check_role(role: &Role) -> Result<(), Misfit> {
@@ -247,9 +239,9 @@ pub(crate) mod tests {
         assert!(complaint(|set| set.tasks[1].id = "first".into()).contains("tasks[1].id"));
         assert!(complaint(|set| set.scenes = None).contains("scenes: missing"));
         assert!(complaint(|set| set.tasks[1].scene = SceneRef::Named("../../etc".into())).contains("tasks[1].scene"));
-        assert!(complaint(|set| set.tasks[0].instruction = "x".repeat(10_000)).contains("tasks[0].instruction: 10000"));
+        assert!(complaint(|set| set.tasks[0].instruction = "x".repeat(10_000)).contains("10000 characters"));
         assert!(complaint(|set| set.tasks[0].instruction = "go\u{1b}[2J".into()).contains("U+001B"));
-        assert!(complaint(|set| set.tasks[0].instruction = "  ".into()).contains("tasks[0].instruction: it is empty"));
+        assert!(complaint(|set| set.tasks[0].instruction = "  ".into()).contains("tasks[0].instruction: the instruction is empty"));
         assert!(complaint(|set| set.tasks[0].sentences.truncate(1)).contains("1 sentences for 2 subtasks"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].object = 9).contains("tasks[0].subtasks[1].object: 9, but"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].receptacle = None).contains("subtasks[1].receptacle"));

@@ -17,6 +17,9 @@ use crate::domain::{Room, Task, TaskSet, Trajectory};
 use crate::house::generate;
 use crate::language::phrases;
 
+/// The seeds of sampled tasks' houses lie from here on, those of collected demonstrations far below: no task is played in a
+/// house that an agent was trained in. Still small enough for readers of JSON that keep numbers as floats.
+const HELD_OUT: u64 = 1 << 41;
 /// How many houses are tried for one task before the wish is called unfulfillable.
 const ATTEMPTS: u64 = 200;
 /// After so many houses without a task, the next kind of room is tried.
@@ -67,8 +70,7 @@ pub fn sample_generated(wish: &Wish, done: &(dyn Fn() + Sync)) -> anyhow::Result
         for attempt in 0..ATTEMPTS {
             let mut rng = wish.source(place as u64, attempt);
             let room = wish.rooms[(place + (attempt / ATTEMPTS_A_ROOM) as usize) % wish.rooms.len()];
-            // Seeds stay small enough for readers of JSON that keep numbers as floats.
-            let seed = u64::from(rng.random::<u32>());
+            let seed = HELD_OUT + u64::from(rng.random::<u32>());
             let (scene, world) = generate::house(room, seed);
             let reference = SceneRef::Generated { room, seed };
             if let Some(task) = generate::task(&scene, &world, reference, wish.length, &mut rng) {
