@@ -1,5 +1,10 @@
 //! Agents: what decides the next action.
 
+pub mod checkpoint;
+pub mod learned;
 pub mod policy;
+pub mod seeker;
+pub mod select;
 
+pub use learned::LearnedPolicy;
 pub use policy::{Decision, Mind, Policy, Situation};

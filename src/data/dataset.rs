@@ -8,6 +8,7 @@ use std::sync::Arc;
 use anyhow::{Context, bail, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::domain::{Scene, TaskSet, Trajectory};
 
@@ -74,8 +75,9 @@ impl Dataset {
     /// When `dataset.json` is absent, malformed, or of another version.
     pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
         let path = folder.join("dataset.json");
-        let manifest: Manifest = read(&path, Manifest::FORMAT)
-            .with_context(|| format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display()))?;
+        let manifest: Manifest = read(&path, Manifest::FORMAT).with_context(|| {
+            format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
+        })?;
         Ok(Dataset { folder: folder.to_owned(), manifest })
     }
 
@@ -134,6 +136,18 @@ impl Dataset {
             let place = || format!("{}, line {}", path.display(), number + 1);
             serde_json::from_str(&line.with_context(place)?).with_context(place)
         }))
+    }
+
+    /// Identifies the trajectories: the first 16 digits of the sha256 of their file.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn digest(&self) -> anyhow::Result<String> {
+        let path = self.folder.join("trajectories.jsonl.zst");
+        let mut file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
+        let mut hash = Sha256::new();
+        std::io::copy(&mut file, &mut hash).with_context(|| path.display().to_string())?;
+        Ok(format!("{:x}", hash.finalize())[..16].to_string())
     }
 
     /// Reads a task set of the dataset, e.g. `eval_100`.

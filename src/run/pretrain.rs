@@ -1,0 +1,228 @@
+//! Pretraining: visual encoder, feature maps, sentences, policy; each stage can be stopped and taken up again.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use sha2::{Digest, Sha256};
+use tch::{Device, Tensor};
+
+use super::cloning::{self, Material};
+use super::footage::Footage;
+use super::presets::Preset;
+use super::progress::{Journal, Report, Scalars};
+use super::visual_training;
+use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceSpec};
+use crate::agent::learned::SharedEmbedder;
+use crate::data::dataset::Dataset;
+use crate::data::features::{Features, Header};
+use crate::data::items::Items;
+
+/// What to train, on what, into where.
+pub struct Pretraining {
+    /// The hyper-parameters.
+    pub preset: Preset,
+    /// The datasets' folders; the first keeps the cache.
+    pub data: Vec<PathBuf>,
+    /// The checkpoint's folder.
+    pub out: PathBuf,
+    /// Take up the training that was begun in `out`.
+    pub resume: bool,
+    /// A checkpoint whose visual encoder is used instead of training one.
+    pub visual_from: Option<PathBuf>,
+    /// Embeds the instructions.
+    pub sentences: SharedEmbedder,
+    /// The name of the sentence encoder's folder.
+    pub sentence_encoder: String,
+    /// Where to compute.
+    pub device: Device,
+}
+
+/// How a training ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trained {
+    /// All steps were taken.
+    Finished,
+    /// It was stopped, and can be resumed.
+    Stopped,
+}
+
+/// Texts that are embedded at once.
+const TEXTS: usize = 256;
+
+impl Pretraining {
+    /// Trains; the checkpoint in `out` is complete whenever this returns `Finished`, and a working one from the first saved step of the
+    /// policy on.
+    ///
+    /// # Errors
+    /// When data or an earlier state cannot be read, the folder not be written, or there is a training in `out` already.
+    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Trained> {
+        let training = self.out.join("training");
+        anyhow::ensure!(
+            self.resume || !training.exists(),
+            "{} holds a training already: use --resume, or another folder",
+            self.out.display()
+        );
+        std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
+        self.keep_preset()?;
+        let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
+        let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+        let footage = Footage::open(&datasets)?;
+        tch::manual_seed(self.preset.seed as i64);
+        let networks = Networks::new(&self.preset.visual, &self.preset.policy, self.device);
+        if !self.train_visual(&networks, &footage, &mut report, stop)? {
+            return Ok(Trained::Stopped);
+        }
+        let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
+        let digest = digests.join("-");
+        let Some(features) = self.features(&networks, &footage, &digest, &mut report, stop)? else {
+            return Ok(Trained::Stopped);
+        };
+        let items = Items::of(&footage.trajectories, footage.labels()?, self.preset.hold_out);
+        let Some(sentences) = self.embed(&items.texts, &mut report, stop)? else { return Ok(Trained::Stopped) };
+        let material = Material { items: &items, features: &features, sentences: &sentences };
+        let config = |steps: u64| self.config(&digest, footage.trajectories.len() as u64, steps);
+        let finished = cloning::train(
+            &networks.policy_store,
+            &networks.policy,
+            &material,
+            &self.preset,
+            &training.join("policy.safetensors"),
+            &mut report,
+            stop,
+            &mut |steps| networks.save(&self.out, &config(steps)?),
+        )?;
+        Ok(if finished { Trained::Finished } else { Trained::Stopped })
+    }
+
+    /// A training goes on only with the preset it began with.
+    fn keep_preset(&self) -> anyhow::Result<()> {
+        let path = self.out.join("training/preset.toml");
+        let text = toml::to_string(&self.preset)?;
+        match std::fs::read_to_string(&path) {
+            Ok(begun) if begun == text => Ok(()),
+            Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
+            Err(_) => crate::agent::checkpoint::write_whole(&path, text.as_bytes()),
+        }
+    }
+
+    fn train_visual(
+        &self,
+        networks: &Networks,
+        footage: &Footage,
+        report: &mut dyn Report,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<bool> {
+        let state = self.out.join("training/visual.safetensors");
+        if let Some(folder) = &self.visual_from {
+            let config = Config::read(folder)?;
+            anyhow::ensure!(
+                config.visual == self.preset.visual,
+                "{}: visual is {:?}, the preset's is {:?}",
+                folder.join("config.json").display(),
+                config.visual,
+                self.preset.visual
+            );
+            let from = Networks::load(folder, &config, self.device)?.visual_store.variables();
+            return tch::no_grad(|| {
+                for (name, mut tensor) in networks.visual_store.variables() {
+                    tensor.f_copy_(from.get(&name).context("a tensor is missing")?)?;
+                }
+                Ok(true)
+            });
+        }
+        // The heads live in a store of their own shape, so the trained encoder is copied out of it.
+        let mut store = tch::nn::VarStore::new(self.device);
+        let encoder = crate::nets::visual::VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
+        let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
+        store.freeze();
+        let trained = store.variables();
+        tch::no_grad(|| {
+            for (name, mut tensor) in networks.visual_store.variables() {
+                tensor.f_copy_(trained.get(&format!("encoder.{name}")).context("a tensor is missing")?)?;
+            }
+            Ok(finished)
+        })
+    }
+
+    fn features(
+        &self,
+        networks: &Networks,
+        footage: &Footage,
+        dataset: &str,
+        report: &mut dyn Report,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Option<Features>> {
+        let header = Header {
+            format_version: Header::FORMAT,
+            encoder: digest(&networks.visual_store)?,
+            dataset: dataset.to_string(),
+            maps: footage.frames() as u64,
+            numbers: self.preset.visual.map() as u64,
+        };
+        let cache = self.data.first().context("there is no dataset")?.join("cache");
+        if let Some(features) = Features::read(&cache, &header)? {
+            return Ok(Some(features));
+        }
+        if !visual_training::encode(&networks.visual, footage, &cache, &header, report, stop)? {
+            return Ok(None);
+        }
+        Features::read(&cache, &header)
+    }
+
+    fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
+        let mut rows = Vec::new();
+        let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        for (i, chunk) in texts.chunks(TEXTS).enumerate() {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let chunk: Vec<&str> = chunk.iter().map(String::as_str).collect();
+            rows.push(embedder.embed(&chunk)?.to_device(Device::Cpu));
+            report.step(&Scalars::new("sentences", (i * TEXTS + chunk.len()) as u64, texts.len() as u64))?;
+        }
+        anyhow::ensure!(!rows.is_empty(), "no trajectory has an annotation");
+        Ok(Some(Tensor::cat(&rows, 0)))
+    }
+
+    fn config(&self, dataset: &str, trajectories: u64, policy_steps: u64) -> anyhow::Result<Config> {
+        let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        anyhow::ensure!(
+            self.preset.policy.embedding == embedder.encoder().width() as i64,
+            "the preset's policy.embedding is {}, the sentence encoder's width is {}",
+            self.preset.policy.embedding,
+            embedder.encoder().width()
+        );
+        Ok(Config {
+            format_version: Config::FORMAT,
+            ontology: Ontology::current(),
+            visual: self.preset.visual.clone(),
+            policy: self.preset.policy.clone(),
+            sentence_encoder: SentenceSpec {
+                name: self.sentence_encoder.clone(),
+                digest: embedder.encoder().digest().to_string(),
+            },
+            provenance: Provenance {
+                preset: self.preset.name.clone(),
+                dataset: dataset.to_string(),
+                trajectories,
+                seed: self.preset.seed,
+                visual_steps: self.preset.visual_training.optimisation.steps,
+                policy_steps,
+            },
+        })
+    }
+}
+
+/// Identifies a store's weights: the first 16 digits of their sha256.
+fn digest(store: &tch::nn::VarStore) -> anyhow::Result<String> {
+    let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
+    variables.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut hash = Sha256::new();
+    for (name, tensor) in variables {
+        hash.update(name.as_bytes());
+        let numbers: Vec<f32> = tensor.detach().to_device(Device::Cpu).flatten(0, -1).try_into()?;
+        numbers.iter().for_each(|number| hash.update(number.to_le_bytes()));
+    }
+    Ok(format!("{:x}", hash.finalize())[..16].to_string())
+}
