@@ -1,1 +1,5 @@
 //! One test binary: its modules are the scenarios.
+
+mod explore;
+mod eval;
+mod floors;

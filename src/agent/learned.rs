@@ -11,6 +11,7 @@ use tch::{Device, Kind, Tensor};
 use super::checkpoint::{Config, Networks};
 use super::policy::{Decision, Policy, Situation};
 use super::select::{self, Selection};
+use crate::language::instruction::normalise;
 use crate::nets::embedding_cache::Embedder;
 
 /// A sentence encoder with its cache, which several policies may share.
@@ -112,7 +113,7 @@ impl LearnedPolicy {
             return Ok(embedding.shallow_clone());
         }
         let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-        let embedding = embedder.embed(&[instruction])?.to_device(self.device).to_kind(Kind::Float);
+        let embedding = embedder.embed(&[&normalise(instruction)])?.to_device(self.device).to_kind(Kind::Float);
         self.read = Some((instruction.to_string(), embedding.shallow_clone()));
         Ok(embedding)
     }

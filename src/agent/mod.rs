@@ -3,6 +3,7 @@
 pub mod checkpoint;
 pub mod learned;
 pub mod policy;
+pub mod seeker;
 pub mod select;
 
 pub use learned::LearnedPolicy;

@@ -6,6 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::domain::Trajectory;
+use crate::language::instruction::normalise;
 
 /// One frame's label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ pub struct Span {
 pub struct Items {
     /// One label a frame; the last frame of a trajectory has none.
     pub labels: Vec<Option<Label>>,
-    /// Distinct texts.
+    /// Distinct texts, normalised.
     pub texts: Vec<String>,
     /// Spans to learn from.
     pub training: Vec<Span>,
@@ -62,8 +63,9 @@ impl Items {
         let mut first = 0;
         for (position, trajectory) in trajectories.iter().enumerate() {
             let mut spans = spans(trajectory, first, &mut |text| {
-                *numbers.entry(text.to_string()).or_insert_with(|| {
-                    items.texts.push(text.to_string());
+                let text = normalise(text);
+                *numbers.entry(text.clone()).or_insert_with(|| {
+                    items.texts.push(text);
                     items.texts.len() as u32 - 1
                 })
             });
@@ -151,7 +153,7 @@ mod tests {
         let items = Items::of(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Vec::new(), 0);
         let edges: Vec<(u32, u32, u32)> = items.training.iter().map(|span| (span.first, span.start, span.end)).collect();
         assert_eq!(edges, [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9)]);
-        assert_eq!(items.texts, ["step 0", "step 1", "all"]);
+        assert_eq!(items.texts, ["step 0", "step 1", "all"].map(normalise));
         assert_eq!(items.training[3].texts, [0, 2]);
     }
 

@@ -12,9 +12,9 @@ use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Trajectory, World};
 use crate::house::{generate, rules};
 
-/// A dataset's trajectories with the scenes they play in.
+/// The trajectories of datasets with the scenes they play in.
 pub struct Footage {
-    /// The trajectories, in the dataset's order.
+    /// The trajectories, in the datasets' order.
     pub trajectories: Vec<Trajectory>,
     scenes: HashMap<SceneRef, Arc<Scene>>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
@@ -22,20 +22,26 @@ pub struct Footage {
 }
 
 impl Footage {
-    /// Reads a dataset's trajectories and makes their scenes.
+    /// Reads the trajectories of datasets, one after the other, and makes their scenes.
     ///
     /// # Errors
     /// When a trajectory or a scene cannot be read.
-    pub fn open(dataset: &Dataset) -> anyhow::Result<Footage> {
-        let trajectories: Vec<Trajectory> = dataset.trajectories()?.collect::<anyhow::Result<_>>()?;
-        anyhow::ensure!(!trajectories.is_empty(), "{} holds no trajectories", dataset.folder().display());
+    pub fn open(datasets: &[Dataset]) -> anyhow::Result<Footage> {
+        let mut trajectories: Vec<Trajectory> = Vec::new();
+        for dataset in datasets {
+            let before = trajectories.len();
+            for trajectory in dataset.trajectories()? {
+                trajectories.push(trajectory?);
+            }
+            anyhow::ensure!(trajectories.len() > before, "{} holds no trajectories", dataset.folder().display());
+        }
         let mut wanted: Vec<SceneRef> = trajectories.iter().map(|trajectory| trajectory.scene.clone()).collect();
         wanted.sort_by_key(|scene| format!("{scene:?}"));
         wanted.dedup();
         let made = wanted.into_par_iter().map(|reference| {
             let scene = match &reference {
                 SceneRef::Generated { room, seed } => Arc::new(generate::house(*room, *seed).0),
-                SceneRef::Named(name) => dataset.scene(name)?,
+                SceneRef::Named(name) => named(datasets, name)?,
             };
             Ok((reference, scene))
         });
@@ -124,4 +130,11 @@ impl Footage {
             (0..self.trajectories.len()).into_par_iter().map(of).collect::<anyhow::Result<_>>()?;
         Ok(labels.concat())
     }
+}
+
+/// The scene of that name in the first dataset that has it.
+fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
+    let mut found = datasets.iter().map(|dataset| dataset.scene(name));
+    let first = found.next().context("there is no dataset")?;
+    first.or_else(|error| found.find_map(Result::ok).ok_or(error))
 }

@@ -1,6 +1,9 @@
 //! Runs: episodes, evaluations, trainings, and the folders they write.
 
+pub mod appraise;
+pub mod card;
 pub mod cloning;
+pub mod collect;
 pub mod episode;
 pub mod evaluate;
 pub mod folder;

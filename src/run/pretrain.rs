@@ -22,8 +22,8 @@ use crate::data::items::Items;
 pub struct Pretraining {
     /// The hyper-parameters.
     pub preset: Preset,
-    /// The dataset's folder.
-    pub data: PathBuf,
+    /// The datasets' folders; the first keeps the cache.
+    pub data: Vec<PathBuf>,
     /// The checkpoint's folder.
     pub out: PathBuf,
     /// Take up the training that was begun in `out`.
@@ -66,14 +66,15 @@ impl Pretraining {
         std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
-        let dataset = Dataset::open(&self.data)?;
-        let footage = Footage::open(&dataset)?;
+        let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+        let footage = Footage::open(&datasets)?;
         tch::manual_seed(self.preset.seed as i64);
         let networks = Networks::new(&self.preset.visual, &self.preset.policy, self.device);
         if !self.train_visual(&networks, &footage, &mut report, stop)? {
             return Ok(Trained::Stopped);
         }
-        let digest = dataset.digest()?;
+        let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
+        let digest = digests.join("-");
         let Some(features) = self.features(&networks, &footage, &digest, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
@@ -159,7 +160,7 @@ impl Pretraining {
             maps: footage.frames() as u64,
             numbers: self.preset.visual.map() as u64,
         };
-        let cache = self.data.join("cache");
+        let cache = self.data.first().context("there is no dataset")?.join("cache");
         if let Some(features) = Features::read(&cache, &header)? {
             return Ok(Some(features));
         }

@@ -17,6 +17,9 @@ use crate::domain::{Room, Task, TaskSet, Trajectory};
 use crate::house::generate;
 use crate::language::phrases;
 
+/// The seeds of sampled tasks' houses lie from here on, those of collected demonstrations far below: no task is played in a
+/// house that an agent was trained in. Still small enough for readers of JSON that keep numbers as floats.
+const HELD_OUT: u64 = 1 << 41;
 /// How many houses are tried for one task before the wish is called unfulfillable.
 const ATTEMPTS: u64 = 200;
 /// After so many houses without a task, the next kind of room is tried.
@@ -67,8 +70,7 @@ pub fn sample_generated(wish: &Wish, done: &(dyn Fn() + Sync)) -> anyhow::Result
         for attempt in 0..ATTEMPTS {
             let mut rng = wish.source(place as u64, attempt);
             let room = wish.rooms[(place + (attempt / ATTEMPTS_A_ROOM) as usize) % wish.rooms.len()];
-            // Seeds stay small enough for readers of JSON that keep numbers as floats.
-            let seed = u64::from(rng.random::<u32>());
+            let seed = HELD_OUT + u64::from(rng.random::<u32>());
             let (scene, world) = generate::house(room, seed);
             let reference = SceneRef::Generated { room, seed };
             if let Some(task) = generate::task(&scene, &world, reference, wish.length, &mut rng) {
@@ -104,7 +106,9 @@ pub fn sample_dataset(
         if split.is_some_and(|split| split != trajectory.split) || !fits(&trajectory) {
             continue;
         }
-        let said = |first: &usize| phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty();
+        let said = |first: &usize| {
+            phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty()
+        };
         let firsts = (0..=trajectory.skills.len()).take_while(|first| first + wish.length <= trajectory.skills.len());
         spans.extend(firsts.filter(said).map(|first| (number, first)));
     }
@@ -158,7 +162,9 @@ pub fn sample_dataset(
 
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
 fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
-    let said = |steps: &[String]| steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty());
+    let said = |steps: &[String]| {
+        steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty())
+    };
     (0..).zip(&trajectory.annotations).filter(|(_, annotation)| said(&annotation.steps)).map(|(i, _)| i).collect()
 }
 
