@@ -3,3 +3,4 @@
 mod explore;
 mod eval;
 mod floors;
+mod command_line;
