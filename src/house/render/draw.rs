@@ -59,7 +59,7 @@ impl<'a> Brush<'a> {
 
     /// A lit colour. The normal is a unit vector of the camera's frame; `depth` in metres dims what is far.
     fn lit(&self, colour: Colour, normal: Vec3, depth: f32) -> u32 {
-        let shade = 0.62 + 0.3 * normal.dot(self.light) + 0.08 * normal.dot(self.up);
+        let shade = 0.74 + 0.22 * normal.dot(self.light) + 0.07 * normal.dot(self.up);
         pack(colour, shade * dimming(depth))
     }
 
