@@ -74,8 +74,9 @@ impl Dataset {
     /// When `dataset.json` is absent, malformed, or of another version.
     pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
         let path = folder.join("dataset.json");
-        let manifest: Manifest = read(&path, Manifest::FORMAT)
-            .with_context(|| format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display()))?;
+        let manifest: Manifest = read(&path, Manifest::FORMAT).with_context(|| {
+            format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
+        })?;
         Ok(Dataset { folder: folder.to_owned(), manifest })
     }
 

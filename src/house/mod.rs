@@ -2,8 +2,8 @@
 
 pub mod bounds;
 pub mod camera;
-pub mod expert;
 pub mod doors;
+pub mod expert;
 pub mod goals;
 pub mod grading;
 pub mod outcome;

@@ -17,7 +17,8 @@ pub fn cover(outline: Rect, points: &[[i32; 2]], blocked: &[Rect]) -> Vec<Rect> 
     let cuts = |axis: usize| -> Vec<i32> {
         let inner = blocked.iter().flat_map(|rect| [rect.min[axis], rect.max[axis]]);
         let range = outline.min[axis]..=outline.max[axis];
-        let mut cuts: Vec<i32> = inner.chain([*range.start(), *range.end()]).filter(|cut| range.contains(cut)).collect();
+        let mut cuts: Vec<i32> =
+            inner.chain([*range.start(), *range.end()]).filter(|cut| range.contains(cut)).collect();
         cuts.sort_unstable();
         cuts.dedup();
         cuts

@@ -96,7 +96,8 @@ mod tests {
 
     #[test]
     fn what_is_no_id_is_an_error_that_quotes_it() {
-        for text in ["", "Mug", "Mug|1|2", "Dragon|1|2|3", "Mug|1|2|x", "Mug|1|2|1e9", "Mug|1|2|NaN", "Mug|1|2|3|Half"] {
+        for text in ["", "Mug", "Mug|1|2", "Dragon|1|2|3", "Mug|1|2|x", "Mug|1|2|1e9", "Mug|1|2|NaN", "Mug|1|2|3|Half"]
+        {
             assert!(Name::parse(text).unwrap_err().contains(&format!("{text:?}")), "{text}");
         }
     }

@@ -97,7 +97,8 @@ impl Recording {
     /// The field that makes no sense, and why.
     pub fn new(id: String, split: String, data: TrajData) -> Result<Recording, String> {
         let numbers = data.plan.high_pddl.iter().map(|high| high.high_idx);
-        if let Some(number) = numbers.chain(data.plan.low_actions.iter().map(|low| low.high_idx)).find(|&n| n > 10_000) {
+        if let Some(number) = numbers.chain(data.plan.low_actions.iter().map(|low| low.high_idx)).find(|&n| n > 10_000)
+        {
             return Err(format!("high_idx: {number} is out of range"));
         }
         let gotos = data.plan.high_pddl.iter().filter(|high| high.discrete_action.action == "GotoLocation");
@@ -112,10 +113,11 @@ impl Recording {
             }
             steps.push(step);
         }
-        let annotations = data.turk_annotations.anns.iter().map(|ann| Annotation {
-            goal: ann.task_desc.trim().to_owned(),
-            steps: merge.sentences(&ann.high_descs),
-        });
+        let annotations = data
+            .turk_annotations
+            .anns
+            .iter()
+            .map(|ann| Annotation { goal: ann.task_desc.trim().to_owned(), steps: merge.sentences(&ann.high_descs) });
         Ok(Recording {
             id,
             split,
@@ -153,7 +155,8 @@ impl Setting {
             let (Some(x), Some(y), Some(z)) = (millimetres(p.x), millimetres(p.y), millimetres(p.z)) else {
                 return Err(wrong("position"));
             };
-            let tenths = |degrees: f64| degrees.is_finite().then(|| (degrees.rem_euclid(360.0) * 10.0).round() as i16 % 3600);
+            let tenths =
+                |degrees: f64| degrees.is_finite().then(|| (degrees.rem_euclid(360.0) * 10.0).round() as i16 % 3600);
             let r = pose.rotation;
             let (Some(rx), Some(ry), Some(rz)) = (tenths(r.x), tenths(r.y), tenths(r.z)) else {
                 return Err(wrong("rotation"));
@@ -182,7 +185,8 @@ fn millimetres(metres: f64) -> Option<i32> {
 fn horizon(degrees: f64) -> Option<i16> {
     let looks = degrees / f64::from(Pose::LOOK);
     let range = f64::from(Pose::UP)..=f64::from(Pose::DOWN);
-    ((looks - looks.round()).abs() < 0.02 && range.contains(&degrees.round())).then(|| looks.round() as i16 * Pose::LOOK)
+    ((looks - looks.round()).abs() < 0.02 && range.contains(&degrees.round()))
+        .then(|| looks.round() as i16 * Pose::LOOK)
 }
 
 /// The planned skills in order, GotoLocation and NoOp apart.

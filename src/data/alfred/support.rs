@@ -151,10 +151,8 @@ pub fn surfaces(
     }
     if mine.is_empty() {
         let area = ahead_of(found.pivot, facing, row.area, -row.behind);
-        let level = |height: &furniture::Height| Surface {
-            height: height.above(found.pivot.y, floor),
-            areas: vec![area],
-        };
+        let level =
+            |height: &furniture::Height| Surface { height: height.above(found.pivot.y, floor), areas: vec![area] };
         return row.supports.iter().map(level).collect();
     }
     let outline = extent(&mine);

@@ -132,7 +132,8 @@ pub fn build<'a>(
 ) -> Result<TaskSet, String> {
     let task = |(number, entry): (usize, &Entry)| {
         let wrong = |what: &str| format!("task {number} ({}): {what}", entry.trajectory);
-        let trajectory = trajectories.get(entry.trajectory.as_str()).ok_or_else(|| wrong("its trajectory is absent"))?;
+        let trajectory =
+            trajectories.get(entry.trajectory.as_str()).ok_or_else(|| wrong("its trajectory is absent"))?;
         let crate::domain::task::SceneRef::Named(scene) = &trajectory.scene else {
             return Err(wrong("its scene has no name"));
         };
@@ -152,9 +153,11 @@ pub fn build<'a>(
 /// Cuts a span out of a trajectory: the expert's actions before it are replayed, and what they handled stays bound.
 fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Result<Task, String> {
     let span = entry.first..entry.first.saturating_add(entry.skills);
-    let skills = trajectory.skills.get(span.clone()).filter(|skills| !skills.is_empty()).ok_or_else(|| {
-        format!("skills {span:?} do not exist; there are {}", trajectory.skills.len())
-    })?;
+    let skills = trajectory
+        .skills
+        .get(span.clone())
+        .filter(|skills| !skills.is_empty())
+        .ok_or_else(|| format!("skills {span:?} do not exist; there are {}", trajectory.skills.len()))?;
     let annotation = trajectory.annotations.get(entry.annotator);
     let annotation = annotation.ok_or_else(|| format!("annotator {} does not exist", entry.annotator))?;
     let sentences = annotation.steps.get(span.clone()).map(<[String]>::to_vec).unwrap_or_default();
