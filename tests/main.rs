@@ -4,3 +4,5 @@ mod explore;
 mod eval;
 mod floors;
 mod command_line;
+mod properties;
+mod scenarios;
