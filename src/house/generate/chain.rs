@@ -4,6 +4,7 @@ use rand::Rng;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
+use super::fill::hangs;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::world::{Instance, Parent};
 use crate::domain::{Class, Scene, World};
@@ -61,7 +62,7 @@ impl<'a> Stock<'a> {
         Stock {
             scene,
             world,
-            movable: unique(world.objects.iter().map(|object| object.class).collect()),
+            movable: unique(world.objects.iter().map(|object| object.class).filter(|&class| !hangs(class)).collect()),
             fixed: unique(scene.fixtures.iter().map(|fixture| fixture.class).collect()),
         }
     }
@@ -87,7 +88,6 @@ impl<'a> Stock<'a> {
     /// A class of furniture that people put `content` into, and where it is not yet.
     fn place(&self, rng: &mut ChaCha8Rng, content: Class) -> Option<Class> {
         let takes = |class: &Class| class.holds(content) && self.is_elsewhere(content, *class);
-        // Few rooms' coffee machine takes a thing that stands by its nature elsewhere.
         let fitting: Vec<Class> = self.fixed.iter().copied().filter(takes).collect();
         fitting.choose(rng).copied()
     }
@@ -157,20 +157,38 @@ impl Chain {
             }
             chain = more;
         }
-        // What is left over belongs to no shorter task that makes sense when it ends with a knife put down or half a meal.
         chain.subtasks.truncate(wanted);
-        let first = chain.subtasks.first()?;
-        if in_hand {
-            if first.skill != SkillKind::Pickup {
-                return None;
+        chain.start_holding(stock, usize::from(in_hand), rng)
+    }
+
+    /// A chain of one skill; whatever it needs in the hand is there at the start.
+    pub fn single(stock: &Stock<'_>, skill: SkillKind, rng: &mut ChaCha8Rng) -> Option<Chain> {
+        let lit_alone = rng.random_bool(0.5);
+        let mut chain = match skill {
+            SkillKind::Pickup | SkillKind::Put => Chain::default().with(stock, Kind::Place, false, rng)?,
+            SkillKind::Slice => Chain::default().with(stock, Kind::Place, true, rng)?,
+            SkillKind::Toggle if lit_alone => Chain::default().with(stock, Kind::Light, false, rng)?,
+            SkillKind::Toggle => Chain::default().with(stock, Kind::Examine, false, rng)?,
+            change => Chain::default().with(stock, Kind::Change(change), false, rng)?,
+        };
+        let place = chain.subtasks.iter().position(|subtask| subtask.skill == skill)?;
+        chain.subtasks.truncate(place + 1);
+        chain.start_holding(stock, place, rng)
+    }
+
+    /// The chain without its first `done` skills, which are one pickup or none.
+    fn start_holding(mut self, stock: &Stock<'_>, done: usize, rng: &mut ChaCha8Rng) -> Option<Chain> {
+        match (done, self.subtasks.first()?.skill) {
+            (0, _) => {}
+            (1, SkillKind::Pickup) => {
+                let held = usize::from(self.subtasks.remove(0).object);
+                let taken = stock.take(self.roles.get(held)?.class, rng)?;
+                self.roles[held].bound = Some(Instance::Object(taken));
             }
-            let held = first.object;
-            let taken = stock.take(chain.roles.get(usize::from(held))?.class, rng)?;
-            chain.roles[usize::from(held)].bound = Some(Instance::Object(taken));
-            chain.subtasks.remove(0);
+            _ => return None,
         }
-        chain.drop_unused_roles();
-        Some(chain)
+        self.drop_unused_roles();
+        Some(self)
     }
 
     /// The chain with a further part of that kind.

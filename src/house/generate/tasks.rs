@@ -17,7 +17,12 @@ use crate::house::grading::{Grader, Grading};
 use crate::language::phrases::{Story, origins};
 
 /// How many chains are drawn before a house is given up for a length.
-const DRAWS: usize = 8;
+const DRAWS: usize = 60;
+/// The skills of tasks of one subtask, as often as they are drawn.
+const SINGLES: [SkillKind; 9] = {
+    use SkillKind::{Clean, Cool, Heat, Pickup, Put, Slice, Toggle};
+    [Pickup, Pickup, Put, Put, Slice, Toggle, Clean, Heat, Cool]
+};
 /// An expert that takes more actions a subtask has lost its way.
 const LONGEST: usize = 120;
 
@@ -26,11 +31,16 @@ pub fn task(scene: &Scene, world: &World, reference: SceneRef, length: usize, rn
     let stock = Stock::of(scene, world);
     let shared = Arc::new(scene.clone());
     (0..DRAWS).find_map(|_| {
-        let in_hand = rng.random_bool(if length == 1 { 0.7 } else { 0.25 });
-        let chain = Chain::draw(&stock, length, in_hand, rng)?;
+        let chain = match length {
+            1 => Chain::single(&stock, *SINGLES.choose(rng)?, rng)?,
+            _ => {
+                let in_hand = rng.random_bool(0.2);
+                Chain::draw(&stock, length, in_hand, rng)?
+            }
+        };
         let start = start(scene, world, &chain, rng)?;
-        let solved = solve(&shared, start.clone(), chain)?;
-        let Solved { chain, steps } = solved;
+        let Solved { chain, steps } =
+            solve(&shared, start.clone(), chain).inspect_err(|e| eprintln!("FAIL {} {e}", scene.name)).ok()?;
         let origins = origins(scene, &start, &chain.roles);
         let story = Story { roles: &chain.roles, subtasks: &chain.subtasks, origins: &origins };
         let (instruction, sentences) = (story.instruction(rng), story.sentences(rng));
@@ -72,8 +82,8 @@ struct Solved {
     steps: u32,
 }
 
-/// Lets the expert do the chain. Fills in the expert's instances, and which subtasks it ended with a Close.
-fn solve(scene: &Arc<Scene>, start: World, mut chain: Chain) -> Option<Solved> {
+/// Lets the expert do the chain, or says why it cannot. Fills in the expert's instances, and which subtasks it ended with a Close.
+fn solve(scene: &Arc<Scene>, start: World, mut chain: Chain) -> Result<Solved, String> {
     // Everything that was opened has to be closed, as ALFRED's expert does; what was not opened need not be.
     for subtask in &mut chain.subtasks {
         subtask.closes = subtask.skill != SkillKind::Toggle;
@@ -84,13 +94,13 @@ fn solve(scene: &Arc<Scene>, start: World, mut chain: Chain) -> Option<Solved> {
     let mut steps = 0;
     while !grader.is_done() {
         if steps >= LONGEST * chain.subtasks.len() {
-            return None;
+            return Err(format!("lost the way: {}", grader.waits_for(scene, house.world())));
         }
-        let action = expert.next(&mut house, &grader).ok()?;
+        let action = expert.next(&mut house, &grader).map_err(|no_way| no_way.to_string())?;
         let outcome = house.step(action);
         steps += 1;
         if !outcome.is_done() {
-            return None;
+            return Err(format!("{outcome}"));
         }
         let current = grader.completed();
         if grader.observe(scene, house.world(), action, outcome) {
@@ -100,7 +110,7 @@ fn solve(scene: &Arc<Scene>, start: World, mut chain: Chain) -> Option<Solved> {
     for (number, role) in (0u8..).zip(&mut chain.roles) {
         role.expert = grader.binding(number).map(|instance| original(house.world(), instance));
     }
-    Some(Solved { chain, steps: steps as u32 })
+    Ok(Solved { chain, steps: steps as u32 })
 }
 
 /// An instance as it can be named before anything is cut.
