@@ -95,9 +95,8 @@ pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn
     let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
     let mut number = 0;
     while findings.agent.trials < appraisal.tasks {
-        let (room, scene, world) = unseen(appraisal.seed, number);
+        let (reference, scene, world) = unseen(appraisal.seed, number);
         number += 1;
-        let reference = SceneRef::Generated { room, seed: UNSEEN + appraisal.seed * 1_000_000 + number };
         let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
         let start = task.start.clone().unwrap_or(world);
         let mut solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
@@ -135,10 +134,10 @@ pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn
     Ok(findings)
 }
 
-fn unseen(seed: u64, number: u64) -> (Room, Arc<Scene>, World) {
-    let room = Room::ALL[(number % 4) as usize];
-    let (scene, world) = generate::house(room, UNSEEN + seed * 1_000_000 + number);
-    (room, Arc::new(scene), world)
+fn unseen(seed: u64, number: u64) -> (SceneRef, Arc<Scene>, World) {
+    let (room, seed) = (Room::ALL[(number % 4) as usize], UNSEEN + seed * 1_000_000 + number);
+    let (scene, world) = generate::house(room, seed);
+    (SceneRef::Generated { room, seed }, Arc::new(scene), world)
 }
 
 /// A start from which two objects of different classes are in view, each the only one of its class there.
