@@ -2,3 +2,5 @@
 
 mod eval;
 mod floors;
+mod properties;
+mod scenarios;

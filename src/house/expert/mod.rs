@@ -61,6 +61,12 @@ impl Expert {
         Expert { scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
     }
 
+    /// Drops the plan: a new episode starts.
+    pub fn forget(&mut self) {
+        self.plan.clear();
+        self.expected = None;
+    }
+
     /// The next action for the grader's current subtask.
     ///
     /// # Errors
