@@ -185,3 +185,98 @@ fn half_bytes(tensor: &Tensor) -> anyhow::Result<Vec<u8>> {
     half.f_copy_data_u8(&mut bytes, half.numel())?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::dataset::{Dataset, Manifest};
+    use crate::data::features::Features;
+    use crate::domain::task::SceneRef;
+    use crate::domain::{Action, ActionType, Trajectory};
+    use crate::house::testing::kitchen;
+
+    /// Two turns around in the test kitchen.
+    fn footage() -> Footage {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, start) = kitchen();
+        let mut writer = crate::data::dataset::Writer::new(folder.path()).unwrap();
+        writer.scene(&scene).unwrap();
+        for (id, turn) in [("left", ActionType::RotateLeft), ("right", ActionType::RotateRight)] {
+            let trajectory = Trajectory {
+                id: id.into(),
+                split: "train".into(),
+                scene: SceneRef::Named(scene.name.clone()),
+                start: start.clone(),
+                actions: vec![Action::navigate(turn); 4],
+                roles: Vec::new(),
+                skills: Vec::new(),
+                skill_starts: Vec::new(),
+                goal: None,
+                annotations: Vec::new(),
+                boxes: Vec::new(),
+                choices: Vec::new(),
+            };
+            writer.trajectory(&trajectory).unwrap();
+        }
+        let manifest = Manifest {
+            format_version: Manifest::FORMAT,
+            source: "test".into(),
+            counts: Default::default(),
+            scenes: 1,
+            held_out: Vec::new(),
+            skipped: Vec::new(),
+        };
+        writer.finish(&manifest).unwrap();
+        Footage::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
+    }
+
+    struct Notes(Vec<Scalars>);
+
+    impl Report for Notes {
+        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+            self.0.push(scalars.clone());
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn the_encoder_learns_what_a_few_frames_show_and_every_frame_gets_its_map() {
+        let footage = footage();
+        assert_eq!(footage.frames(), 10);
+        let mut preset = Preset::named("l-bc").unwrap();
+        preset.visual.channels = [4, 4, 8, 16];
+        preset.visual_training.optimisation.steps = 30;
+        preset.visual_training.optimisation.batch = 8;
+        preset.visual_training.optimisation.schedule.warmup_steps = 2;
+        (preset.report_every, preset.save_every) = (1, 100);
+        tch::manual_seed(2);
+        let store = nn::VarStore::new(Device::Cpu);
+        let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
+        let folder = tempfile::tempdir().unwrap();
+        let (state, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+        let mut notes = Notes(Vec::new());
+        assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
+        let loss = |i: usize| notes.0[i].values["marks"];
+        assert!(loss(29) < 0.5 * loss(0), "{} then {}", loss(0), loss(29));
+
+        let header = Header {
+            format_version: Header::FORMAT,
+            encoder: "e".into(),
+            dataset: "d".into(),
+            maps: 10,
+            numbers: preset.visual.map() as u64,
+        };
+        assert!(encode(&encoder, &footage, folder.path(), &header, &mut notes, &stop).unwrap());
+        let features = Features::read(folder.path(), &header).unwrap().unwrap();
+        let map = |frame| {
+            let mut bytes = Vec::new();
+            features.gather(frame, &mut bytes);
+            bytes
+        };
+        assert_eq!(features.len(), 10);
+        // Both trajectories start in one state, and four turns lead back to it.
+        assert_eq!(map(0), map(5));
+        assert_eq!(map(1), map(8));
+        assert_ne!(map(0), map(1));
+    }
+}
