@@ -2,6 +2,8 @@
 
 pub mod bounds;
 pub mod camera;
+pub mod generate;
+pub mod expert;
 pub mod doors;
 pub mod expert;
 pub mod goals;
