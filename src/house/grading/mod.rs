@@ -240,6 +240,11 @@ impl Grader {
         role.expert
     }
 
+    /// Strict: the whole goal was met before the last subtask was done; nothing more is credited.
+    pub fn is_cut_short(&self) -> bool {
+        self.finished && !self.is_done()
+    }
+
     /// Whether only the close is missing from the current subtask.
     pub fn is_half_done(&self) -> bool {
         self.pending.is_some()
