@@ -1,1 +1,8 @@
 //! One test binary: its modules are the scenarios.
+
+mod explore;
+mod eval;
+mod floors;
+mod command_line;
+mod properties;
+mod scenarios;

@@ -1,7 +1,7 @@
 //! Task files: read strictly, so that a mistake is found before the first episode and not in the middle of a night's run.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 
@@ -9,9 +9,8 @@ use super::json::{self, Document};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, Role, SkillKind, Subtask, Task, TaskSet};
 use crate::house::validate::Misfit;
+use crate::language::instruction;
 
-/// The longest instruction that is taken, in characters; a sentence encoder reads far less.
-pub const LONGEST_INSTRUCTION: usize = 2_000;
 /// The longest horizon that is taken, in steps.
 pub const LONGEST_HORIZON: u32 = 100_000;
 /// The most subtasks (and roles) that a task may have; steps and roles are counted in bytes.
@@ -34,6 +33,24 @@ pub fn read(path: &Path) -> anyhow::Result<Document<TaskSet>> {
 pub fn write(path: &Path, set: &TaskSet) -> anyhow::Result<()> {
     check(set).with_context(|| format!("cannot write {}", path.display()))?;
     json::write(path, set)
+}
+
+/// Splits `FILE#TASK` into the file and the task; the whole is the file where no `#` is.
+pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
+    match text.rsplit_once('#') {
+        Some((file, task)) => (PathBuf::from(file), Some(task)),
+        None => (PathBuf::from(text), None),
+    }
+}
+
+/// The task of that number, from 0, or of that id.
+///
+/// # Errors
+/// When there is none; says what there is.
+pub fn pick<'a>(set: &'a TaskSet, wanted: &str) -> anyhow::Result<&'a Task> {
+    let numbered = wanted.parse().ok().and_then(|number: usize| set.tasks.get(number));
+    let found = numbered.or_else(|| set.tasks.iter().find(|task| task.id == wanted));
+    found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 0 to {}", set.tasks.len() - 1))
 }
 
 /// Checks what the types alone do not: texts, indices and classes. Whether a task fits its scene is seen when that is loaded.
@@ -103,14 +120,7 @@ pub fn check_task(task: &Task) -> Result<(), Misfit> {
 }
 
 fn text(field: &str, text: &str) -> Result<(), Misfit> {
-    let length = text.chars().count();
-    if length > LONGEST_INSTRUCTION {
-        return Err(Misfit::new(field, format!("{length} characters are more than {LONGEST_INSTRUCTION}")));
-    }
-    if let Some(control) = text.chars().find(|c| c.is_control()) {
-        return Err(Misfit::new(field, format!("it holds the control character U+{:04X}", control as u32)));
-    }
-    if text.trim().is_empty() { Err(Misfit::new(field, "it is empty")) } else { Ok(()) }
+    instruction::parse(text).map(drop).map_err(|problem| Misfit::new(field, problem.to_string()))
 }
 
 fn check_role(role: &Role) -> Result<(), Misfit> {
@@ -229,9 +239,9 @@ pub(crate) mod tests {
         assert!(complaint(|set| set.tasks[1].id = "first".into()).contains("tasks[1].id"));
         assert!(complaint(|set| set.scenes = None).contains("scenes: missing"));
         assert!(complaint(|set| set.tasks[1].scene = SceneRef::Named("../../etc".into())).contains("tasks[1].scene"));
-        assert!(complaint(|set| set.tasks[0].instruction = "x".repeat(10_000)).contains("tasks[0].instruction: 10000"));
+        assert!(complaint(|set| set.tasks[0].instruction = "x".repeat(10_000)).contains("10000 characters"));
         assert!(complaint(|set| set.tasks[0].instruction = "go\u{1b}[2J".into()).contains("U+001B"));
-        assert!(complaint(|set| set.tasks[0].instruction = "  ".into()).contains("tasks[0].instruction: it is empty"));
+        assert!(complaint(|set| set.tasks[0].instruction = "  ".into()).contains("tasks[0].instruction: the instruction is empty"));
         assert!(complaint(|set| set.tasks[0].sentences.truncate(1)).contains("1 sentences for 2 subtasks"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].object = 9).contains("tasks[0].subtasks[1].object: 9, but"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].receptacle = None).contains("subtasks[1].receptacle"));
@@ -241,6 +251,16 @@ pub(crate) mod tests {
         assert!(complaint(|set| set.tasks[0].horizon = 0).contains("horizon"));
         let long_name = complaint(|set| set.tasks[0].id = "x".repeat(9_000));
         assert!(long_name.len() < 300, "the error itself stays short");
+    }
+
+    #[test]
+    fn a_task_is_picked_by_its_number_or_its_id() {
+        let set = sample_set();
+        assert_eq!(split_reference("a/b.json#1"), (PathBuf::from("a/b.json"), Some("1")));
+        assert_eq!(split_reference("a/b.json"), (PathBuf::from("a/b.json"), None));
+        assert_eq!(pick(&set, "1").unwrap().id, "second");
+        assert_eq!(pick(&set, "first").unwrap().id, "first");
+        assert!(pick(&set, "2").unwrap_err().to_string().contains("0 to 1"));
     }
 
     proptest! {

@@ -58,6 +58,14 @@ pub struct Progress {
     pub errors: usize,
 }
 
+impl Progress {
+    fn count(&mut self, episode: &Episode) {
+        self.done += 1;
+        self.successes += usize::from(episode.success);
+        self.errors += usize::from(episode.error.is_some());
+    }
+}
+
 impl Evaluation {
     /// Checks that every task can start, before anything is written.
     ///
@@ -97,6 +105,61 @@ impl Evaluation {
     /// What identifies this run.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
+    }
+
+    /// Every task with every seed, as positions in the set.
+    pub fn all(&self) -> Vec<(usize, u64)> {
+        let seeds = self.options.seeds;
+        (0..self.tasks.len()).flat_map(|task| (0..seeds).map(move |seed| (task, seed))).collect()
+    }
+
+    /// Plays the episodes of these tasks and seeds on several threads; `sink` takes each, in their order.
+    ///
+    /// `stop` ends it early: episodes under way are finished, no others begun.
+    ///
+    /// # Errors
+    /// When a policy cannot be made, or `sink` fails.
+    pub fn play(
+        &self,
+        wanted: &[(usize, u64)],
+        make_policy: &MakePolicy<'_>,
+        stop: &AtomicBool,
+        sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let jobs = self.options.jobs.min(wanted.len());
+        let policies = (0..jobs).map(|_| make_policy()).collect::<anyhow::Result<Vec<_>>>()?;
+        let next = AtomicUsize::new(0);
+        // Set when the sink fails; `stop` belongs to the caller.
+        let give_up = AtomicBool::new(false);
+        let (sender, receiver) = mpsc::channel::<(usize, Episode)>();
+        std::thread::scope(|scope| {
+            for policy in policies {
+                let (sender, next, give_up) = (sender.clone(), &next, &give_up);
+                scope.spawn(move || {
+                    let mut policy = Some(policy);
+                    while !stop.load(Ordering::Relaxed) && !give_up.load(Ordering::Relaxed) {
+                        let place = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(&(task, seed)) = wanted.get(place) else { break };
+                        let episode = self.episode(task, seed, &mut policy, make_policy);
+                        if sender.send((place, episode)).is_err() {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop(sender);
+            // Episodes come as they end and leave in their order: what is written is the same for any number of threads.
+            let mut waiting = BTreeMap::new();
+            let mut place = 0;
+            for (at, episode) in receiver {
+                waiting.insert(at, episode);
+                while let Some(episode) = waiting.remove(&place) {
+                    sink(episode).inspect_err(|_| give_up.store(true, Ordering::Relaxed))?;
+                    place += 1;
+                }
+            }
+            Ok(())
+        })
     }
 
     /// One episode. Errors and panics of the policy or the environment end it and are recorded.
@@ -160,61 +223,24 @@ pub fn evaluate(
     make_policy: &MakePolicy<'_>,
     folder: &mut RunFolder,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(Progress, Option<&Episode>),
+    progress: &mut dyn FnMut(Progress),
 ) -> anyhow::Result<Summary> {
-    let earlier = std::mem::take(&mut folder.earlier);
-    let done: BTreeSet<(&str, u64)> = earlier.iter().map(|episode| (episode.task.as_str(), episode.seed)).collect();
-    let all = (0..evaluation.tasks.len()).flat_map(|task| (0..evaluation.options.seeds).map(move |seed| (task, seed)));
-    let wanted: Vec<(usize, u64)> =
-        all.filter(|&(task, seed)| !done.contains(&(evaluation.tasks[task].id.as_str(), seed))).collect();
-    let total = earlier.len() + wanted.len();
+    let mut episodes = std::mem::take(&mut folder.earlier);
+    let done: BTreeSet<(&str, u64)> = episodes.iter().map(|episode| (episode.task.as_str(), episode.seed)).collect();
+    let all = evaluation.all();
+    let total = all.len();
+    let missing = |&(task, seed): &(usize, u64)| !done.contains(&(evaluation.tasks[task].id.as_str(), seed));
+    let wanted: Vec<(usize, u64)> = all.into_iter().filter(missing).collect();
     let mut state = Progress { of: total, ..Progress::default() };
-    let count = |state: &mut Progress, episode: &Episode| {
-        state.done += 1;
-        state.successes += usize::from(episode.success);
-        state.errors += usize::from(episode.error.is_some());
-    };
-    drop(done);
-    let mut episodes = earlier;
-    episodes.iter().for_each(|episode| count(&mut state, episode));
-    progress(state, None);
-
-    let jobs = evaluation.options.jobs.clamp(1, wanted.len().max(1));
-    let policies = (0..jobs).map(|_| make_policy()).collect::<anyhow::Result<Vec<_>>>()?;
-    let next = AtomicUsize::new(0);
-    // Set when the folder cannot be written to; `stop` belongs to the caller.
-    let give_up = AtomicBool::new(false);
-    let (sender, receiver) = mpsc::channel::<(usize, Episode)>();
-    std::thread::scope(|scope| -> anyhow::Result<()> {
-        for policy in policies {
-            let (sender, wanted, next, give_up) = (sender.clone(), &wanted, &next, &give_up);
-            scope.spawn(move || {
-                let mut policy = Some(policy);
-                while !stop.load(Ordering::Relaxed) && !give_up.load(Ordering::Relaxed) {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(&(task, seed)) = wanted.get(place) else { break };
-                    let episode = evaluation.episode(task, seed, &mut policy, make_policy);
-                    if sender.send((place, episode)).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        // Episodes come as they end and are written in their order, so the file is the same for any number of threads.
-        let mut waiting = BTreeMap::new();
-        let mut place = 0;
-        for (at, episode) in receiver {
-            waiting.insert(at, episode);
-            while let Some(mut episode) = waiting.remove(&place) {
-                folder.append(&episode).inspect_err(|_| give_up.store(true, Ordering::Relaxed))?;
-                count(&mut state, &episode);
-                progress(state, Some(&episode));
-                episode.trace = Vec::new();
-                episodes.push(episode);
-                place += 1;
-            }
-        }
+    episodes.iter().for_each(|episode| state.count(episode));
+    progress(state);
+    evaluation.play(&wanted, make_policy, stop, &mut |mut episode| {
+        folder.append(&episode)?;
+        state.count(&episode);
+        progress(state);
+        // It is on disk; a night's run need not be in memory too.
+        episode.trace = Vec::new();
+        episodes.push(episode);
         Ok(())
     })?;
     let summary = Summary::of(&evaluation.manifest, &evaluation.tasks, &episodes, episodes.len() < total);
@@ -339,7 +365,7 @@ mod tests {
         let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;
         let mut folder = RunFolder::open(into, evaluation.manifest())?;
         let stop = AtomicBool::new(false);
-        let mut progress = |progress: Progress, _: Option<&Episode>| {
+        let mut progress = |progress: Progress| {
             if progress.done >= stop_after {
                 stop.store(true, Ordering::Relaxed);
             }

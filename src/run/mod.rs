@@ -18,6 +18,7 @@ pub mod rollout;
 pub mod scenes;
 pub mod sights;
 pub mod stats;
+pub mod tasks;
 pub mod threshold;
 pub mod visual_training;
 
