@@ -1,4 +1,5 @@
 //! One test binary: its modules are the scenarios.
 
+mod generated;
 mod properties;
 mod scenarios;
