@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Ground floor first.
-const FLOORS: [&str; 10] = ["domain", "house", "language", "data", "nets", "algo", "agent", "run", "tui", "cli"];
+const FLOORS: [&str; 10] = ["domain", "language", "house", "data", "nets", "algo", "agent", "run", "tui", "cli"];
 
 /// Libraries, and the floors that may use them.
 const LIBRARIES: [(&str, &[&str]); 4] =
