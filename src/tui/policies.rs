@@ -62,18 +62,33 @@ impl Policies {
 
 struct RandomPolicy(rand_chacha::ChaCha8Rng);
 impl Policy for RandomPolicy {
-    fn name(&self) -> &str { "random" }
-    fn begin(&mut self, seed: u64) { self.0 = rand_chacha::rand_core::SeedableRng::seed_from_u64(seed) }
+    fn name(&self) -> &str {
+        "random"
+    }
+    fn begin(&mut self, seed: u64) {
+        self.0 = rand_chacha::rand_core::SeedableRng::seed_from_u64(seed)
+    }
     fn decide(&mut self, s: &mut crate::agent::Situation<'_>) -> anyhow::Result<crate::agent::Decision> {
+        use crate::domain::{Action, ActionType};
         use rand::Rng;
-        use crate::domain::{ActionType, Action};
         let c = s.house.candidates();
         let n = self.0.random_range(0..5 + c.len());
         let action = if n < 5 { Action::navigate(ActionType::ALL[n]) } else { c[n - 5].action() };
         let mut actions = [None; 12];
-        for a in &mut actions[..5] { *a = Some(0.1) }
-        for x in &c { actions[x.kind.index()] = Some(0.2) }
-        let objects = c.iter().map(|x| (x.class, 0.2, true)).chain(crate::domain::Class::all().take(4).map(|c| (c, 0.05, false))).collect();
-        Ok(crate::agent::Decision { action, mind: Some(crate::agent::Mind { actions, objects, entropy: 0.62, greedy: action }) })
+        for a in &mut actions[..5] {
+            *a = Some(0.1)
+        }
+        for x in &c {
+            actions[x.kind.index()] = Some(0.2)
+        }
+        let objects = c
+            .iter()
+            .map(|x| (x.class, 0.2, true))
+            .chain(crate::domain::Class::all().take(4).map(|c| (c, 0.05, false)))
+            .collect();
+        Ok(crate::agent::Decision {
+            action,
+            mind: Some(crate::agent::Mind { actions, objects, entropy: 0.62, greedy: action }),
+        })
     }
 }

@@ -13,7 +13,6 @@ use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Scene, World};
 
 pub use words::describe;
-pub(crate) use words::preposition;
 
 /// How subtasks are graded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -44,7 +44,11 @@ impl Widget for Map<'_> {
         let right = target.map_or(String::new(), |(_, words)| words.clone());
         let inner = panel(buf, area, "Map", &right);
         let Some(plan) = Plan::fitting(now, inner) else { return };
-        if app.ability.shades() { plan.shaded(now, buf) } else { plan.lettered(app, now, buf) }
+        if app.ability.shades() {
+            plan.shaded(now, buf)
+        } else {
+            plan.lettered(app, now, buf)
+        }
         plan.marks(app, now, target.map(|(target, _)| target), buf);
     }
 }
@@ -69,7 +73,13 @@ impl Plan {
         }
         let needed = (width as u32).div_ceil(columns as u32).max((depth as u32).div_ceil(squares as u32)) as i32;
         // Whole and half cells keep the grid regular.
-        let side = if needed <= 125 { 125 } else if needed <= 250 { 250 } else { needed };
+        let side = if needed <= 125 {
+            125
+        } else if needed <= 250 {
+            250
+        } else {
+            needed
+        };
         // A cell's centre is at a multiple of 250 mm; the drawing starts at a cell's edge.
         let snapped = |v: i32| (v - 125).div_euclid(250) * 250 + 125;
         let spare = |have: i32, want: i32| (have - want.div_euclid(side)).max(0) / 2;
@@ -80,14 +90,18 @@ impl Plan {
 
     /// The middle of a square, in millimetres.
     fn point(&self, column: u16, square: u16) -> (i32, i32) {
-        (self.west + i32::from(column) * self.side + self.side / 2, self.north - i32::from(square) * self.side - self.side / 2)
+        (
+            self.west + i32::from(column) * self.side + self.side / 2,
+            self.north - i32::from(square) * self.side - self.side / 2,
+        )
     }
 
     /// The character that a point lies in.
     fn position(&self, x: i32, z: i32) -> Option<(u16, u16)> {
         let column = (x - self.west).div_euclid(self.side);
         let row = (self.north - z).div_euclid(2 * self.side);
-        let inside = (0..i32::from(self.area.width)).contains(&column) && (0..i32::from(self.area.height)).contains(&row);
+        let inside =
+            (0..i32::from(self.area.width)).contains(&column) && (0..i32::from(self.area.height)).contains(&row);
         inside.then(|| (self.area.x + column as u16, self.area.y + row as u16))
     }
 
@@ -126,7 +140,8 @@ impl Plan {
                 continue;
             }
             let width = name.width() as u16;
-            let place = Rect { x: x.saturating_sub(width / 2).max(self.area.x), y, width, height: 1 }.intersection(self.area);
+            let place =
+                Rect { x: x.saturating_sub(width / 2).max(self.area.x), y, width, height: 1 }.intersection(self.area);
             if taken.iter().any(|other| other.intersects(place)) {
                 continue;
             }
@@ -174,7 +189,12 @@ impl Plan {
             let Instance::Object(index) = sighting.instance else { continue };
             if let Some(object) = now.world.object(index).filter(|_| !now.world.in_hand(index)) {
                 let symbol = if shades { '•' } else { app.letters.letter(object.class) };
-                mark(object.at.x, object.at.z, symbol, Style::new().fg(if shades { Color::White } else { Color::Reset }));
+                mark(
+                    object.at.x,
+                    object.at.z,
+                    symbol,
+                    Style::new().fg(if shades { Color::White } else { Color::Reset }),
+                );
             }
         }
         if let Some(at) = target.and_then(|target| now.world.position(&now.scene, target)) {
@@ -198,12 +218,13 @@ fn bounds(now: &Snapshot) -> Option<Floor> {
         let at = cell.centre(0);
         Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(125)
     });
-    cells.chain(now.scene.walls.iter().map(|wall| wall.footprint())).chain(furniture(now).map(|(floor, _)| floor)).reduce(
-        |a, b| Floor {
+    cells
+        .chain(now.scene.walls.iter().map(|wall| wall.footprint()))
+        .chain(furniture(now).map(|(floor, _)| floor))
+        .reduce(|a, b| Floor {
             min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1])],
             max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1])],
-        },
-    )
+        })
 }
 
 fn extent(floor: &Floor) -> i64 {
@@ -213,7 +234,8 @@ fn extent(floor: &Floor) -> i64 {
 /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
 fn furniture(now: &Snapshot) -> impl Iterator<Item = (Floor, Class)> + '_ {
     let floor = now.scene.floor();
-    let parts = now.scene.fixtures.iter().flat_map(|fixture| fixture.body.iter().map(move |part| (part, fixture.class)));
+    let parts =
+        now.scene.fixtures.iter().flat_map(|fixture| fixture.body.iter().map(move |part| (part, fixture.class)));
     let mut parts: Vec<_> = parts.filter(move |(part, _)| part.min.y - floor < OVERHEAD).collect();
     parts.sort_by_key(|(part, _)| part.max.y);
     parts.into_iter().map(|(part, class)| (part.footprint(), class))
