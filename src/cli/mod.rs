@@ -18,7 +18,6 @@ mod replay;
 mod shell;
 mod stop;
 mod tasks;
-mod terminal;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
