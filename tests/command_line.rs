@@ -69,7 +69,12 @@ fn embed_refuses_a_line_that_is_not_text_and_a_folder_that_is_not_there() {
     let Some(encoder) = tiny_encoder() else { return };
     let home = tempfile::tempdir().unwrap();
     let mut command = sprint(home.path());
-    command.args(["embed", "--encoder"]).arg(encoder).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+        .args(["embed", "--encoder"])
+        .arg(encoder)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
     let mut program = command.spawn().unwrap();
     program.stdin.take().unwrap().write_all(b"mug\n\xff\xfe\n").unwrap();
     let output = program.wait_with_output().unwrap();

@@ -158,8 +158,13 @@ fn plain_mode_takes_verbs_and_prints_a_line_a_step_without_escape_codes() {
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(!text.contains('\x1b'), "{text}");
-    for wanted in ["scene: kitchen", "hand: empty", "instruction: find the quince (was: ", "step 3: ", "step 4: RotateLeft: ok"] {
+    for wanted in
+        ["scene: kitchen", "hand: empty", "instruction: find the quince (was: ", "step 3: ", "step 4: RotateLeft: ok"]
+    {
         assert!(text.contains(wanted), "no {wanted:?} in:\n{text}");
     }
-    assert!(text.contains("error: there is no candidate 99") && text.contains("error: unknown verb \"dance\""), "{text}");
+    assert!(
+        text.contains("error: there is no candidate 99") && text.contains("error: unknown verb \"dance\""),
+        "{text}"
+    );
 }

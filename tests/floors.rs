@@ -3,15 +3,11 @@
 use std::path::{Path, PathBuf};
 
 /// Ground floor first.
-const FLOORS: [&str; 10] = ["domain", "house", "language", "data", "nets", "algo", "agent", "run", "tui", "cli"];
+const FLOORS: [&str; 10] = ["domain", "language", "house", "data", "nets", "algo", "agent", "run", "tui", "cli"];
 
 /// Libraries, and the floors that may use them.
-const LIBRARIES: [(&str, &[&str]); 4] = [
-    ("tch", &["nets", "algo", "agent", "run", "cli"]),
-    ("ratatui", &["tui"]),
-    ("crossterm", &["tui"]),
-    ("clap", &["cli"]),
-];
+const LIBRARIES: [(&str, &[&str]); 4] =
+    [("tch", &["nets", "algo", "agent", "run"]), ("ratatui", &["tui"]), ("crossterm", &["tui"]), ("clap", &["cli"])];
 
 /// A source file: its floor and its lines that are code.
 struct Source {

@@ -4,3 +4,6 @@ mod explore;
 mod eval;
 mod floors;
 mod command_line;
+mod generated;
+mod properties;
+mod scenarios;

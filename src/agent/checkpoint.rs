@@ -102,8 +102,8 @@ impl Config {
             version.map_or("missing".to_string(), |version| version.to_string()),
             Config::FORMAT
         );
-        let config: Config =
-            serde_json::from_value(value).with_context(|| format!("{} is not a checkpoint's configuration", path.display()))?;
+        let config: Config = serde_json::from_value(value)
+            .with_context(|| format!("{} is not a checkpoint's configuration", path.display()))?;
         let own = Ontology::current();
         anyhow::ensure!(
             config.ontology.classes == own.classes,
@@ -315,7 +315,13 @@ mod tests {
         tensors.insert("policy.objects.bias".into(), Tensor::from_slice(&[1.0f32]));
         weights::write(&path, &tensors, &BTreeMap::new()).unwrap();
         let error = format!("{:#}", Networks::load(folder.path(), &config, Device::Cpu).unwrap_err());
-        for part in ["model.safetensors", "missing policy.actions.bias", "unknown surprise", "policy.objects.bias is Float[1]", "Float[82]"] {
+        for part in [
+            "model.safetensors",
+            "missing policy.actions.bias",
+            "unknown surprise",
+            "policy.objects.bias is Float[1]",
+            "Float[82]",
+        ] {
             assert!(error.contains(part), "{error}");
         }
         std::fs::write(&path, b"nonsense").unwrap();

@@ -63,7 +63,13 @@ impl LearnedPolicy {
     }
 
     /// A policy of networks at hand.
-    pub fn with(name: String, config: Config, networks: Networks, sentences: SharedEmbedder, device: Device) -> LearnedPolicy {
+    pub fn with(
+        name: String,
+        config: Config,
+        networks: Networks,
+        sentences: SharedEmbedder,
+        device: Device,
+    ) -> LearnedPolicy {
         LearnedPolicy {
             name,
             config,

@@ -45,7 +45,13 @@ const LISTED: usize = 12;
 
 /// The likeliest classes before restriction, each with whether it is a candidate of the interaction at hand: the shown
 /// action, or the likeliest possible interaction when that is navigation.
-fn ranking(objects: &[f32], candidates: &[Candidate], shown: usize, open: &[usize], shares: &[f32]) -> Vec<(Class, f32, bool)> {
+fn ranking(
+    objects: &[f32],
+    candidates: &[Candidate],
+    shown: usize,
+    open: &[usize],
+    shares: &[f32],
+) -> Vec<(Class, f32, bool)> {
     let interaction = |index: usize| ActionType::from_index(index).filter(|kind| kind.is_interaction());
     let likeliest = open.iter().zip(shares).filter(|(index, _)| interaction(**index).is_some());
     let likeliest = likeliest.max_by(|a, b| a.1.total_cmp(b.1)).and_then(|(&index, _)| interaction(index));
@@ -140,8 +146,7 @@ mod tests {
         let candidates = [candidate(ActionType::Pickup, "Mug", 0, 500.0)];
         for favourite in ActionType::ALL {
             for _ in 0..40 {
-                let decision =
-                    decide(&actions(favourite), &objects("Mug"), &candidates, Selection::Sample(&mut rng));
+                let decision = decide(&actions(favourite), &objects("Mug"), &candidates, Selection::Sample(&mut rng));
                 let kind = decision.action.kind;
                 assert!(!kind.is_interaction() || kind == ActionType::Pickup);
                 let mind = decision.mind.unwrap();

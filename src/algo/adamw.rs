@@ -36,7 +36,8 @@ impl AdamW {
     /// An optimiser at its start: no step taken, moments zero.
     pub fn new(store: &nn::VarStore, config: AdamWConfig) -> AdamW {
         let trainable = store.variables().into_iter().filter(|(_, tensor)| tensor.requires_grad());
-        let slot = |weight: Tensor| Slot { mean: weight.zeros_like().detach(), square: weight.zeros_like().detach(), weight };
+        let slot =
+            |weight: Tensor| Slot { mean: weight.zeros_like().detach(), square: weight.zeros_like().detach(), weight };
         AdamW { config, slots: trainable.map(|(name, weight)| (name, slot(weight))).collect(), steps: 0 }
     }
 
@@ -76,7 +77,10 @@ impl AdamW {
     /// Both moments of every tensor, as `mean.NAME` and `square.NAME`.
     pub fn moments(&self) -> BTreeMap<String, Tensor> {
         let both = |(name, slot): (&String, &Slot)| {
-            [(format!("mean.{name}"), slot.mean.shallow_clone()), (format!("square.{name}"), slot.square.shallow_clone())]
+            [
+                (format!("mean.{name}"), slot.mean.shallow_clone()),
+                (format!("square.{name}"), slot.square.shallow_clone()),
+            ]
         };
         self.slots.iter().flat_map(both).collect()
     }

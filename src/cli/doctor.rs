@@ -1,7 +1,6 @@
 //! `sprint doctor`: what was found on this machine, and the remedy for what was not.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;

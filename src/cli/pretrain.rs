@@ -22,7 +22,7 @@ use crate::run::pretrain::{Pretraining, Trained};
 /// Trains an agent.
 #[derive(Args)]
 pub struct Pretrain {
-    /// Dataset folders; the first one keeps the cache
+    /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
     /// A shipped preset (l-bc), or a preset's file
@@ -37,6 +37,9 @@ pub struct Pretrain {
     /// Use this checkpoint's visual encoder instead of training one
     #[arg(long, value_name = "DIR")]
     visual_from: Option<PathBuf>,
+    /// Start from this checkpoint's policy instead of a fresh one
+    #[arg(long, value_name = "DIR")]
+    policy_from: Option<PathBuf>,
     /// Steps of the visual encoder's training, instead of the preset's
     #[arg(long, value_name = "N")]
     encoder_steps: Option<u64>,
@@ -71,6 +74,7 @@ impl Pretrain {
             out: self.out,
             resume: self.resume,
             visual_from: self.visual_from,
+            policy_from: self.policy_from,
             sentences: sentences.clone(),
             sentence_encoder: name(&folder),
             device,

@@ -59,6 +59,11 @@ impl Features {
         Ok(Some(Features { bytes, width: 2 * wanted.numbers as usize }))
     }
 
+    /// Adds the maps of another file of the same encoder after these.
+    pub fn append(&mut self, mut other: Features) {
+        self.bytes.append(&mut other.bytes);
+    }
+
     /// Appends the bytes of one map: little-endian 16-bit floats.
     pub fn gather(&self, map: usize, into: &mut Vec<u8>) {
         into.extend_from_slice(&self.bytes[map * self.width..(map + 1) * self.width]);

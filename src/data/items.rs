@@ -123,8 +123,8 @@ impl Item {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::trajectory::Annotation;
     use crate::domain::task::SceneRef;
+    use crate::domain::trajectory::Annotation;
     use crate::domain::{Action, ActionType, SkillKind, Subtask, World};
 
     fn trajectory(skill_starts: Vec<u32>, steps: usize) -> Trajectory {
@@ -151,7 +151,8 @@ mod tests {
     #[test]
     fn a_trajectory_gives_its_primitives_and_its_whole() {
         let items = Items::of(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Vec::new(), 0);
-        let edges: Vec<(u32, u32, u32)> = items.training.iter().map(|span| (span.first, span.start, span.end)).collect();
+        let edges: Vec<(u32, u32, u32)> =
+            items.training.iter().map(|span| (span.first, span.start, span.end)).collect();
         assert_eq!(edges, [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9)]);
         assert_eq!(items.texts, ["step 0", "step 1", "all"].map(normalise));
         assert_eq!(items.training[3].texts, [0, 2]);

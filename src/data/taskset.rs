@@ -241,7 +241,10 @@ pub(crate) mod tests {
         assert!(complaint(|set| set.tasks[1].scene = SceneRef::Named("../../etc".into())).contains("tasks[1].scene"));
         assert!(complaint(|set| set.tasks[0].instruction = "x".repeat(10_000)).contains("10000 characters"));
         assert!(complaint(|set| set.tasks[0].instruction = "go\u{1b}[2J".into()).contains("U+001B"));
-        assert!(complaint(|set| set.tasks[0].instruction = "  ".into()).contains("tasks[0].instruction: the instruction is empty"));
+        assert!(
+            complaint(|set| set.tasks[0].instruction = "  ".into())
+                .contains("tasks[0].instruction: the instruction is empty")
+        );
         assert!(complaint(|set| set.tasks[0].sentences.truncate(1)).contains("1 sentences for 2 subtasks"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].object = 9).contains("tasks[0].subtasks[1].object: 9, but"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].receptacle = None).contains("subtasks[1].receptacle"));

@@ -1,7 +1,7 @@
 //! FiLM: a sentence scales and shifts the channels of a convolution (Perez et al., 2018).
 
-use tch::nn::{self, Init, Module};
 use tch::Tensor;
+use tch::nn::{self, Init, Module};
 
 /// Per-channel scale and shift, read off a sentence embedding. It starts as the identity.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! The policy network: a convolutional trunk over stacked feature maps, modulated by the sentence, and two heads.
 
 use serde::{Deserialize, Serialize};
-use tch::nn::{self, Module, ModuleT};
 use tch::Tensor;
+use tch::nn::{self, Module, ModuleT};
 
 use super::film::Film;
 use super::visual::SIDE;

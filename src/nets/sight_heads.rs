@@ -57,7 +57,8 @@ impl SightHeads {
     pub fn loss(&self, maps: &Tensor, known: &Known, positive_weight: f64) -> SightLoss {
         let logits = maps.apply(&self.marks);
         let weight = Tensor::from(positive_weight as f32).to_device(logits.device());
-        let marks = logits.binary_cross_entropy_with_logits(&known.marks, None::<&Tensor>, Some(&weight), Reduction::Mean);
+        let marks =
+            logits.binary_cross_entropy_with_logits(&known.marks, None::<&Tensor>, Some(&weight), Reduction::Mean);
         SightLoss {
             marks: marks * logits.size()[1],
             depth: (maps.apply(&self.depth) - &known.depth).abs().mean(Kind::Float),

@@ -95,12 +95,11 @@ pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn
     let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
     let mut number = 0;
     while findings.agent.trials < appraisal.tasks {
-        let (room, scene, world) = unseen(appraisal.seed, number);
+        let (reference, scene, world) = unseen(appraisal.seed, number);
         number += 1;
-        let reference = SceneRef::Generated { room, seed: UNSEEN + appraisal.seed * 1_000_000 + number };
         let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
         let start = task.start.clone().unwrap_or(world);
-        let mut solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
+        let solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
             let house = House::new(scene.clone(), start.clone());
             let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon));
@@ -135,10 +134,10 @@ pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn
     Ok(findings)
 }
 
-fn unseen(seed: u64, number: u64) -> (Room, Arc<Scene>, World) {
-    let room = Room::ALL[(number % 4) as usize];
-    let (scene, world) = generate::house(room, UNSEEN + seed * 1_000_000 + number);
-    (room, Arc::new(scene), world)
+fn unseen(seed: u64, number: u64) -> (SceneRef, Arc<Scene>, World) {
+    let (room, seed) = (Room::ALL[(number % 4) as usize], UNSEEN + seed * 1_000_000 + number);
+    let (scene, world) = generate::house(room, seed);
+    (SceneRef::Generated { room, seed }, Arc::new(scene), world)
 }
 
 /// A start from which two objects of different classes are in view, each the only one of its class there.
@@ -205,7 +204,12 @@ fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> 
 
 impl Pair {
     /// The class that the policy picks up first when it is told to take one of the two.
-    fn first_pickup(&self, policy: &mut dyn Policy, told: usize, rng: &mut ChaCha8Rng) -> anyhow::Result<Option<Class>> {
+    fn first_pickup(
+        &self,
+        policy: &mut dyn Policy,
+        told: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Option<Class>> {
         let (roles, subtasks) = pickup(self.objects[told]);
         let instruction = phrases::sentence(&roles, &subtasks[0], rng);
         let house = House::new(self.scene.clone(), self.world.clone());

@@ -149,3 +149,104 @@ fn measure(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::features::{Header, Writer};
+    use crate::data::items::Label;
+    use crate::nets::policy::PolicySpec;
+
+    const FRAMES: u64 = 24;
+
+    fn preset(steps: u64) -> Preset {
+        let mut preset = Preset::named("l-bc").unwrap();
+        preset.policy = PolicySpec { history: 2, embedding: 3, channels: [4; 4], hidden: vec![32], dropout: 0.1 };
+        preset.visual.channels = [2; 4];
+        (preset.training.steps, preset.training.batch) = (steps, 16);
+        (preset.training.schedule.warmup_steps, preset.training.schedule.learning_rate) = (2, 0.01);
+        (preset.save_every, preset.report_every) = (1000, 1000);
+        preset
+    }
+
+    /// Frames of noise, each with an action of its own; half of them with an object.
+    fn features(preset: &Preset) -> Features {
+        let folder = tempfile::tempdir().unwrap();
+        let numbers = preset.visual.map() as u64;
+        let header = Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
+        tch::manual_seed(4);
+        let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
+        let mut bytes = vec![0; maps.numel() * 2];
+        maps.copy_data_u8(&mut bytes, maps.numel());
+        let mut writer = Writer::create(folder.path(), header.clone()).unwrap();
+        writer.add(&bytes).unwrap();
+        writer.finish().unwrap();
+        Features::read(folder.path(), &header).unwrap().unwrap()
+    }
+
+    fn items() -> Items {
+        let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
+        let span = |first: u32| Span { first, start: first, end: first + 6, texts: vec![0, 1] };
+        Items {
+            labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
+            texts: vec!["one".into(), "two".into()],
+            training: (0..4).map(|i| span(6 * i)).collect(),
+            held_out: vec![span(0)],
+        }
+    }
+
+    /// Notes the last numbers, and pulls the brake after a step.
+    struct Watch<'a> {
+        stop: &'a AtomicBool,
+        stop_after: u64,
+        last: Scalars,
+    }
+
+    impl Report for Watch<'_> {
+        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+            self.last = scalars.clone();
+            self.stop.store(scalars.step == self.stop_after, Ordering::Relaxed);
+            Ok(())
+        }
+    }
+
+    /// Trains, stopping once and going on when `stop_after` says so; the final weights and numbers.
+    fn trained(steps: u64, stop_after: u64) -> (Vec<(String, Tensor)>, Scalars) {
+        let preset = preset(steps);
+        let (features, items) = (features(&preset), items());
+        let sentences = Tensor::from_slice2(&[[1.0f32, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let material = Material { items: &items, features: &features, sentences: &sentences };
+        let folder = tempfile::tempdir().unwrap();
+        let state = folder.path().join("policy.safetensors");
+        let stop = AtomicBool::new(false);
+        loop {
+            tch::manual_seed(1);
+            let store = nn::VarStore::new(Device::Cpu);
+            let policy = PolicyNet::new(&store.root(), &preset.policy, preset.visual.features());
+            let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
+            stop.store(false, Ordering::Relaxed);
+            let mut save = |_| Ok(());
+            if train(&store, &policy, &material, &preset, &state, &mut watch, &stop, &mut save).unwrap() {
+                let mut weights: Vec<(String, Tensor)> = store.variables().into_iter().collect();
+                weights.sort_by(|a, b| a.0.cmp(&b.0));
+                return (weights, watch.last);
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_frames_are_learned_by_heart() {
+        let (_, last) = trained(250, u64::MAX);
+        assert!(last.values["held_out_action_accuracy"] > 0.95, "{last:?}");
+        assert!(last.values["held_out_object_accuracy"] > 0.95, "{last:?}");
+    }
+
+    #[test]
+    fn a_training_that_was_stopped_and_resumed_equals_the_uninterrupted_one_to_the_bit() {
+        let (whole, resumed) = (trained(8, u64::MAX).0, trained(8, 3).0);
+        assert_eq!(whole.len(), resumed.len());
+        for ((name, one), (_, other)) in whole.iter().zip(&resumed) {
+            assert_eq!(one, other, "{name}");
+        }
+    }
+}

@@ -192,10 +192,9 @@ impl Episode<'_> {
 
     fn annotations(&self, rng: &mut ChaCha8Rng) -> Vec<Annotation> {
         let Task { roles, subtasks, .. } = self.task;
-        let annotate = |_| Annotation {
-            goal: phrases::instruction(roles, subtasks, rng),
-            steps: subtasks.iter().map(|subtask| phrases::sentence(roles, subtask, rng)).collect(),
-        };
+        let origins = phrases::origins(self.scene, &self.start, roles);
+        let story = phrases::Story { roles, subtasks, origins: &origins };
+        let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
         (0..self.collection.annotations.max(1)).map(annotate).collect()
     }
 }

@@ -85,6 +85,15 @@ impl Evaluation {
         {
             anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
         }
+        if options.grading == Grading::Strict {
+            let unrecorded = |task: &Task| task.subtasks.iter().position(|subtask| subtask.literal.is_none());
+            if let Some((i, j)) = tasks.iter().enumerate().find_map(|(i, task)| Some((i, unrecorded(task)?))) {
+                anyhow::bail!(
+                    "tasks[{i}].subtasks[{j}].literal: missing, so the task {:?} has no recording for the strict grader; use --grader class",
+                    tasks[i].id
+                );
+            }
+        }
         let scenes_hash = scenes.check(&tasks)?;
         let manifest = Manifest {
             format_version: Manifest::FORMAT,

@@ -1,6 +1,7 @@
 //! Footage: the trajectories of a dataset as states that can be drawn, any step at random.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use anyhow::Context;
@@ -17,6 +18,8 @@ pub struct Footage {
     /// The trajectories, in the datasets' order.
     pub trajectories: Vec<Trajectory>,
     scenes: HashMap<SceneRef, Arc<Scene>>,
+    /// The trajectories of each dataset.
+    pub parts: Vec<Range<usize>>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     firsts: Vec<usize>,
 }
@@ -28,12 +31,14 @@ impl Footage {
     /// When a trajectory or a scene cannot be read.
     pub fn open(datasets: &[Dataset]) -> anyhow::Result<Footage> {
         let mut trajectories: Vec<Trajectory> = Vec::new();
+        let mut parts = Vec::new();
         for dataset in datasets {
             let before = trajectories.len();
             for trajectory in dataset.trajectories()? {
                 trajectories.push(trajectory?);
             }
             anyhow::ensure!(trajectories.len() > before, "{} holds no trajectories", dataset.folder().display());
+            parts.push(before..trajectories.len());
         }
         let mut wanted: Vec<SceneRef> = trajectories.iter().map(|trajectory| trajectory.scene.clone()).collect();
         wanted.sort_by_key(|scene| format!("{scene:?}"));
@@ -50,12 +55,17 @@ impl Footage {
         for trajectory in &trajectories {
             firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
         }
-        Ok(Footage { trajectories, scenes, firsts })
+        Ok(Footage { trajectories, scenes, parts, firsts })
     }
 
     /// How many frames there are: each trajectory has one more than it has actions.
     pub fn frames(&self) -> usize {
         self.firsts[self.firsts.len() - 1]
+    }
+
+    /// How many frames some trajectories have.
+    pub fn frames_of(&self, trajectories: &Range<usize>) -> usize {
+        self.firsts[trajectories.end] - self.firsts[trajectories.start]
     }
 
     /// Whether a frame belongs to a held-out trajectory: every `hold_out`th is.

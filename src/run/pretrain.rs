@@ -1,6 +1,6 @@
 //! Pretraining: visual encoder, feature maps, sentences, policy; each stage can be stopped and taken up again.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -22,7 +22,7 @@ use crate::data::items::Items;
 pub struct Pretraining {
     /// The hyper-parameters.
     pub preset: Preset,
-    /// The datasets' folders; the first keeps the cache.
+    /// The datasets' folders; each keeps its own cache.
     pub data: Vec<PathBuf>,
     /// The checkpoint's folder.
     pub out: PathBuf,
@@ -30,6 +30,8 @@ pub struct Pretraining {
     pub resume: bool,
     /// A checkpoint whose visual encoder is used instead of training one.
     pub visual_from: Option<PathBuf>,
+    /// A checkpoint whose policy is the start, instead of a fresh one.
+    pub policy_from: Option<PathBuf>,
     /// Embeds the instructions.
     pub sentences: SharedEmbedder,
     /// The name of the sentence encoder's folder.
@@ -75,7 +77,10 @@ impl Pretraining {
         }
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
         let digest = digests.join("-");
-        let Some(features) = self.features(&networks, &footage, &digest, &mut report, stop)? else {
+        if let Some(folder) = &self.policy_from {
+            copy(&self.given(folder)?.policy_store, "", &networks.policy_store)?;
+        }
+        let Some(features) = self.features(&networks, &footage, &digests, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
         let items = Items::of(&footage.trajectories, footage.labels()?, self.preset.hold_out);
@@ -115,59 +120,64 @@ impl Pretraining {
     ) -> anyhow::Result<bool> {
         let state = self.out.join("training/visual.safetensors");
         if let Some(folder) = &self.visual_from {
-            let config = Config::read(folder)?;
-            anyhow::ensure!(
-                config.visual == self.preset.visual,
-                "{}: visual is {:?}, the preset's is {:?}",
-                folder.join("config.json").display(),
-                config.visual,
-                self.preset.visual
-            );
-            let from = Networks::load(folder, &config, self.device)?.visual_store.variables();
-            return tch::no_grad(|| {
-                for (name, mut tensor) in networks.visual_store.variables() {
-                    tensor.f_copy_(from.get(&name).context("a tensor is missing")?)?;
-                }
-                Ok(true)
-            });
+            copy(&self.given(folder)?.visual_store, "", &networks.visual_store)?;
+            return Ok(true);
         }
         // The heads live in a store of their own shape, so the trained encoder is copied out of it.
         let mut store = tch::nn::VarStore::new(self.device);
         let encoder = crate::nets::visual::VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
         let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
         store.freeze();
-        let trained = store.variables();
-        tch::no_grad(|| {
-            for (name, mut tensor) in networks.visual_store.variables() {
-                tensor.f_copy_(trained.get(&format!("encoder.{name}")).context("a tensor is missing")?)?;
-            }
-            Ok(finished)
-        })
+        copy(&store, "encoder.", &networks.visual_store)?;
+        Ok(finished)
     }
 
+    /// The networks of a checkpoint of the preset's sizes.
+    fn given(&self, folder: &Path) -> anyhow::Result<Networks> {
+        let config = Config::read(folder)?;
+        let file = folder.join("config.json");
+        let (found, own) = (&config.visual, &self.preset.visual);
+        anyhow::ensure!(found == own, "{}: visual is {found:?}, the preset's is {own:?}", file.display());
+        let (found, own) = (&config.policy, &self.preset.policy);
+        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+        Networks::load(folder, &config, self.device)
+    }
+
+    /// Every dataset's maps, one after the other; each is computed once and kept in that dataset's cache.
     fn features(
         &self,
         networks: &Networks,
         footage: &Footage,
-        dataset: &str,
+        digests: &[String],
         report: &mut dyn Report,
         stop: &AtomicBool,
     ) -> anyhow::Result<Option<Features>> {
-        let header = Header {
-            format_version: Header::FORMAT,
-            encoder: digest(&networks.visual_store)?,
-            dataset: dataset.to_string(),
-            maps: footage.frames() as u64,
-            numbers: self.preset.visual.map() as u64,
-        };
-        let cache = self.data.first().context("there is no dataset")?.join("cache");
-        if let Some(features) = Features::read(&cache, &header)? {
-            return Ok(Some(features));
+        let mut all: Option<Features> = None;
+        let encoder = digest(&networks.visual_store)?;
+        for ((folder, trajectories), dataset) in self.data.iter().zip(&footage.parts).zip(digests) {
+            let header = Header {
+                format_version: Header::FORMAT,
+                encoder: encoder.clone(),
+                dataset: dataset.clone(),
+                maps: footage.frames_of(trajectories) as u64,
+                numbers: self.preset.visual.map() as u64,
+            };
+            let cache = folder.join("cache");
+            let mut features = Features::read(&cache, &header)?;
+            if features.is_none() {
+                let visual = &networks.visual;
+                if !visual_training::encode(visual, footage, trajectories.clone(), &cache, &header, report, stop)? {
+                    return Ok(None);
+                }
+                features = Features::read(&cache, &header)?;
+            }
+            let features = features.with_context(|| format!("{} changed meanwhile", cache.display()))?;
+            match &mut all {
+                Some(all) => all.append(features),
+                None => all = Some(features),
+            }
         }
-        if !visual_training::encode(&networks.visual, footage, &cache, &header, report, stop)? {
-            return Ok(None);
-        }
-        Features::read(&cache, &header)
+        Ok(all)
     }
 
     fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
@@ -212,6 +222,18 @@ impl Pretraining {
             },
         })
     }
+}
+
+/// Copies the tensors of one store, those under `prefix`, over another's.
+fn copy(from: &tch::nn::VarStore, prefix: &str, to: &tch::nn::VarStore) -> anyhow::Result<()> {
+    let from = from.variables();
+    tch::no_grad(|| {
+        for (name, mut tensor) in to.variables() {
+            let name = format!("{prefix}{name}");
+            tensor.f_copy_(from.get(&name).with_context(|| format!("the tensor {name} is missing"))?)?;
+        }
+        Ok(())
+    })
 }
 
 /// Identifies a store's weights: the first 16 digits of their sha256.

@@ -95,13 +95,8 @@ mod tests {
 
     #[test]
     fn pixels_are_counted_in_the_place_they_fall_into() {
-        let mut frame = Frame {
-            width: 300,
-            height: 300,
-            rgb: Vec::new(),
-            depth: vec![2.0; 90_000],
-            ids: vec![0; 90_000],
-        };
+        let mut frame =
+            Frame { width: 300, height: 300, rgb: Vec::new(), depth: vec![2.0; 90_000], ids: vec![0; 90_000] };
         for y in 0..10 {
             for x in 280..300 {
                 frame.ids[y * 300 + x] = 3;

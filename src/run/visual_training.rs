@@ -1,5 +1,6 @@
 //! Trains the visual encoder on drawn frames of a dataset, and computes the feature maps of all its frames.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,7 +51,8 @@ pub fn train(
             return Ok(false);
         }
         let step = learner.step();
-        let (images, known) = batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
+        let (images, known) =
+            batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
         learner.begin_step();
         let loss = heads.loss(&encoder.forward(&images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
@@ -124,7 +126,10 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
     let depth: Vec<f32> = sights.iter().flat_map(|sight| sight.depth.iter().copied()).collect();
     let device = encoder.device();
     let known = Known {
-        marks: Tensor::from_slice(&gather(|sight| &sight.marks)).view([n, MARKS as i64, SIDE, SIDE]).to_device(device).to_kind(Kind::Float),
+        marks: Tensor::from_slice(&gather(|sight| &sight.marks))
+            .view([n, MARKS as i64, SIDE, SIDE])
+            .to_device(device)
+            .to_kind(Kind::Float),
         depth: Tensor::from_slice(&depth).view([n, 1, SIDE, SIDE]).to_device(device),
         held: Tensor::from_slice(&held).to_device(device),
     };
@@ -134,13 +139,14 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
 /// Frames that are encoded at once.
 const CHUNK: usize = 256;
 
-/// Computes the feature map of every frame into `folder`. Returns false when it was stopped; nothing is written then.
+/// Computes the feature map of every frame of some trajectories into `folder`. Returns false when it was stopped; nothing is written then.
 ///
 /// # Errors
 /// When a frame cannot be drawn or the file not be written.
 pub fn encode(
     encoder: &VisualEncoder,
     footage: &Footage,
+    trajectories: Range<usize>,
     folder: &Path,
     header: &Header,
     report: &mut dyn Report,
@@ -150,7 +156,8 @@ pub fn encode(
     let mut pending: Vec<Vec<u8>> = Vec::new();
     let mut done = 0;
     let spec = encoder.spec();
-    let trajectories: Vec<usize> = (0..footage.trajectories.len()).collect();
+    let frames = footage.frames_of(&trajectories);
+    let trajectories: Vec<usize> = trajectories.collect();
     for group in trajectories.chunks(16) {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
@@ -166,13 +173,13 @@ pub fn encode(
         let drawn: Vec<Vec<Vec<u8>>> =
             group.par_iter().map_init(|| Renderer::new(House::FRAME), draw).collect::<anyhow::Result<_>>()?;
         pending.extend(drawn.into_iter().flatten());
-        let whole = if done + pending.len() == footage.frames() { pending.len() } else { pending.len() / CHUNK * CHUNK };
+        let whole = if done + pending.len() == frames { pending.len() } else { pending.len() / CHUNK * CHUNK };
         for chunk in pending[..whole].chunks(CHUNK) {
             writer.add(&half_bytes(&encoder.encode(chunk))?)?;
         }
         pending.drain(..whole);
         done += whole;
-        report.step(&Scalars::new("features", done as u64, footage.frames() as u64))?;
+        report.step(&Scalars::new("features", done as u64, frames as u64))?;
     }
     writer.finish()?;
     Ok(true)
@@ -184,4 +191,99 @@ fn half_bytes(tensor: &Tensor) -> anyhow::Result<Vec<u8>> {
     let mut bytes = vec![0u8; half.numel() * 2];
     half.f_copy_data_u8(&mut bytes, half.numel())?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::dataset::{Dataset, Manifest};
+    use crate::data::features::Features;
+    use crate::domain::task::SceneRef;
+    use crate::domain::{Action, ActionType, Trajectory};
+    use crate::house::testing::kitchen;
+
+    /// Two turns around in the test kitchen.
+    fn footage() -> Footage {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, start) = kitchen();
+        let mut writer = crate::data::dataset::Writer::new(folder.path()).unwrap();
+        writer.scene(&scene).unwrap();
+        for (id, turn) in [("left", ActionType::RotateLeft), ("right", ActionType::RotateRight)] {
+            let trajectory = Trajectory {
+                id: id.into(),
+                split: "train".into(),
+                scene: SceneRef::Named(scene.name.clone()),
+                start: start.clone(),
+                actions: vec![Action::navigate(turn); 4],
+                roles: Vec::new(),
+                skills: Vec::new(),
+                skill_starts: Vec::new(),
+                goal: None,
+                annotations: Vec::new(),
+                boxes: Vec::new(),
+                choices: Vec::new(),
+            };
+            writer.trajectory(&trajectory).unwrap();
+        }
+        let manifest = Manifest {
+            format_version: Manifest::FORMAT,
+            source: "test".into(),
+            counts: Default::default(),
+            scenes: 1,
+            held_out: Vec::new(),
+            skipped: Vec::new(),
+        };
+        writer.finish(&manifest).unwrap();
+        Footage::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
+    }
+
+    struct Notes(Vec<Scalars>);
+
+    impl Report for Notes {
+        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+            self.0.push(scalars.clone());
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn the_encoder_learns_what_a_few_frames_show_and_every_frame_gets_its_map() {
+        let footage = footage();
+        assert_eq!(footage.frames(), 10);
+        let mut preset = Preset::named("l-bc").unwrap();
+        preset.visual.channels = [4, 4, 8, 16];
+        preset.visual_training.optimisation.steps = 30;
+        preset.visual_training.optimisation.batch = 8;
+        preset.visual_training.optimisation.schedule.warmup_steps = 2;
+        (preset.report_every, preset.save_every) = (1, 100);
+        tch::manual_seed(2);
+        let store = nn::VarStore::new(Device::Cpu);
+        let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
+        let folder = tempfile::tempdir().unwrap();
+        let (state, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+        let mut notes = Notes(Vec::new());
+        assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
+        let loss = |i: usize| notes.0[i].values["marks"];
+        assert!(loss(29) < 0.5 * loss(0), "{} then {}", loss(0), loss(29));
+
+        let header = Header {
+            format_version: Header::FORMAT,
+            encoder: "e".into(),
+            dataset: "d".into(),
+            maps: 10,
+            numbers: preset.visual.map() as u64,
+        };
+        assert!(encode(&encoder, &footage, 0..2, folder.path(), &header, &mut notes, &stop).unwrap());
+        let features = Features::read(folder.path(), &header).unwrap().unwrap();
+        let map = |frame| {
+            let mut bytes = Vec::new();
+            features.gather(frame, &mut bytes);
+            bytes
+        };
+        assert_eq!(features.len(), 10);
+        // Both trajectories start in one state, and four turns lead back to it.
+        assert_eq!(map(0), map(5));
+        assert_eq!(map(1), map(8));
+        assert_ne!(map(0), map(1));
+    }
 }

@@ -225,7 +225,9 @@ impl Engine {
         let text = instruction::parse(text)?;
         self.rollout.instruction = text;
         self.decision = None;
-        let asked = self.task.as_ref().is_some_and(|task| instruction::normalise(&task.instruction) == instruction::normalise(&self.rollout.instruction));
+        let asked = self.task.as_ref().is_some_and(|task| {
+            instruction::normalise(&task.instruction) == instruction::normalise(&self.rollout.instruction)
+        });
         Ok(match (self.rollout.grader.is_some(), asked) {
             (true, true) => "the task's own words",
             (true, false) => {

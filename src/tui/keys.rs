@@ -77,7 +77,8 @@ const TYPING: &[Binding] = &[
     bind("down", &[Down], Verb::Later),
 ];
 
-const HELP: &[Binding] = &[bind("esc ? q", &[Esc, Char('?'), Char('q'), F(1), Enter, Backspace, Char(' ')], Verb::Cancel)];
+const HELP: &[Binding] =
+    &[bind("esc ? q", &[Esc, Char('?'), Char('q'), F(1), Enter, Backspace, Char(' ')], Verb::Cancel)];
 
 /// The keys that mean something in `mode`, in the order of the help: those of the mode first.
 pub fn bindings(mode: Mode) -> impl Iterator<Item = &'static Binding> {

@@ -240,7 +240,11 @@ fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
 /// What is seen, the largest first, with where it is.
 fn look(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
     let pose = now.world.agent;
-    writeln!(out, "at cell {},{} facing {:?}, looking {} degrees down", pose.cell.x, pose.cell.z, pose.heading, pose.horizon)?;
+    writeln!(
+        out,
+        "at cell {},{} facing {:?}, looking {} degrees down",
+        pose.cell.x, pose.cell.z, pose.heading, pose.horizon
+    )?;
     let held = now.world.held.and_then(|held| now.world.object(held));
     writeln!(out, "hand: {}", held.map_or("empty", |object| object.class.spoken()))?;
     let mut sightings = now.view.sightings.clone();

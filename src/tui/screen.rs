@@ -51,7 +51,8 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     terminal::catch_panics();
     let (tell, messages) = sync_channel(QUEUE);
     watch_signals(tell.clone())?;
-    let guard = terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
+    let guard =
+        terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
     let graphics = graphics(screen.protocol);
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
@@ -154,10 +155,7 @@ impl<W: Write> Conversation<W> {
 }
 
 /// Takes in messages until one of them ends it.
-fn converse(
-    mut conversation: Conversation<impl Write>,
-    messages: &Receiver<Msg>,
-) -> anyhow::Result<Farewell> {
+fn converse(mut conversation: Conversation<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<Farewell> {
     loop {
         conversation.show()?;
         let first = messages.recv().context("all threads are gone")?;

@@ -141,7 +141,8 @@ mod tests {
         farewell(&mut out, true).unwrap();
         let text = String::from_utf8(out).unwrap();
         let order = ["\x1b_Ga=d", "\x1b[?2026l", "\x1b[?2004l", "\x1b[?1049l", "\x1b[?25h"];
-        let places: Vec<_> = order.iter().map(|part| text.find(part).unwrap_or_else(|| panic!("no {part:?}"))).collect();
+        let places: Vec<_> =
+            order.iter().map(|part| text.find(part).unwrap_or_else(|| panic!("no {part:?}"))).collect();
         assert!(places.is_sorted(), "{text:?}");
     }
 

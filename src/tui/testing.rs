@@ -54,7 +54,11 @@ pub fn snapshot(engine: &mut Engine) -> Snapshot {
     let seen = ["DiningTable", "Mug", "Plate", "Fridge"].map(|name| named(scene, world, name));
     let boxes: [[u16; 4]; 4] = [[40, 160, 299, 260], [80, 130, 110, 165], [180, 150, 240, 170], [230, 20, 299, 150]];
     now.view = View {
-        sightings: seen.into_iter().zip(boxes).map(|(instance, bounds)| Sighting { instance, pixels: 900, bounds }).collect(),
+        sightings: seen
+            .into_iter()
+            .zip(boxes)
+            .map(|(instance, bounds)| Sighting { instance, pixels: 900, bounds })
+            .collect(),
     };
     let side = 300;
     let mut frame = Frame {
@@ -71,7 +75,9 @@ pub fn snapshot(engine: &mut Engine) -> Snapshot {
             };
             let hit = [1, 2, 3, 0].into_iter().find(|&i| inside(boxes[i]));
             frame.ids[y * side + x] = hit.map_or(0, |i| code(seen[i]));
-            frame.rgb.extend(hit.map_or([90, 80, 70], |i| [[150, 110, 70], [200, 60, 50], [220, 220, 225], [180, 190, 200]][i]));
+            frame.rgb.extend(
+                hit.map_or([90, 80, 70], |i| [[150, 110, 70], [200, 60, 50], [220, 220, 225], [180, 190, 200]][i]),
+            );
         }
     }
     now.frame = Arc::new(frame);
@@ -103,7 +109,10 @@ pub fn thought(now: &Snapshot) -> Report {
         (class("CoffeeMachine"), 0.03, false),
     ];
     let action = now.candidates[0].action();
-    Report::Thought(Decision { action, mind: Some(Mind { actions, objects, entropy: 1.13, greedy: action }) }, "Pickup Mug".into())
+    Report::Thought(
+        Decision { action, mind: Some(Mind { actions, objects, entropy: 1.13, greedy: action }) },
+        "Pickup Mug".into(),
+    )
 }
 
 /// A screen of that size in which the agent has just begun.

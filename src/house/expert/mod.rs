@@ -24,6 +24,9 @@ pub enum NoWay {
     /// There is nothing left to do.
     #[error("every subtask is done")]
     Finished,
+    /// The strict grader will not credit anything any more.
+    #[error("the whole goal is met: strict grading credits nothing more")]
+    CutShort,
     /// No thing would serve, or none would take what is held.
     #[error("there is no way to {subtask}: nothing here would serve for it")]
     Nothing {
@@ -59,6 +62,12 @@ impl Expert {
     /// An expert without a plan.
     pub fn new() -> Expert {
         Expert { scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
+    }
+
+    /// Drops the plan: a new episode starts.
+    pub fn forget(&mut self) {
+        self.plan.clear();
+        self.expected = None;
     }
 
     /// The next action for the grader's current subtask.

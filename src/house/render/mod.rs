@@ -68,6 +68,7 @@ impl Renderer {
             }
         }
         if let Some(held) = world.held.and_then(|held| self.cast.things.get(usize::from(held))) {
+            brush.bring_forward(camera.eye(), 0.0);
             for (solid, (centre, axes)) in held.solids.iter().zip(objects::held(&held.solids, held.radius)) {
                 brush.local(solid, centre, axes, 0);
             }
@@ -84,6 +85,7 @@ impl Figure {
 
     fn draw(&self, brush: &mut Brush, id: u16) {
         if self.is_in_view(brush) {
+            brush.bring_forward(self.centre, self.forward());
             for solid in &self.solids {
                 brush.solid(solid, id);
             }

@@ -6,8 +6,7 @@ use super::Job;
 
 /// The eight ways to cut a cell's quarters in two, as bits (1 upper left, 2 upper right, 4 lower left, 8 lower right) that
 /// are foreground. Whole halves come first: on a tie they win.
-const CUTS: [(u8, char); 8] =
-    [(3, '▀'), (5, '▌'), (15, '█'), (1, '▘'), (2, '▝'), (4, '▖'), (8, '▗'), (9, '▚')];
+const CUTS: [(u8, char); 8] = [(3, '▀'), (5, '▌'), (15, '█'), (1, '▘'), (2, '▝'), (4, '▖'), (8, '▗'), (9, '▚')];
 
 /// One styled character a cell, row by row, with the labels over them.
 pub fn draw(job: &Job) -> Vec<(char, Style)> {
@@ -83,7 +82,11 @@ fn nearest(quarters: [[f32; 3]; 4]) -> (char, Style) {
     let colour = |c: [f32; 3]| Color::Rgb(c[0].round() as u8, c[1].round() as u8, c[2].round() as u8);
     let (_, symbol, front, back) = best;
     // A flat cell is a space, which every terminal and every copy of the screen keeps cheap.
-    if front == back { (' ', Style::new().bg(colour(back))) } else { (symbol, Style::new().fg(colour(front)).bg(colour(back))) }
+    if front == back {
+        (' ', Style::new().bg(colour(back)))
+    } else {
+        (symbol, Style::new().fg(colour(front)).bg(colour(back)))
+    }
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, HashMap};
 use ratatui::style::{Color, Style};
 
 use super::Job;
+use crate::domain::Instance;
 use crate::domain::{Class, Scene, World};
 use crate::house::view::{code, decode};
-use crate::domain::Instance;
 
 /// A letter for every class of a scene: capitals for furniture, small letters for things. The same for a whole episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -149,7 +149,8 @@ mod tests {
 
     #[test]
     fn every_class_of_a_scene_has_a_letter_of_its_own() {
-        let objects = Class::all().filter(|class| class.info().pickupable).map(|class| Object { class, ..Object::default() });
+        let objects =
+            Class::all().filter(|class| class.info().pickupable).map(|class| Object { class, ..Object::default() });
         let world = World { objects: objects.collect(), ..World::default() };
         let (scene, _) = crate::house::testing::kitchen();
         let letters = Letters::of(&scene, &world);

@@ -39,7 +39,8 @@ fn entry_lines(entry: &Entry, width: usize) -> Vec<Line<'static>> {
         Tone::Good => THEME.good,
         Tone::Note => THEME.note,
     };
-    let text = if entry.outcome.is_empty() { entry.text.clone() } else { format!("{} · {}", entry.text, entry.outcome) };
+    let text =
+        if entry.outcome.is_empty() { entry.text.clone() } else { format!("{} · {}", entry.text, entry.outcome) };
     let room = width.saturating_sub(5);
     let mut lines = Vec::new();
     for (at, line) in wrap(&text, room, "  ").into_iter().enumerate() {

@@ -45,7 +45,11 @@ impl Widget for Map<'_> {
         let inner = panel(buf, area, "Map", &right);
         let ground = Ground::of(now);
         let Some(plan) = Plan::fitting(&ground, inner) else { return };
-        if app.ability.shades() { plan.shaded(&ground, buf) } else { plan.lettered(app, &ground, buf) }
+        if app.ability.shades() {
+            plan.shaded(&ground, buf)
+        } else {
+            plan.lettered(app, &ground, buf)
+        }
         plan.marks(app, now, target.map(|(target, _)| target), buf);
     }
 }
@@ -70,7 +74,13 @@ impl Plan {
         }
         let needed = (width as u32).div_ceil(columns as u32).max((depth as u32).div_ceil(squares as u32)) as i32;
         // Whole and half cells keep the grid regular.
-        let side = if needed <= 125 { 125 } else if needed <= 250 { 250 } else { needed };
+        let side = if needed <= 125 {
+            125
+        } else if needed <= 250 {
+            250
+        } else {
+            needed
+        };
         // A cell's centre is at a multiple of 250 mm; the drawing starts at a cell's edge.
         let snapped = |v: i32| (v - 125).div_euclid(250) * 250 + 125;
         let spare = |have: i32, want: i32| (have - want.div_euclid(side)).max(0) / 2;
@@ -81,14 +91,18 @@ impl Plan {
 
     /// The middle of a square, in millimetres.
     fn point(&self, column: u16, square: u16) -> (i32, i32) {
-        (self.west + i32::from(column) * self.side + self.side / 2, self.north - i32::from(square) * self.side - self.side / 2)
+        (
+            self.west + i32::from(column) * self.side + self.side / 2,
+            self.north - i32::from(square) * self.side - self.side / 2,
+        )
     }
 
     /// The character that a point lies in.
     fn position(&self, x: i32, z: i32) -> Option<(u16, u16)> {
         let column = (x - self.west).div_euclid(self.side);
         let row = (self.north - z).div_euclid(2 * self.side);
-        let inside = (0..i32::from(self.area.width)).contains(&column) && (0..i32::from(self.area.height)).contains(&row);
+        let inside =
+            (0..i32::from(self.area.width)).contains(&column) && (0..i32::from(self.area.height)).contains(&row);
         inside.then(|| (self.area.x + column as u16, self.area.y + row as u16))
     }
 
@@ -127,7 +141,8 @@ impl Plan {
                 continue;
             }
             let width = name.width() as u16;
-            let place = Rect { x: x.saturating_sub(width / 2).max(self.area.x), y, width, height: 1 }.intersection(self.area);
+            let place =
+                Rect { x: x.saturating_sub(width / 2).max(self.area.x), y, width, height: 1 }.intersection(self.area);
             if taken.iter().any(|other| other.intersects(place)) {
                 continue;
             }
@@ -176,7 +191,12 @@ impl Plan {
             let Instance::Object(index) = sighting.instance else { continue };
             if let Some(object) = now.world.object(index).filter(|_| !now.world.in_hand(index)) {
                 let symbol = if shades { '•' } else { app.letters.letter(object.class) };
-                mark(object.at.x, object.at.z, symbol, Style::new().fg(if shades { Color::White } else { Color::Reset }));
+                mark(
+                    object.at.x,
+                    object.at.z,
+                    symbol,
+                    Style::new().fg(if shades { Color::White } else { Color::Reset }),
+                );
             }
         }
         if let Some(at) = target.and_then(|target| now.world.position(&now.scene, target)) {

@@ -43,7 +43,8 @@ impl Widget for MindPanel<'_> {
                 put(buf, inner, below, "e: the expert acts   x: chance acts   m: you act", THEME.quiet);
             }
             (Some((_, words)), None) => {
-                Line::from(vec![Span::raw("next  "), Span::styled(format!("> {words}"), THEME.chosen)]).render(inner, buf);
+                Line::from(vec![Span::raw("next  "), Span::styled(format!("> {words}"), THEME.chosen)])
+                    .render(inner, buf);
                 let text = format!("The {} policy has no probabilities to show.", app.policy.name());
                 put(buf, inner, 2, text, THEME.quiet);
             }
@@ -57,7 +58,14 @@ fn distribution(area: Rect, buf: &mut Buffer, decision: &Decision, mind: &Mind, 
     let (actions, objects) = if area.height >= 12 {
         let beside = if wide { OBJECTS } else { 0 };
         let actions = Rect { width: area.width - beside - 2 * u16::from(wide), height: 12, ..area };
-        (actions, if wide { Rect { x: actions.right() + 2, width: OBJECTS, ..area } } else { Rect { y: area.y + 12, height: area.height - 12, ..area } })
+        (
+            actions,
+            if wide {
+                Rect { x: actions.right() + 2, width: OBJECTS, ..area }
+            } else {
+                Rect { y: area.y + 12, height: area.height - 12, ..area }
+            },
+        )
     } else {
         (Rect { height: 6, ..area }, Rect { y: area.y + 6, height: area.height.saturating_sub(6), ..area })
     };

@@ -58,11 +58,8 @@ fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
     let width = usize::from(area.width);
     let right = fit(right, width.saturating_sub(title.width() + 4));
     let rule = width.saturating_sub(title.width() + 1 + if right.is_empty() { 0 } else { right.width() + 1 });
-    let mut spans = vec![
-        Span::styled(title.to_string(), THEME.title),
-        Span::raw(" "),
-        Span::styled("─".repeat(rule), THEME.quiet),
-    ];
+    let mut spans =
+        vec![Span::styled(title.to_string(), THEME.title), Span::raw(" "), Span::styled("─".repeat(rule), THEME.quiet)];
     if !right.is_empty() {
         spans.extend([Span::raw(" "), Span::raw(right)]);
     }

@@ -27,7 +27,11 @@ impl Widget for Header<'_> {
             });
             words.push(format!("seed {}", now.seed));
         }
-        words.push(if app.by_hand() { format!("you act ({} advises)", app.policy.name()) } else { format!("{} acts", app.policy.name()) });
+        words.push(if app.by_hand() {
+            format!("you act ({} advises)", app.policy.name())
+        } else {
+            format!("{} acts", app.policy.name())
+        });
         let (state, style) = match (&app.busy, app.running) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
             (None, true) => (format!("running {}", app.pace.name()), THEME.good),
@@ -55,10 +59,17 @@ impl Widget for Status<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         let hints: &[(&str, &str)] = match app.mode {
-            Mode::Watch => &[("space", "run"), ("n", "step"), ("i", "instruct"), ("m", "take over"), ("?", "keys"), ("q", "quit")],
-            Mode::Manual => {
-                &[("arrows", "move"), ("1-9", "act"), ("enter", "policy's choice"), ("i", "instruct"), ("m", "give back"), ("?", "keys")]
+            Mode::Watch => {
+                &[("space", "run"), ("n", "step"), ("i", "instruct"), ("m", "take over"), ("?", "keys"), ("q", "quit")]
             }
+            Mode::Manual => &[
+                ("arrows", "move"),
+                ("1-9", "act"),
+                ("enter", "policy's choice"),
+                ("i", "instruct"),
+                ("m", "give back"),
+                ("?", "keys"),
+            ],
             Mode::Typing => &[("enter", "tell the agent"), ("esc", "leave"), ("up", "earlier instructions")],
             Mode::Help => &[("esc", "close the help")],
         };
