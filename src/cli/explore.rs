@@ -1,12 +1,13 @@
 //! `sprint explore`: opens what the explorer starts in, and starts it.
 
+use std::cell::OnceCell;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
-use super::{Ending, logging};
+use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
@@ -121,9 +122,17 @@ impl Explore {
         let (start, scenes) = self.start()?;
         let openings = Openings::new(start, self.seed, scenes);
         let checkpoint = self.checkpoint.clone();
-        let policies = Policies::new(Box::new(move || match &checkpoint {
-            Some(folder) => bail!("{}: not yet", folder.display()),
-            None => bail!("there is no checkpoint"),
+        let loaded = OnceCell::new();
+        let policies = Policies::new(Box::new(move || {
+            let agent = match loaded.get() {
+                Some(agent) => agent,
+                None => {
+                    let folder = checkpoint.clone().map_or_else(policies::shipped, Ok)?;
+                    let agent = policies::learned(folder)?;
+                    loaded.get_or_init(|| agent)
+                }
+            };
+            (agent.make)()
         }));
         Engine::new(openings, policies, kind, self.instruction.as_deref())
     }

@@ -90,8 +90,9 @@ impl Openings {
                 let (scene, world) = generate::house(*room, self.seed);
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
                 let reference = SceneRef::Generated { room: *room, seed: self.seed };
-                let _ = (&mut rng, &reference, LENGTH);
-                let task: Option<Task> = None;
+                let task = (1..=LENGTH)
+                    .rev()
+                    .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
                 let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
                 Ok(Opening { scene: Arc::new(scene), world, task })
             }

@@ -43,11 +43,12 @@ impl Widget for Map<'_> {
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
         let right = target.map_or(String::new(), |(_, words)| words.clone());
         let inner = panel(buf, area, "Map", &right);
-        let Some(plan) = Plan::fitting(now, inner) else { return };
+        let ground = Ground::of(now);
+        let Some(plan) = Plan::fitting(&ground, inner) else { return };
         if app.ability.shades() {
-            plan.shaded(now, buf)
+            plan.shaded(&ground, buf)
         } else {
-            plan.lettered(app, now, buf)
+            plan.lettered(app, &ground, buf)
         }
         plan.marks(app, now, target.map(|(target, _)| target), buf);
     }
@@ -64,8 +65,8 @@ struct Plan {
 }
 
 impl Plan {
-    fn fitting(now: &Snapshot, area: Rect) -> Option<Plan> {
-        let bounds = bounds(now)?;
+    fn fitting(ground: &Ground, area: Rect) -> Option<Plan> {
+        let bounds = ground.bounds?;
         let (width, depth) = (bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1]);
         let (columns, squares) = (i32::from(area.width), 2 * i32::from(area.height));
         if columns == 0 || squares == 0 {
@@ -105,10 +106,10 @@ impl Plan {
         inside.then(|| (self.area.x + column as u16, self.area.y + row as u16))
     }
 
-    fn shaded(&self, now: &Snapshot, buf: &mut Buffer) {
+    fn shaded(&self, ground: &Ground, buf: &mut Buffer) {
         let shade = |column: u16, square: u16| {
             let (x, z) = self.point(column, square);
-            colour_at(now, x, z)
+            ground.colour(x, z)
         };
         for row in 0..self.area.height {
             for column in 0..self.area.width {
@@ -122,12 +123,12 @@ impl Plan {
                 };
             }
         }
-        self.names(now, buf);
+        self.names(ground, buf);
     }
 
     /// Names furniture where its name fits, the largest first.
-    fn names(&self, now: &Snapshot, buf: &mut Buffer) {
-        let mut pieces: Vec<(Floor, Class)> = furniture(now).collect();
+    fn names(&self, ground: &Ground, buf: &mut Buffer) {
+        let mut pieces = ground.furniture.clone();
         pieces.sort_by_key(|(floor, class)| (std::cmp::Reverse(extent(floor)), *class));
         let mut taken: Vec<Rect> = Vec::new();
         for (floor, class) in pieces {
@@ -152,13 +153,14 @@ impl Plan {
     }
 
     /// Without colours: a letter for furniture, dots to walk on.
-    fn lettered(&self, app: &App, now: &Snapshot, buf: &mut Buffer) {
+    fn lettered(&self, app: &App, ground: &Ground, buf: &mut Buffer) {
+        let now = ground.now;
         for row in 0..self.area.height {
             for column in 0..self.area.width {
                 let (x, upper) = self.point(column, 2 * row);
                 let z = upper - self.side / 2;
                 let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
-                let symbol = if let Some(class) = class_at(now, x, z) {
+                let symbol = if let Some(class) = ground.class(x, z) {
                     app.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
                     '#'
@@ -212,58 +214,63 @@ impl Plan {
     }
 }
 
-/// What the whole plan covers.
-fn bounds(now: &Snapshot) -> Option<Floor> {
-    let cells = now.scene.cells.iter().map(|cell| {
-        let at = cell.centre(0);
-        Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(125)
-    });
-    cells
-        .chain(now.scene.walls.iter().map(|wall| wall.footprint()))
-        .chain(furniture(now).map(|(floor, _)| floor))
-        .reduce(|a, b| Floor {
+/// What is where on the floor.
+struct Ground<'a> {
+    now: &'a Snapshot,
+    /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
+    furniture: Vec<(Floor, Class)>,
+    /// What the whole plan covers.
+    bounds: Option<Floor>,
+}
+
+impl<'a> Ground<'a> {
+    fn of(now: &'a Snapshot) -> Ground<'a> {
+        let floor = now.scene.floor();
+        let parts = now.scene.fixtures.iter().flat_map(|fixture| fixture.body.iter().map(|part| (part, fixture.class)));
+        let mut parts: Vec<_> = parts.filter(|(part, _)| part.min.y - floor < OVERHEAD).collect();
+        parts.sort_by_key(|(part, _)| part.max.y);
+        let furniture: Vec<(Floor, Class)> = parts.into_iter().map(|(part, class)| (part.footprint(), class)).collect();
+        let cells = now.scene.cells.iter().map(|cell| {
+            let at = cell.centre(0);
+            Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(Cell::SIDE / 2)
+        });
+        let walls = now.scene.walls.iter().map(|wall| wall.footprint());
+        let bounds = cells.chain(walls).chain(furniture.iter().map(|(floor, _)| *floor)).reduce(|a, b| Floor {
             min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1])],
             max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1])],
-        })
+        });
+        Ground { now, furniture, bounds }
+    }
+
+    /// The furniture at a point, the highest of it.
+    fn class(&self, x: i32, z: i32) -> Option<Class> {
+        self.furniture.iter().rev().find(|(floor, _)| floor.contains(x, z)).map(|(_, class)| *class)
+    }
+
+    fn colour(&self, x: i32, z: i32) -> Option<Color> {
+        if !self.bounds?.contains(x, z) {
+            return None;
+        }
+        if let Some(class) = self.class(x, z) {
+            return Some(furniture_colour(class));
+        }
+        let now = self.now;
+        if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
+            return Some(WALL);
+        }
+        let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
+        if !now.scene.has_cell(cell) {
+            return Some(GROUND);
+        }
+        if now.path.contains(&cell) {
+            return Some(PATH);
+        }
+        Some(if gazed_at(now.world.agent, x, z) { SEEN } else { WALKABLE })
+    }
 }
 
 fn extent(floor: &Floor) -> i64 {
     i64::from(floor.max[0] - floor.min[0]) * i64::from(floor.max[1] - floor.min[1])
-}
-
-/// The furniture that stands on the floor or on other furniture, box by box, lowest first.
-fn furniture(now: &Snapshot) -> impl Iterator<Item = (Floor, Class)> + '_ {
-    let floor = now.scene.floor();
-    let parts =
-        now.scene.fixtures.iter().flat_map(|fixture| fixture.body.iter().map(move |part| (part, fixture.class)));
-    let mut parts: Vec<_> = parts.filter(move |(part, _)| part.min.y - floor < OVERHEAD).collect();
-    parts.sort_by_key(|(part, _)| part.max.y);
-    parts.into_iter().map(|(part, class)| (part.footprint(), class))
-}
-
-/// The furniture at a point, the highest of it.
-fn class_at(now: &Snapshot, x: i32, z: i32) -> Option<Class> {
-    furniture(now).filter(|(floor, _)| floor.contains(x, z)).last().map(|(_, class)| class)
-}
-
-fn colour_at(now: &Snapshot, x: i32, z: i32) -> Option<Color> {
-    if let Some(class) = class_at(now, x, z) {
-        return Some(furniture_colour(class));
-    }
-    if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
-        return Some(WALL);
-    }
-    let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
-    let at = cell.centre(0);
-    let near_middle = (x - at.x).abs() <= 63 && (z - at.z).abs() <= 63;
-    if now.path.contains(&cell) && near_middle {
-        return Some(PATH);
-    }
-    if now.scene.has_cell(cell) {
-        return Some(if gazed_at(now.world.agent, x, z) { SEEN } else { WALKABLE });
-    }
-    let room = bounds(now)?;
-    room.contains(x, z).then_some(GROUND)
 }
 
 /// Whether a point lies in the 60 degrees that the agent looks into.

@@ -35,9 +35,12 @@ impl Widget for MindPanel<'_> {
                 }
             }
             (_, Some(trouble)) => {
-                for (row, line) in (0..).zip(wrap(trouble, usize::from(inner.width), "")) {
+                let lines = wrap(trouble, usize::from(inner.width), "");
+                let below = lines.len() as u16 + 1;
+                for (row, line) in (0..).zip(lines) {
                     put(buf, inner, row, line, THEME.bad);
                 }
+                put(buf, inner, below, "e: the expert acts   x: chance acts   m: you act", THEME.quiet);
             }
             (Some((_, words)), None) => {
                 Line::from(vec![Span::raw("next  "), Span::styled(format!("> {words}"), THEME.chosen)])
