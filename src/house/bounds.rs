@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::camera::Camera;
-use super::placing;
+use super::{doors, placing};
 use crate::domain::class::Shape;
 use crate::domain::place::{Cuboid, Pose};
 use crate::domain::world::{Instance, Object, World};
@@ -53,7 +53,11 @@ pub fn projected_bounds(scene: &Scene, world: &World, pose: Pose, instance: Inst
     let camera = Camera::of(scene, pose);
     let mut bounds = Bounds::default();
     match instance {
-        Instance::Object(index) => bounds.add(&camera, &Extent::of_object(scene, world.object(index)?)),
+        Instance::Object(index) => {
+            let object = world.object(index)?;
+            bounds.add(&camera, &Extent::of_object(scene, object));
+            doors::open_lid(scene, object).iter().for_each(|lid| bounds.add(&camera, lid));
+        }
         Instance::Fixture(index) => {
             let fixture = scene.fixture(index)?;
             let open = world.is_open(instance);
@@ -70,6 +74,8 @@ pub fn projected_bounds(scene: &Scene, world: &World, pose: Pose, instance: Inst
                 extent.centre += shift;
                 bounds.add(&camera, &extent);
             }
+            let door = doors::open_door(fixture).filter(|_| open);
+            door.iter().for_each(|door| bounds.add(&camera, door));
         }
     }
     bounds.edges()

@@ -10,7 +10,7 @@ const RASTER: i32 = 50;
 pub const DRAWER_TRAVEL: i32 = 170;
 
 /// The outline that an object covers on the floor plan when its pivot is at `at`, turned by whole quarter turns.
-fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
+pub fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
     let (_, size, offset) = scene.shape_of(object);
     let yaw = i32::from(object.turn[1]);
     let (width, depth) = if (yaw + 450).rem_euclid(1800) >= 900 { (size[2], size[0]) } else { (size[0], size[2]) };

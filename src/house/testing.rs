@@ -5,8 +5,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::House;
+use super::expert::Expert;
+use super::grading::Grader;
+use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::world::Instance;
-use crate::domain::{Class, Scene, World};
+use crate::domain::{Action, ActionType, Class, Scene, World};
 
 #[derive(Deserialize)]
 struct Kitchen {
@@ -36,4 +39,54 @@ pub fn named(scene: &Scene, world: &World, name: &str) -> Instance {
     let fixtures = (0u16..).zip(&scene.fixtures).filter(|(_, fixture)| fixture.class == class);
     let all = objects.map(|(i, _)| Instance::Object(i)).chain(fixtures.map(|(i, _)| Instance::Fixture(i)));
     all.collect::<Vec<_>>().get(nth).copied().unwrap_or_else(|| panic!("no {name}"))
+}
+
+/// A role for a class.
+pub fn role(class: &str) -> Role {
+    Role { class: Class::named(class).unwrap(), slice: false, bound: None, expert: None }
+}
+
+/// A role for a slice of a class.
+pub fn slice_role(class: &str) -> Role {
+    Role { slice: true, ..role(class) }
+}
+
+/// A subtask about one role.
+pub fn subtask(skill: SkillKind, object: u8) -> Subtask {
+    Subtask { skill, object, receptacle: None, closes: false, literal: None }
+}
+
+/// A Put.
+pub fn put_subtask(object: u8, receptacle: u8) -> Subtask {
+    Subtask { receptacle: Some(receptacle), ..subtask(SkillKind::Put, object) }
+}
+
+/// The same subtask, ending with a close.
+pub fn closing(subtask: Subtask) -> Subtask {
+    Subtask { closes: true, ..subtask }
+}
+
+/// Lets the expert do a task; the actions it took, or why it could not go on.
+pub fn demonstrate(house: &mut House, grader: &mut Grader, limit: usize) -> Result<Vec<Action>, String> {
+    let mut expert = Expert::new();
+    let mut actions = Vec::new();
+    while !grader.is_done() {
+        let action = expert.next(house, grader).map_err(|no_way| format!("{no_way}; after {actions:?}"))?;
+        let outcome = house.step(action);
+        actions.push(action);
+        if !outcome.is_done() {
+            return Err(format!("{outcome}, after {actions:?}"));
+        }
+        let (scene, world) = (house.scene().clone(), house.world().clone());
+        grader.observe(&scene, &world, action, outcome);
+        if actions.len() > limit {
+            return Err(format!("not done after {actions:?}; {}", grader.waits_for(&scene, &world)));
+        }
+    }
+    Ok(actions)
+}
+
+/// The interactions among actions, by kind.
+pub fn interactions(actions: &[Action]) -> Vec<ActionType> {
+    actions.iter().map(|action| action.kind).filter(|kind| kind.is_interaction()).collect()
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::outcome::Reason;
 use crate::domain::world::{Instance, World};
-use crate::domain::{Action, ActionType, Class, Point, Scene};
+use crate::domain::{Action, ActionType, Cell, Class, Point, Scene};
 
 /// How far the agent reaches, horizontally, in millimetres.
 pub const REACH: f32 = 1500.0;
@@ -94,7 +94,12 @@ impl View {
 /// Horizontal distance from the agent to an instance in millimetres: to the pivot, or to the nearest point of a fixture's
 /// body or surfaces when that is nearer.
 pub fn distance(scene: &Scene, world: &World, instance: Instance) -> Option<f32> {
-    let agent = world.agent.cell.centre(scene.agent_y);
+    distance_from(scene, world, world.agent.cell, instance)
+}
+
+/// The same distance for an agent that stands in `cell`.
+pub fn distance_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> Option<f32> {
+    let agent = cell.centre(scene.agent_y);
     let pivot = agent.floor_distance(world.position(scene, instance)?);
     let Instance::Fixture(index) = instance else { return Some(pivot) };
     let fixture = scene.fixture(index)?;
@@ -105,7 +110,12 @@ pub fn distance(scene: &Scene, world: &World, instance: Instance) -> Option<f32>
 
 /// Distance in space from the agent's own point to the pivot, in millimetres: what "nearest" of a class means (paper's code).
 pub fn nearness(scene: &Scene, world: &World, instance: Instance) -> f32 {
-    let agent: Point = world.agent.cell.centre(scene.agent_y);
+    nearness_from(scene, world, world.agent.cell, instance)
+}
+
+/// The same distance for an agent that stands in `cell`.
+pub fn nearness_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> f32 {
+    let agent: Point = cell.centre(scene.agent_y);
     world.position(scene, instance).map_or(f32::INFINITY, |pivot| agent.distance(pivot))
 }
 

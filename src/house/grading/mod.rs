@@ -239,6 +239,11 @@ impl Grader {
         role.expert
     }
 
+    /// Whether only the close is missing from the current subtask.
+    pub fn is_half_done(&self) -> bool {
+        self.pending.is_some()
+    }
+
     /// What the first half of the current subtask left to be closed.
     pub fn to_close(&self) -> Option<Instance> {
         self.pending.and_then(|pending| pending.shut)

@@ -1,26 +1,28 @@
 //! Draws what the agent sees: colour, depth and instances in one pass, on one core.
 
+pub mod cast;
 pub mod draw;
+pub mod furniture;
+pub mod looks;
+pub mod objects;
 pub mod raster;
 pub mod resolve;
 pub mod solid;
 
+use cast::{Cast, Figure};
 use draw::Brush;
 use raster::Raster;
-use solid::Solid;
 
-use super::bounds::Extent;
 use super::camera::Camera;
-use super::placing;
 use super::view::{self, Frame};
-use crate::domain::place::Cuboid;
 use crate::domain::world::{Instance, World};
 use crate::domain::{Point, Scene};
 
-/// Draws frames of one size.
+/// Draws frames of one size. What it keeps between frames only saves work: a frame depends on the scene and the world alone.
 pub struct Renderer {
     frame: Frame,
     raster: Raster,
+    cast: Cast,
 }
 
 impl Renderer {
@@ -34,7 +36,7 @@ impl Renderer {
             depth: vec![f32::INFINITY; pixels],
             ids: vec![0; pixels],
         };
-        Renderer { frame, raster: Raster::new(size) }
+        Renderer { frame, raster: Raster::new(size), cast: Cast::default() }
     }
 
     /// The frame that was drawn last.
@@ -42,45 +44,51 @@ impl Renderer {
         &self.frame
     }
 
-    /// Draws what the agent sees.
+    /// Draws what the agent sees. What is shut in, sliced up or in the hand is not in the scene; the held object is shown
+    /// small in the lower right corner, as no instance.
     pub fn draw(&mut self, scene: &Scene, world: &World) -> &Frame {
         let camera = Camera::of(scene, world.agent);
         let metres = |height: i32| Point::new(0, height, 0).metres().y;
         let ceiling = scene.walls.iter().map(|wall| wall.max.y).max().map(metres);
+        self.cast.follow(scene, world);
         self.raster.clear();
         resolve::backdrop(&mut self.raster, &camera, scene.room, metres(scene.floor()), ceiling);
         let mut brush = Brush::new(&mut self.raster, camera);
-        for wall in &scene.walls {
-            brush.solid(&Solid::filling(&Extent::of_cuboid(wall), [0.85, 0.83, 0.77]), 0);
+        for wall in &self.cast.walls.solids {
+            brush.solid(wall, 0);
         }
-        for (index, fixture) in (0u16..).zip(&scene.fixtures) {
-            let instance = Instance::Fixture(index);
-            let shift = if world.is_open(instance) { placing::drawer_shift(scene, index) } else { Point::default() };
-            let flat = fixture.surfaces.iter().flat_map(|surface| {
-                let (y, areas) = (surface.height, &surface.areas);
-                areas.iter().map(move |area| {
-                    let (low, high) = (area.min, area.max);
-                    Cuboid::between(Point::new(low[0], y - 10, low[1]), Point::new(high[0], y, high[1]))
-                })
-            });
-            for part in fixture.body.iter().copied().chain(flat) {
-                let mut extent = Extent::of_cuboid(&part);
-                extent.centre += shift.metres();
-                let hue = fixture.class.index() as f32;
-                let colour = [0.0, 2.1, 4.2].map(|phase| 0.6 + 0.25 * (hue * 2.4 + phase).sin());
-                brush.solid(&Solid::filling(&extent, colour), view::code(instance));
-            }
+        for (index, figure) in (0u16..).zip(&self.cast.fixtures) {
+            figure.draw(&mut brush, view::code(Instance::Fixture(index)));
         }
-        for (index, object) in (0u16..).zip(&world.objects) {
+        for ((index, object), figure) in (0u16..).zip(&world.objects).zip(&self.cast.things) {
             let instance = Instance::Object(index);
-            if object.sliced || world.in_hand(index) || world.shut_in(scene, instance).is_some() {
-                continue;
+            let gone = object.sliced || !figure.is_in_view(&brush);
+            if !gone && !world.in_hand(index) && world.shut_in(scene, instance).is_none() {
+                figure.draw(&mut brush, view::code(instance));
             }
-            let hue = object.class.index() as f32;
-            let colour = [0.0, 2.1, 4.2].map(|phase| 0.6 + 0.4 * (hue * 2.4 + phase).sin());
-            brush.solid(&Solid::filling(&Extent::of_object(scene, object), colour), view::code(instance));
+        }
+        if let Some(held) = world.held.and_then(|held| self.cast.things.get(usize::from(held))) {
+            brush.bring_forward(camera.eye(), 0.0);
+            for (solid, (centre, axes)) in held.solids.iter().zip(objects::held(&held.solids, held.radius)) {
+                brush.local(solid, centre, axes, 0);
+            }
         }
         resolve::resolve(&self.raster, &mut self.frame);
         &self.frame
+    }
+}
+
+impl Figure {
+    fn is_in_view(&self, brush: &Brush) -> bool {
+        !self.solids.is_empty() && brush.sees(self.centre, self.radius)
+    }
+
+    fn draw(&self, brush: &mut Brush, id: u16) {
+        if self.is_in_view(brush) {
+            brush.bring_forward(self.centre, self.forward());
+            for solid in &self.solids {
+                brush.solid(solid, id);
+            }
+        }
     }
 }

@@ -1,0 +1,129 @@
+//! What rooms are made of: `assets/rooms.toml`, after ALFRED's statistics.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use serde::Deserialize;
+
+use crate::domain::class::Shape;
+use crate::domain::{Class, Room};
+
+/// A range of millimetres or of counts, ends included.
+pub type Range = [i32; 2];
+
+/// What a kind of room holds. Lengths in millimetres.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoomPlan {
+    /// The room's extent along x.
+    pub width: Range,
+    /// The room's extent along z.
+    pub depth: Range,
+    /// The chance that a corner is cut out of it.
+    pub notch: f64,
+    /// Its furniture, in the order in which it is placed.
+    pub pieces: Vec<Piece>,
+    /// For each movable class: the chance that the room holds any, and the mean count when it does.
+    pub objects: BTreeMap<Class, [f64; 2]>,
+}
+
+/// A kind of furniture. Lengths in millimetres.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Piece {
+    /// A class, or a built-in group (`Run`, `Vanity`, `Shelves`, `Wardrobe`).
+    pub kind: String,
+    /// The chance that the room has any.
+    pub chance: f64,
+    /// How many, when it has any.
+    pub count: Range,
+    /// Along the wall.
+    pub width: Range,
+    /// Out of the wall.
+    pub depth: Range,
+    /// Of its top, or of its seat.
+    pub height: Range,
+    /// How many drawers its front has.
+    pub drawers: Range,
+    /// The chance of a desk lamp on it.
+    pub lamp: f64,
+    /// It stands in the middle of the room.
+    pub middle: bool,
+}
+
+impl Default for Piece {
+    fn default() -> Piece {
+        let none = [0, 0];
+        Piece {
+            kind: String::new(),
+            chance: 1.0,
+            count: [1, 1],
+            width: none,
+            depth: none,
+            height: none,
+            drawers: none,
+            lamp: 0.0,
+            middle: false,
+        }
+    }
+}
+
+/// The shape of a generated object. Lengths in millimetres.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Form {
+    /// Which primitive.
+    pub shape: Shape,
+    /// Width, height, depth.
+    pub size: [i32; 3],
+    /// Its pivot is at its upper edge.
+    #[serde(default)]
+    pub hangs: bool,
+}
+
+/// The whole file.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rooms {
+    kitchen: RoomPlan,
+    living_room: RoomPlan,
+    bedroom: RoomPlan,
+    bathroom: RoomPlan,
+    /// Shapes that differ from the object table's.
+    pub shapes: BTreeMap<Class, Form>,
+}
+
+impl Rooms {
+    /// The plan of a kind of room.
+    pub fn plan(&self, room: Room) -> &RoomPlan {
+        match room {
+            Room::Kitchen => &self.kitchen,
+            Room::LivingRoom => &self.living_room,
+            Room::Bedroom => &self.bedroom,
+            Room::Bathroom => &self.bathroom,
+        }
+    }
+}
+
+/// The table that is part of the program.
+pub fn rooms() -> &'static Rooms {
+    static ROOMS: OnceLock<Rooms> = OnceLock::new();
+    // A test parses the table, so the default cannot be reached in a build that passed.
+    ROOMS.get_or_init(|| toml::from_str(include_str!("../../../assets/rooms.toml")).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_rooms_parses_and_names_only_movable_classes_as_objects() {
+        let rooms: Rooms = toml::from_str(include_str!("../../../assets/rooms.toml")).unwrap();
+        for room in Room::ALL {
+            let plan = rooms.plan(room);
+            assert!(!plan.pieces.is_empty());
+            assert!(plan.objects.keys().all(|class| class.info().pickupable), "{room:?}");
+        }
+        assert!(rooms.shapes.keys().all(|class| class.info().pickupable));
+    }
+}

@@ -1,0 +1,165 @@
+//! What stands in a scene, as bodies that are kept from frame to frame and rebuilt only where the world changed.
+
+use glam::Vec3;
+
+use super::furniture;
+use super::objects;
+use super::solid::Solid;
+use crate::domain::place::Cuboid;
+use crate::domain::scene::{Fixture, Mesh, Scene};
+use crate::domain::world::{FixtureState, Object, World};
+use crate::domain::{Point, Room};
+use crate::house::bounds::Extent;
+
+/// How high the strip along the foot of walls is, in millimetres.
+const SKIRTING: i32 = 90;
+
+/// An instance's bodies and a ball around them.
+#[derive(Clone, Debug, Default)]
+pub struct Figure {
+    /// The bodies.
+    pub solids: Vec<Solid>,
+    /// The middle of the ball, in metres.
+    pub centre: Vec3,
+    /// Its radius.
+    pub radius: f32,
+    /// How high the bodies are together.
+    height: f32,
+}
+
+impl Figure {
+    /// How far it comes forward where it meets others. Measured heights of supports and of flat things are off by some
+    /// millimetres, which would bury a key in a table top.
+    pub fn forward(&self) -> f32 {
+        const FLAT: f32 = 0.06;
+        const FORWARD: f32 = 0.025;
+        if self.height < FLAT { FORWARD } else { 0.0 }
+    }
+
+    fn of(solids: Vec<Solid>) -> Figure {
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for solid in &solids {
+            // How far a body of these axes reaches along x, y and z at most.
+            let reach = solid.axes.x_axis.abs() + solid.axes.y_axis.abs() + solid.axes.z_axis.abs();
+            low = low.min(solid.centre - reach);
+            high = high.max(solid.centre + reach);
+        }
+        if solids.is_empty() {
+            return Figure::default();
+        }
+        Figure { solids, centre: (low + high) / 2.0, radius: (high - low).length() / 2.0, height: high.y - low.y }
+    }
+}
+
+/// The bodies of a scene and of the world in it.
+#[derive(Default)]
+pub struct Cast {
+    known: Option<Known>,
+    states: Vec<FixtureState>,
+    objects: Vec<Object>,
+    /// The walls.
+    pub walls: Figure,
+    /// One for each fixture.
+    pub fixtures: Vec<Figure>,
+    /// One for each movable object.
+    pub things: Vec<Figure>,
+}
+
+/// The parts of a scene that its bodies follow from.
+#[derive(PartialEq)]
+struct Known {
+    room: Room,
+    agent_y: i32,
+    fixtures: Vec<Fixture>,
+    walls: Vec<Cuboid>,
+    meshes: Vec<Mesh>,
+}
+
+impl Known {
+    fn is(&self, scene: &Scene) -> bool {
+        self.room == scene.room
+            && self.agent_y == scene.agent_y
+            && self.walls == scene.walls
+            && self.meshes == scene.meshes
+            && self.fixtures == scene.fixtures
+    }
+}
+
+impl Cast {
+    /// Brings the bodies up to date. The result depends on the scene and the world only.
+    pub fn follow(&mut self, scene: &Scene, world: &World) {
+        if !self.known.as_ref().is_some_and(|known| known.is(scene)) {
+            *self = Cast {
+                known: Some(Known {
+                    room: scene.room,
+                    agent_y: scene.agent_y,
+                    fixtures: scene.fixtures.clone(),
+                    walls: scene.walls.clone(),
+                    meshes: scene.meshes.clone(),
+                }),
+                walls: Figure::of(walls(scene)),
+                ..Cast::default()
+            };
+        }
+        self.follow_fixtures(scene, &world.fixtures);
+        self.follow_objects(scene, &world.objects);
+    }
+
+    fn follow_fixtures(&mut self, scene: &Scene, states: &[FixtureState]) {
+        if self.states == states && self.fixtures.len() == scene.fixtures.len() {
+            return;
+        }
+        let first = self.fixtures.len() != scene.fixtures.len();
+        self.fixtures.resize(scene.fixtures.len(), Figure::default());
+        let changed = |index: usize| self.states.get(index) != states.get(index);
+        for (index, fixture) in scene.fixtures.iter().enumerate() {
+            // A counter changes when the door of something built into it opens.
+            let around = || {
+                furniture::gives_way(fixture)
+                    && (0..scene.fixtures.len()).any(|other| {
+                        let built_in = &scene.fixtures[other];
+                        changed(other)
+                            && furniture::is_built_in(built_in)
+                            && fixture.body.iter().any(|a| built_in.body.iter().any(|b| furniture::meet(a, b)))
+                    })
+            };
+            if first || changed(index) || around() {
+                self.fixtures[index] = Figure::of(furniture::build(scene, index as u16, states));
+            }
+        }
+        self.states = states.to_vec();
+    }
+
+    fn follow_objects(&mut self, scene: &Scene, objects: &[Object]) {
+        self.objects.truncate(objects.len());
+        self.things.resize(objects.len(), Figure::default());
+        for (index, object) in objects.iter().enumerate() {
+            match self.objects.get_mut(index) {
+                Some(known) if known == object => continue,
+                Some(known) => known.clone_from(object),
+                None => self.objects.push(object.clone()),
+            }
+            self.things[index] = Figure::of(objects::build(scene, index as u16, object));
+        }
+    }
+}
+
+fn walls(scene: &Scene) -> Vec<Solid> {
+    let colour = match scene.room {
+        Room::Kitchen => [0.90, 0.87, 0.78],
+        Room::LivingRoom => [0.80, 0.84, 0.80],
+        Room::Bedroom => [0.80, 0.82, 0.90],
+        Room::Bathroom => [0.84, 0.90, 0.91],
+    };
+    let strip = |wall: &Cuboid| {
+        let (min, max) = (wall.min, wall.max);
+        let out = 8;
+        Cuboid {
+            min: Point::new(min.x - out, min.y, min.z - out),
+            max: Point::new(max.x + out, (min.y + SKIRTING).min(max.y), max.z + out),
+        }
+    };
+    let paper = scene.walls.iter().map(|wall| Solid::filling(&Extent::of_cuboid(wall), colour));
+    let skirting = scene.walls.iter().map(|wall| Solid::filling(&Extent::of_cuboid(&strip(wall)), [0.95, 0.94, 0.91]));
+    paper.chain(skirting).collect()
+}
