@@ -2,9 +2,9 @@
 
 pub mod bounds;
 pub mod camera;
-pub mod generate;
-pub mod expert;
 pub mod doors;
+pub mod expert;
+pub mod generate;
 pub mod goals;
 pub mod grading;
 pub mod outcome;
