@@ -69,8 +69,7 @@ impl Material<'_> {
 /// # Errors
 /// When a state cannot be read or written.
 pub fn train(
-    store: &nn::VarStore,
-    policy: &PolicyNet,
+    (store, policy): (&nn::VarStore, &PolicyNet),
     material: &Material<'_>,
     preset: &Preset,
     state: &Path,
@@ -97,18 +96,18 @@ pub fn train(
         let loss = bc::loss(&logits, &batch.actions, &batch.objects);
         learner.minimise(&loss.total());
         let mut scalars = Scalars::new("policy", learner.step(), preset.training.steps);
-        if learner.step() % preset.report_every == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
             scalars.add("action_loss", &loss.action);
             scalars.add("object_loss", &loss.object);
             let (actions, objects) = bc::accuracy(&logits, &batch.actions, &batch.objects);
             scalars.set("action_accuracy", actions);
             scalars.set("object_accuracy", objects);
         }
-        if learner.step() % (preset.report_every * 5) == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done() {
             measure(policy, material, &material.items.held_out, preset, device, &mut scalars)?;
         }
         report.step(&scalars)?;
-        if learner.step() % preset.save_every == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
             learner.save(state)?;
             save(learner.step())?;
         }
@@ -226,7 +225,7 @@ mod tests {
             let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
             stop.store(false, Ordering::Relaxed);
             let mut save = |_| Ok(());
-            if train(&store, &policy, &material, &preset, &state, &mut watch, &stop, &mut save).unwrap() {
+            if train((&store, &policy), &material, &preset, &state, &mut watch, &stop, &mut save).unwrap() {
                 let mut weights: Vec<(String, Tensor)> = store.variables().into_iter().collect();
                 weights.sort_by(|a, b| a.0.cmp(&b.0));
                 return (weights, watch.last);

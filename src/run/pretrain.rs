@@ -88,8 +88,7 @@ impl Pretraining {
         let material = Material { items: &items, features: &features, sentences: &sentences };
         let config = |steps: u64| self.config(&digest, footage.trajectories.len() as u64, steps);
         let finished = cloning::train(
-            &networks.policy_store,
-            &networks.policy,
+            (&networks.policy_store, &networks.policy),
             &material,
             &self.preset,
             &training.join("policy.safetensors"),

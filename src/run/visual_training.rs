@@ -57,16 +57,16 @@ pub fn train(
         let loss = heads.loss(&encoder.forward(&images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
         let mut scalars = Scalars::new("visual", learner.step(), training.optimisation.steps);
-        if learner.step() % preset.report_every == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
             scalars.add("marks", &loss.marks);
             scalars.add("depth", &loss.depth);
             scalars.add("held", &loss.held);
         }
-        if learner.step() % (preset.report_every * 5) == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done() {
             measure(encoder, &heads, footage, &held_out, &mut scalars)?;
         }
         report.step(&scalars)?;
-        if learner.step() % preset.save_every == 0 || learner.is_done() {
+        if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
             learner.save(state)?;
         }
     }

@@ -269,7 +269,7 @@ impl Engine {
     ///
     /// # Errors
     /// When it cannot be opened; the present one stays.
-    pub fn next(&mut self) -> anyhow::Result<()> {
+    pub fn next_episode(&mut self) -> anyhow::Result<()> {
         self.openings.advance();
         self.enter_opened()
     }

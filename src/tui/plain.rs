@@ -162,7 +162,7 @@ fn obey(engine: &mut Engine, verb: Verb, out: &mut impl Write) -> anyhow::Result
             opening(&engine.snapshot(), out)?;
         }
         Verb::Next => {
-            engine.next()?;
+            engine.next_episode()?;
             opening(&engine.snapshot(), out)?;
         }
         Verb::Seed(seed) => {

@@ -190,7 +190,7 @@ impl<T: Fn(Report) -> bool> Worker<T> {
             }
             Command::Next => {
                 self.due = Instant::now() + self.pace.between_steps();
-                match self.engine.next() {
+                match self.engine.next_episode() {
                     Ok(()) => self.show() && self.think(),
                     Err(error) => self.fail(&error),
                 }

@@ -59,6 +59,12 @@ pub struct Scout {
     views: HashMap<Pose, View>,
 }
 
+impl Default for Scout {
+    fn default() -> Scout {
+        Scout::new()
+    }
+}
+
 impl Scout {
     /// A scout that has seen nothing.
     pub fn new() -> Scout {
