@@ -77,7 +77,7 @@ mod tests {
         let mut house = kitchen_house();
         let mut interactions = 0;
         for _ in 0..150 {
-            let mut situation = Situation { house: &mut house, instruction: "", grader: None };
+            let mut situation = Situation { house: &mut house, instruction: "", step: 0, grader: None };
             let action = policy.decide(&mut situation).unwrap().action;
             let outcome = house.step(action);
             if action.target.is_some() {

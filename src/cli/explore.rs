@@ -48,6 +48,9 @@ pub struct Explore {
     /// No screen: a verb a line on standard input, a line a step on standard output
     #[arg(long)]
     plain: bool,
+    /// Wait for a key before the first step
+    #[arg(long)]
+    paused: bool,
     /// Who acts at first
     #[arg(long, value_enum, default_value = "agent")]
     policy: PolicyName,
@@ -111,7 +114,7 @@ impl Explore {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
         }
         let log = logging::open().ok();
-        let screen = screen::Screen { protocol, policy: kind, manual, log };
+        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, log };
         match screen::run(screen, move || self.engine(kind))? {
             Farewell::Signal(_) => Ok(Ending::Interrupted),
             Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),

@@ -253,6 +253,9 @@ impl App {
     }
 
     fn write(&mut self, entry: Entry) {
+        if self.log.back() == Some(&entry) {
+            return;
+        }
         if self.log.len() == LOG {
             self.log.pop_front();
         }

@@ -36,6 +36,8 @@ pub struct Snapshot {
     pub step: u32,
     /// After how many it ends.
     pub horizon: Option<u32>,
+    /// How many the expert takes for the task.
+    pub expert_steps: Option<u32>,
     /// The task, where one applies.
     pub progress: Option<Progress>,
     /// Why the episode is over, if it is.
@@ -81,6 +83,7 @@ pub struct Engine {
     rollout: Rollout,
     start: World,
     task: Option<Task>,
+    limited: bool,
     seed: u64,
     episode: u32,
     path: Vec<Cell>,
@@ -110,6 +113,7 @@ impl Engine {
             seed: openings.seed(),
             openings,
             task: opening.task,
+            limited: opening.limited,
             episode: 1,
             path: Vec::new(),
             completed_at: Vec::new(),
@@ -248,8 +252,12 @@ impl Engine {
     /// Puts the house back to its start, with the present instruction.
     pub fn reset(&mut self) {
         let instruction = std::mem::take(&mut self.rollout.instruction);
-        let opening =
-            Opening { scene: self.rollout.house.scene().clone(), world: self.start.clone(), task: self.task.take() };
+        let opening = Opening {
+            scene: self.rollout.house.scene().clone(),
+            world: self.start.clone(),
+            task: self.task.take(),
+            limited: self.limited,
+        };
         self.enter(opening);
         if let Ok(words) = instruction::parse(&instruction) {
             // The text was checked when it came in.
@@ -286,6 +294,7 @@ impl Engine {
     fn enter(&mut self, opening: Opening) {
         self.rollout = rollout_of(&opening);
         self.task = opening.task;
+        self.limited = opening.limited;
         self.episode += 1;
         self.path = vec![opening.world.agent.cell];
         self.completed_at.clear();
@@ -327,6 +336,7 @@ impl Engine {
             instruction: self.rollout.instruction.clone(),
             step: self.rollout.steps(),
             horizon: self.rollout.horizon,
+            expert_steps: self.task.as_ref().filter(|_| self.rollout.grader.is_some()).map(|task| task.expert_steps),
             progress,
             end: self.rollout.end(),
             path: self.path.clone(),
@@ -340,7 +350,7 @@ fn rollout_of(opening: &Opening) -> Rollout {
     match &opening.task {
         Some(task) => {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
-            Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon))
+            Rollout::new(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
         }
         None => Rollout::new(house, "look around".into(), None, None),
     }

@@ -155,6 +155,8 @@ impl<T: Fn(Report) -> bool> Worker<T> {
     /// Carries out a command; false when nobody listens any more.
     fn obey(&mut self, command: Command) -> bool {
         match command {
+            // Without a policy there is nothing to run; that it is missing was told.
+            Command::Run(true) if !self.engine.has_policy() => true,
             Command::Run(running) => {
                 let over = running && self.over();
                 self.due = Instant::now();
@@ -187,7 +189,7 @@ impl<T: Fn(Report) -> bool> Worker<T> {
                 self.run(false) && self.show() && self.think()
             }
             Command::Next => {
-                self.run(false);
+                self.due = Instant::now() + self.pace.between_steps();
                 match self.engine.next() {
                     Ok(()) => self.show() && self.think(),
                     Err(error) => self.fail(&error),
