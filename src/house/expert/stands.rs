@@ -90,9 +90,7 @@ impl Scout {
         }
         let view = match self.views.entry(pose) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::hash_map::Entry::Vacant(entry) => {
-                entry.insert(View::of(self.renderer.draw(scene, world)))
-            }
+            std::collections::hash_map::Entry::Vacant(entry) => entry.insert(self.renderer.look(scene, world)),
         };
         let Some(sighting) = view.sighting(aim.target).copied() else { return Sight::Unseen };
         if view::reachable(scene, world, view, aim.target).is_err() {
