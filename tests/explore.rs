@@ -109,8 +109,8 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
     session.press("pick up the quince");
     session.see("now: ");
     session.press("\r");
-    session.see("told: pick up the quince");
-    session.see("Instruction > pick up the quince");
+    session.see("told: Pick up the quince.");
+    session.see("Instruction > Pick up the quince.");
     session.see("(was: ");
     session.press("n");
     session.see("step 1");
@@ -159,7 +159,7 @@ fn plain_mode_takes_verbs_and_prints_a_line_a_step_without_escape_codes() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(!text.contains('\x1b'), "{text}");
     for wanted in
-        ["scene: kitchen", "hand: empty", "instruction: find the quince (was: ", "step 3: ", "step 4: RotateLeft: ok"]
+        ["scene: kitchen", "hand: empty", "instruction: Find the quince. (was: ", "step 3: ", "step 4: RotateLeft: ok"]
     {
         assert!(text.contains(wanted), "no {wanted:?} in:\n{text}");
     }

@@ -369,7 +369,7 @@ mod tests {
         assert_eq!(engine.instruct("open the fridge").unwrap(), "the task no longer applies");
         assert!(engine.progress().is_none());
         engine.reset();
-        assert_eq!(engine.instruction(), "open the fridge", "a reset keeps what was typed");
+        assert_eq!(engine.instruction(), "Open the fridge.", "a reset keeps what was typed");
         assert!(engine.progress().is_none());
         assert!(engine.instruct(&words.to_uppercase()).unwrap().contains("reset"));
         engine.reset();

@@ -44,6 +44,9 @@ pub struct Layout {
     pub status: Rect,
 }
 
+/// What the panels on the right need: the map, a gap, and words.
+const NARROWEST_RIGHT: u16 = 46;
+
 impl Layout {
     /// The layout of a screen; `None` when it is too small.
     pub fn of(screen: Rect) -> Option<Layout> {
@@ -55,7 +58,7 @@ impl Layout {
         let body = height - 3;
         // The picture is square, two columns to a row; what remains of its column lists the interactions.
         let listed = if body < 30 { 5 } else { 8 };
-        let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(140);
+        let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
         let sees = 1 + left / 2;
         let right = width - left - 2;
         let mind = if body >= 30 { 13 } else { 9 };

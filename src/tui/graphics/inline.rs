@@ -419,9 +419,11 @@ mod tests {
 
     #[test]
     fn iterm2_scales_to_cells_and_sixel_starts_a_device_control_string() {
-        let sequence = iterm2(&job(Protocol::Iterm2));
+        let job_of = job(Protocol::Iterm2);
+        let sequence = iterm2(&job_of);
         assert!(sequence.starts_with("\x1b]1337;File=inline=1;size=") && sequence.ends_with('\x07'));
-        assert!(sequence.contains(";width=50;height=25;"), "{}", &sequence[..90]);
+        let size = format!(";width={};height={};", job_of.area.width, job_of.area.height);
+        assert!(sequence.contains(&size), "{}", &sequence[..90]);
         assert!(sixel(&job(Protocol::Sixel)).contains("\x1bP"));
     }
 }
