@@ -11,6 +11,7 @@ use tch::{Device, Kind, Tensor};
 use super::checkpoint::{Config, Networks};
 use super::policy::{Decision, Policy, Situation};
 use super::select::{self, Selection};
+use crate::domain::ActionType;
 use crate::language::instruction::normalise;
 use crate::nets::embedding_cache::Embedder;
 
@@ -27,6 +28,10 @@ pub struct LearnedPolicy {
     /// The maps of the last frames, oldest first, and the step that the last one belongs to.
     seen: VecDeque<Tensor>,
     seen_at: Option<u32>,
+    /// The last image, and the actions that were chosen at it and left it as it was.
+    last_image: Vec<u8>,
+    blocked: Vec<ActionType>,
+    last_choice: Option<ActionType>,
     /// The instruction that was read last, with its embedding.
     read: Option<(String, Tensor)>,
     samples: bool,
@@ -78,6 +83,9 @@ impl LearnedPolicy {
             device,
             seen: VecDeque::new(),
             seen_at: None,
+            last_image: Vec::new(),
+            blocked: Vec::new(),
+            last_choice: None,
             read: None,
             samples: false,
             rng: ChaCha8Rng::seed_from_u64(0),
@@ -97,7 +105,9 @@ impl LearnedPolicy {
     /// The last frames' maps as one observation. Before the first frames there was the first one.
     fn observe(&mut self, situation: &mut Situation<'_>) -> Tensor {
         let image = self.networks.visual.spec().image(situation.house.frame());
-        let map = self.networks.visual.encode(&[image]);
+        self.notice(&image, self.seen_at != Some(situation.step));
+        let map = self.networks.visual.encode(std::slice::from_ref(&image));
+        self.last_image = image;
         let history = self.config.policy.history as usize;
         if self.seen_at == Some(situation.step) {
             self.seen.pop_back();
@@ -110,6 +120,15 @@ impl LearnedPolicy {
         let first = history - self.seen.len();
         let maps: Vec<&Tensor> = (0..history).map(|i| &self.seen[i.saturating_sub(first)]).collect();
         Tensor::cat(&maps, 1)
+    }
+
+    /// Notices when the last choice changed nothing: a wall, or the camera's limit. Until the view changes it is not tried again.
+    fn notice(&mut self, image: &[u8], stepped: bool) {
+        if self.last_image != image {
+            self.blocked.clear();
+        } else if stepped && let Some(choice) = self.last_choice.filter(|choice| !choice.is_interaction()) {
+            self.blocked.push(choice);
+        }
     }
 
     fn sentence(&mut self, instruction: &str) -> anyhow::Result<Tensor> {
@@ -132,6 +151,9 @@ impl Policy for LearnedPolicy {
 
     fn begin(&mut self, seed: u64) {
         self.seen.clear();
+        self.last_image.clear();
+        self.blocked.clear();
+        self.last_choice = None;
         self.seen_at = None;
         self.rng = ChaCha8Rng::seed_from_u64(seed);
     }
@@ -144,6 +166,8 @@ impl Policy for LearnedPolicy {
         let (actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
         let candidates = situation.house.candidates();
         let selection = if self.samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        Ok(select::decide(&actions, &objects, &candidates, selection))
+        let decision = select::decide(&actions, &objects, &candidates, &self.blocked, selection);
+        self.last_choice = Some(decision.action.kind);
+        Ok(decision)
     }
 }

@@ -17,9 +17,20 @@ pub enum Selection<'a> {
     Sample(&'a mut ChaCha8Rng),
 }
 
-/// Decides from the logits of one situation: `actions` has 12 entries, `objects` 82.
-pub fn decide(actions: &[f32], objects: &[f32], candidates: &[Candidate], selection: Selection<'_>) -> Decision {
-    let possible = |kind: ActionType| !kind.is_interaction() || candidates.iter().any(|c| c.kind == kind);
+/// Decides from the logits of one situation: `actions` has 12 entries, `objects` 82. Of the navigation actions those in
+/// `blocked` are masked, unless that would leave none.
+pub fn decide(
+    actions: &[f32],
+    objects: &[f32],
+    candidates: &[Candidate],
+    blocked: &[ActionType],
+    selection: Selection<'_>,
+) -> Decision {
+    let all_blocked = ActionType::ALL.iter().all(|kind| kind.is_interaction() || blocked.contains(kind));
+    let possible = |kind: ActionType| match kind.is_interaction() {
+        true => candidates.iter().any(|c| c.kind == kind),
+        false => all_blocked || !blocked.contains(&kind),
+    };
     let open: Vec<usize> = ActionType::ALL.into_iter().filter(|&kind| possible(kind)).map(ActionType::index).collect();
     let shares = weigh(&softmax_over(actions, &open), &open, objects, candidates);
     let likeliest = open[argmax(&shares)];
@@ -173,7 +184,8 @@ mod tests {
         let candidates = [candidate(ActionType::Pickup, "Mug", 0, 500.0)];
         for favourite in ActionType::ALL {
             for _ in 0..40 {
-                let decision = decide(&actions(favourite), &objects("Mug"), &candidates, Selection::Sample(&mut rng));
+                let decision =
+                    decide(&actions(favourite), &objects("Mug"), &candidates, &[], Selection::Sample(&mut rng));
                 let kind = decision.action.kind;
                 assert!(!kind.is_interaction() || kind == ActionType::Pickup);
                 let mind = decision.mind.unwrap();
@@ -191,7 +203,7 @@ mod tests {
             candidate(ActionType::Pickup, "Mug", 7, 900.0),
             candidate(ActionType::Slice, "Apple", 1, 300.0),
         ];
-        let decision = decide(&actions(ActionType::Pickup), &objects("Apple"), &candidates, Selection::Greedy);
+        let decision = decide(&actions(ActionType::Pickup), &objects("Apple"), &candidates, &[], Selection::Greedy);
         assert_eq!(decision.action, Action::interact(ActionType::Pickup, Instance::Object(3)));
         let (likeliest, _, possible) = decision.mind.unwrap().objects[0];
         assert_eq!((likeliest.name(), possible), ("Apple", false));
@@ -202,9 +214,19 @@ mod tests {
         let candidates = [candidate(ActionType::Pickup, "Mug", 3, 400.0)];
         let mut logits = vec![0.0; ActionType::COUNT];
         logits[ActionType::Pickup.index()] = 2.0;
-        let choose = |wanted: &str| decide(&logits, &objects(wanted), &candidates, Selection::Greedy).action.kind;
+        let choose = |wanted: &str| decide(&logits, &objects(wanted), &candidates, &[], Selection::Greedy).action.kind;
         assert_eq!(choose("Mug"), ActionType::Pickup);
         assert_eq!(choose("Apple"), ActionType::MoveAhead);
+    }
+
+    #[test]
+    fn what_led_nowhere_is_not_tried_again() {
+        let choose = |blocked: &[ActionType]| {
+            decide(&actions(ActionType::MoveAhead), &objects("Mug"), &[], blocked, Selection::Greedy).action.kind
+        };
+        assert_eq!(choose(&[]), ActionType::MoveAhead);
+        assert_eq!(choose(&[ActionType::MoveAhead]), ActionType::RotateLeft);
+        assert_eq!(choose(&ActionType::ALL), ActionType::MoveAhead);
     }
 
     #[test]
@@ -214,7 +236,7 @@ mod tests {
         (logits[0], logits[1]) = (0.0, 3f32.ln());
         let mut turns = 0;
         for _ in 0..2000 {
-            let decision = decide(&logits, &objects("Mug"), &[], Selection::Sample(&mut rng));
+            let decision = decide(&logits, &objects("Mug"), &[], &[], Selection::Sample(&mut rng));
             turns += usize::from(decision.action.kind == ActionType::RotateLeft);
             assert_eq!(decision.mind.unwrap().greedy.kind, ActionType::RotateLeft);
         }
@@ -225,7 +247,7 @@ mod tests {
     fn all_probability_on_masked_actions_leaves_a_uniform_choice() {
         let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
         logits[ActionType::Slice.index()] = 0.0;
-        let mind = decide(&logits, &objects("Mug"), &[], Selection::Greedy).mind.unwrap();
+        let mind = decide(&logits, &objects("Mug"), &[], &[], Selection::Greedy).mind.unwrap();
         assert_eq!(mind.actions[0], Some(0.2));
     }
 }
