@@ -26,7 +26,7 @@ impl Session {
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
         command.arg("explore");
         command.args(arguments);
-        for name in ["TMUX", "NO_COLOR", "LC_ALL", "LC_CTYPE"] {
+        for name in ["TMUX", "CI", "NO_COLOR", "LC_ALL", "LC_CTYPE"] {
             command.env_remove(name);
         }
         command.env("TERM", "xterm-256color");
@@ -101,7 +101,7 @@ impl Session {
 
 #[test]
 fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() {
-    let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3"]);
+    let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
     session.see("Mind");
     session.see("step 0");
     assert!(session.screen.lock().unwrap().screen().alternate_screen());
@@ -129,7 +129,7 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
 #[test]
 fn signals_end_it_and_restore_the_terminal() {
     for name in ["-TERM", "-INT", "-HUP"] {
-        let mut session = Session::start(&["--policy", "random", "--graphics", "ascii"]);
+        let mut session = Session::start(&["--policy", "random", "--graphics", "ascii", "--paused"]);
         session.see("Mind");
         session.press(" ");
         session.see("running");

@@ -70,21 +70,22 @@ impl Policy for RandomPolicy {
 mod tests {
     use super::*;
     use crate::house::testing::kitchen_house;
-    use crate::run::rollout::Rollout;
 
     fn walk(seed: u64) -> (String, usize) {
         let mut policy = RandomPolicy::new();
         policy.begin(seed);
-        let mut rollout = Rollout::new(kitchen_house(), String::new(), None, Some(150));
+        let mut house = kitchen_house();
         let mut interactions = 0;
-        while rollout.end().is_none() {
-            let tick = rollout.step(&mut policy).unwrap();
-            if tick.decision.action.target.is_some() {
-                assert!(tick.outcome.is_done(), "{:?}: {}", tick.decision.action, tick.outcome);
+        for _ in 0..150 {
+            let mut situation = Situation { house: &mut house, instruction: "", step: 0, grader: None };
+            let action = policy.decide(&mut situation).unwrap().action;
+            let outcome = house.step(action);
+            if action.target.is_some() {
+                assert!(outcome.is_done(), "{action:?}: {outcome}");
                 interactions += 1;
             }
         }
-        (rollout.house.world().digest(), interactions)
+        (house.world().digest(), interactions)
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! From the two heads to an action: impossible actions are masked, the class is restricted to the candidates of the
-//! action, the instance is the nearest of its class.
+//! From the two heads to an action. The heads are two factors: an interaction is as likely as its action times its class.
+//! Pairs that are impossible now are masked and the rest renormalised, so an action whose only candidates are things that
+//! nobody asked for is as unlikely as they are. The instance is the nearest of its class.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +21,7 @@ pub enum Selection<'a> {
 pub fn decide(actions: &[f32], objects: &[f32], candidates: &[Candidate], selection: Selection<'_>) -> Decision {
     let possible = |kind: ActionType| !kind.is_interaction() || candidates.iter().any(|c| c.kind == kind);
     let open: Vec<usize> = ActionType::ALL.into_iter().filter(|&kind| possible(kind)).map(ActionType::index).collect();
-    let shares = softmax_over(actions, &open);
+    let shares = weigh(&softmax_over(actions, &open), &open, objects, candidates);
     let likeliest = open[argmax(&shares)];
     let greedy = complete(likeliest, objects, candidates, &mut Selection::Greedy);
     let (action, shown) = match selection {
@@ -38,6 +39,34 @@ pub fn decide(actions: &[f32], objects: &[f32], candidates: &[Candidate], select
     let mind =
         Mind { actions: probabilities, objects: ranking(objects, candidates, shown, &open, &shares), entropy, greedy };
     Decision { action, mind: Some(mind) }
+}
+
+/// Each possible action's share times that of its candidates among all classes, renormalised.
+fn weigh(shares: &[f32], open: &[usize], objects: &[f32], candidates: &[Candidate]) -> Vec<f32> {
+    let all: Vec<usize> = (1..objects.len().min(Class::VOCABULARY)).collect();
+    let classes = softmax_over(objects, &all);
+    let mass = |index: usize| {
+        let mut named = classes_of(ActionType::ALL[index], candidates);
+        named.retain(|class| (1..=classes.len()).contains(class));
+        named.into_iter().map(|class| classes[class - 1]).sum::<f32>()
+    };
+    let weight = |(&index, share): (&usize, &f32)| {
+        if ActionType::ALL[index].is_interaction() { share * mass(index) } else { *share }
+    };
+    let weights: Vec<f32> = open.iter().zip(shares).map(weight).collect();
+    let sum: f32 = weights.iter().sum();
+    match sum.is_finite() && sum > 0.0 {
+        true => weights.into_iter().map(|weight| weight / sum).collect(),
+        false => shares.to_vec(),
+    }
+}
+
+/// The classes that an action could name now, by index.
+fn classes_of(kind: ActionType, candidates: &[Candidate]) -> Vec<usize> {
+    let mut classes: Vec<usize> = candidates.iter().filter(|c| c.kind == kind).map(|c| c.class.index()).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    classes
 }
 
 /// How many object classes a mind lists.
@@ -74,10 +103,8 @@ fn ranking(
 /// Adds the target to a kind of action.
 fn complete(index: usize, objects: &[f32], candidates: &[Candidate], selection: &mut Selection<'_>) -> Action {
     let kind = ActionType::ALL[index];
-    let mut classes: Vec<usize> =
-        candidates.iter().filter(|c| c.kind == kind).map(|c| c.class.index()).filter(|&i| i < objects.len()).collect();
-    classes.sort_unstable();
-    classes.dedup();
+    let mut classes = classes_of(kind, candidates);
+    classes.retain(|&class| class < objects.len());
     if !kind.is_interaction() || classes.is_empty() {
         return Action::navigate(kind);
     }
@@ -136,7 +163,7 @@ mod tests {
 
     fn actions(favourite: ActionType) -> Vec<f32> {
         let mut logits = vec![0.0; ActionType::COUNT];
-        logits[favourite.index()] = 5.0;
+        logits[favourite.index()] = 12.0;
         logits
     }
 
@@ -168,6 +195,16 @@ mod tests {
         assert_eq!(decision.action, Action::interact(ActionType::Pickup, Instance::Object(3)));
         let (likeliest, _, possible) = decision.mind.unwrap().objects[0];
         assert_eq!((likeliest.name(), possible), ("Apple", false));
+    }
+
+    #[test]
+    fn an_action_is_unlikely_when_its_candidates_are() {
+        let candidates = [candidate(ActionType::Pickup, "Mug", 3, 400.0)];
+        let mut logits = vec![0.0; ActionType::COUNT];
+        logits[ActionType::Pickup.index()] = 2.0;
+        let choose = |wanted: &str| decide(&logits, &objects(wanted), &candidates, Selection::Greedy).action.kind;
+        assert_eq!(choose("Mug"), ActionType::Pickup);
+        assert_eq!(choose("Apple"), ActionType::MoveAhead);
     }
 
     #[test]

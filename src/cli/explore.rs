@@ -1,12 +1,13 @@
 //! `sprint explore`: opens what the explorer starts in, and starts it.
 
+use std::cell::OnceCell;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
-use super::{Ending, logging};
+use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
@@ -47,6 +48,9 @@ pub struct Explore {
     /// No screen: a verb a line on standard input, a line a step on standard output
     #[arg(long)]
     plain: bool,
+    /// Wait for a key before the first step
+    #[arg(long)]
+    paused: bool,
     /// Who acts at first
     #[arg(long, value_enum, default_value = "agent")]
     policy: PolicyName,
@@ -110,7 +114,7 @@ impl Explore {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
         }
         let log = logging::open().ok();
-        let screen = screen::Screen { protocol, policy: kind, manual, log };
+        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, log };
         match screen::run(screen, move || self.engine(kind))? {
             Farewell::Signal(_) => Ok(Ending::Interrupted),
             Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
@@ -121,9 +125,17 @@ impl Explore {
         let (start, scenes) = self.start()?;
         let openings = Openings::new(start, self.seed, scenes);
         let checkpoint = self.checkpoint.clone();
-        let policies = Policies::new(Box::new(move || match &checkpoint {
-            Some(folder) => bail!("{}: not yet", folder.display()),
-            None => bail!("there is no checkpoint"),
+        let loaded = OnceCell::new();
+        let policies = Policies::new(Box::new(move || {
+            let agent = match loaded.get() {
+                Some(agent) => agent,
+                None => {
+                    let folder = checkpoint.clone().map_or_else(policies::shipped, Ok)?;
+                    let agent = policies::learned(folder)?;
+                    loaded.get_or_init(|| agent)
+                }
+            };
+            (agent.make)()
         }));
         Engine::new(openings, policies, kind, self.instruction.as_deref())
     }

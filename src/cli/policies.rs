@@ -69,7 +69,7 @@ impl PolicyChoice {
 }
 
 /// A trained agent, several of which share one sentence encoder.
-fn learned(folder: PathBuf) -> anyhow::Result<Chosen> {
+pub fn learned(folder: PathBuf) -> anyhow::Result<Chosen> {
     // More threads than one would make sums depend on how many there are, and workers get in each other's way.
     device::set_threads(1);
     let mut digest = Sha256::new();
@@ -86,7 +86,7 @@ fn learned(folder: PathBuf) -> anyhow::Result<Chosen> {
 }
 
 /// The agent that acts when none is named: the first that is found.
-fn shipped() -> anyhow::Result<PathBuf> {
+pub fn shipped() -> anyhow::Result<PathBuf> {
     checkpoints().into_iter().next().context(
         "there is no trained agent in checkpoints/: name one with --checkpoint, or let --policy expert or random act",
     )

@@ -11,7 +11,7 @@ use crate::data::Dataset;
 use crate::run::replay::{Options, Report, replay};
 
 /// How many failures of each kind are listed.
-const LISTED: usize = 5;
+const LISTED: usize = 500;
 
 /// Re-runs recorded demonstrations.
 #[derive(Args)]

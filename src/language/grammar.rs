@@ -20,6 +20,13 @@ pub struct Grammar {
     names: BTreeMap<Class, Vec<String>>,
     plurals: BTreeMap<Class, String>,
     one: BTreeMap<Class, String>,
+    phrasal: Phrasal,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Phrasal {
+    verbs: Vec<String>,
 }
 
 /// What the program fills into a phrase.
@@ -47,7 +54,10 @@ impl Grammar {
     pub fn say(&self, rule: &str, slots: &Slots<'_>, rng: &mut ChaCha8Rng) -> String {
         let mut out = String::new();
         self.expand(rule, slots, rng, &mut out, 0);
-        out
+        self.phrasal.verbs.iter().fold(out, |text, verb| match verb.split_once(' ') {
+            Some((verb, particle)) => put_between(&text, verb, particle),
+            None => text,
+        })
     }
 
     fn expand(&self, rule: &str, slots: &Slots<'_>, rng: &mut ChaCha8Rng, out: &mut String, depth: usize) {
@@ -93,6 +103,14 @@ impl Grammar {
     }
 }
 
+/// "pick up it" as "pick it up".
+fn put_between(text: &str, verb: &str, particle: &str) -> String {
+    let (wrong, right) = (format!("{verb} {particle} it"), format!("{verb} it {particle}"));
+    let Some(start) = text.find(&wrong) else { return text.into() };
+    let rest = &text[start + wrong.len()..];
+    if rest.starts_with(char::is_alphanumeric) { text.into() } else { format!("{}{right}{rest}", &text[..start]) }
+}
+
 /// A noun with "a" or "an".
 pub fn with_article(noun: &str) -> String {
     let vowel = noun.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O']);
@@ -103,7 +121,7 @@ pub fn with_article(noun: &str) -> String {
 mod tests {
     use super::*;
 
-    const SLOTS: [&str; 11] = ["object", "place", "from", "at", "shut", "dest", "to", "inside", "tool", "held", "lamp"];
+    const SLOTS: [&str; 11] = ["object", "food", "place", "from", "at", "shut", "dest", "to", "inside", "tool", "held"];
 
     #[test]
     fn every_name_in_the_phrase_table_is_a_rule_or_a_slot() {
@@ -116,6 +134,12 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn it_goes_between_verb_and_particle() {
+        assert_eq!(put_between("find the mug and pick up it.", "pick", "up"), "find the mug and pick it up.");
+        assert_eq!(put_between("pick up items", "pick", "up"), "pick up items");
     }
 
     #[test]

@@ -86,32 +86,51 @@ impl Story<'_> {
         self.roles.get(usize::from(role)).map_or(Class::NONE, |role| role.class)
     }
 
-    /// The thing with an article: "the mug", "a slice of bread".
-    pub(super) fn thing(&self, role: u8, rng: &mut ChaCha8Rng) -> String {
+    /// Whether two roles ask for the same: one class, whole or sliced.
+    pub(super) fn alike(&self, a: u8, b: u8) -> bool {
+        let asked = |role: u8| self.roles.get(usize::from(role)).map(|role| (role.class, role.slice));
+        asked(a) == asked(b)
+    }
+
+    /// Whether the role is a slice.
+    pub(super) fn is_slice(&self, role: u8) -> bool {
+        self.roles.get(usize::from(role)).is_some_and(|role| role.slice)
+    }
+
+    /// The thing with an article, as one speaks of it at a step: "the mug", "a slice of bread", "another potato".
+    pub(super) fn thing(&self, role: u8, step: usize, rng: &mut ChaCha8Rng) -> String {
         let class = self.class(role);
-        let is_slice = self.roles.get(usize::from(role)).is_some_and(|role| role.slice);
-        if is_slice {
-            let name = class.spoken();
-            return match rng.random_range(0..6) {
-                0 => format!("the {name} slice"),
-                1 => format!("a {name} slice").replace("a apple", "an apple"),
-                2 => format!("a piece of {name}"),
-                3 => format!("the slice of {name}"),
-                _ => format!("a slice of {name}"),
-            };
+        let before = &self.subtasks[..step.min(self.subtasks.len())];
+        let mut named = before.iter().flat_map(|subtask| std::iter::once(subtask.object).chain(subtask.receptacle));
+        let is_known = named.clone().any(|other| other == role);
+        let is_second = !is_known && named.any(|other| self.alike(other, role));
+        let noun = match (self.is_slice(role), rng.random_range(0..4)) {
+            (true, 0) => format!("{} slice", class.spoken()),
+            (true, 1) => format!("piece of {}", class.spoken()),
+            (true, _) => format!("slice of {}", class.spoken()),
+            (false, _) => grammar().name(class, rng).to_string(),
+        };
+        if is_second {
+            let which = ["another", "another", "the other", "a second", "one more"][rng.random_range(0..5u32) as usize];
+            return format!("{which} {noun}");
         }
         // Only what can be carried comes in such numbers that any one will do.
-        if class.info().pickupable && rng.random_bool(0.25) {
-            return grammar().one(class);
+        let any_will_do = class.info().pickupable && !is_known && rng.random_bool(0.3);
+        match (any_will_do, self.is_slice(role)) {
+            (true, true) => with_article(&noun),
+            (true, false) => grammar().one(class),
+            (false, _) => format!("the {noun}"),
         }
-        format!("the {}", grammar().name(class, rng))
     }
 
     /// A clause for one step, without a capital or a full stop.
     fn clause(&self, step: usize, as_it: bool, rng: &mut ChaCha8Rng) -> String {
         let subtask = &self.subtasks[step];
         let mut slots = Slots::new();
-        let object = if as_it { "it".to_string() } else { self.thing(subtask.object, rng) };
+        let object = if as_it { "it".to_string() } else { self.thing(subtask.object, step, rng) };
+        if self.class(subtask.object).info().tags.iter().any(|tag| tag == "food") {
+            slots.insert("food", object.clone());
+        }
         slots.insert("object", object);
         let origin = self.origins.get(usize::from(subtask.object)).copied().flatten();
         let untouched = !self.subtasks[..step].iter().any(|earlier| earlier.object == subtask.object);
@@ -127,7 +146,7 @@ impl Story<'_> {
             }
             SkillKind::Toggle if step > 0 && self.holds_before(step) => {
                 let held = self.subtasks[step - 1].object;
-                slots.insert("held", if rng.random_bool(0.5) { "it".into() } else { self.thing(held, rng) });
+                slots.insert("held", if rng.random_bool(0.5) { "it".into() } else { self.thing(held, step, rng) });
                 return grammar().say("toggle_with", &slots, rng);
             }
             _ => {}
@@ -184,11 +203,8 @@ fn origin_slots(origin: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, Strin
 
 /// "the counter" and what goes with it, for where a thing goes.
 pub(super) fn destination_slots(class: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, String)> {
-    let dest = format!(
-        "{} {}",
-        if class.info().pickupable && rng.random_bool(0.3) { "a" } else { "the" },
-        grammar().name(class, rng)
-    );
+    let name = grammar().name(class, rng);
+    let dest = if class.info().pickupable && rng.random_bool(0.3) { with_article(name) } else { format!("the {name}") };
     let mut slots = vec![("to", format!("{} {dest}", class.preposition()))];
     if class.info().openable && !class.info().pickupable {
         slots.push(("inside", dest.clone()));
@@ -202,10 +218,15 @@ fn finish(clause: String, rng: &mut ChaCha8Rng) -> String {
     if clause.is_empty() {
         return clause;
     }
-    let states =
-        clause.starts_with("i ") || clause.contains("? ") || clause.starts_with("the ") || clause.starts_with("a ");
-    let manners = if states { String::new() } else { grammar().say("manners", &Slots::new(), rng) };
-    let thanks = if manners.is_empty() { grammar().say("thanks", &Slots::new(), rng) } else { String::new() };
+    // Only an order can be put politely; a remark cannot.
+    let remarks = ["i ", "you ", "see ", "the ", "a ", "an ", "another ", "one ", "from ", "let there ", "go "];
+    let is_order = !remarks.iter().any(|remark| clause.starts_with(remark)) && !clause.contains("? ");
+    let mut say = |rule: &str, chance: f64| match rng.random_bool(chance) {
+        true => grammar().say(rule, &Slots::new(), rng),
+        false => String::new(),
+    };
+    let manners = if is_order { say("manners", 0.35) } else { String::new() };
+    let thanks = if manners.is_empty() && is_order { say("thanks", 0.2) } else { String::new() };
     let asks = manners.starts_with("could")
         || manners.starts_with("would")
         || manners.starts_with("can")
@@ -235,4 +256,96 @@ fn sentence_case(text: &str) -> String {
         }
     }
     out.replace(" i ", " I ").replace(" i'd ", " I'd ")
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::house::testing::{closing, put_subtask, role, slice_role, subtask};
+
+    fn chain() -> (Vec<Role>, Vec<Subtask>) {
+        let roles =
+            [role("Knife"), role("Apple"), role("CounterTop"), slice_role("Apple"), role("Bowl"), role("Fridge")];
+        let subtasks = [
+            subtask(SkillKind::Pickup, 0),
+            subtask(SkillKind::Slice, 1),
+            put_subtask(0, 2),
+            subtask(SkillKind::Pickup, 3),
+            subtask(SkillKind::Heat, 3),
+            put_subtask(3, 4),
+            subtask(SkillKind::Pickup, 4),
+            closing(put_subtask(4, 5)),
+        ];
+        (roles.to_vec(), subtasks.to_vec())
+    }
+
+    /// Whether a text names a class by one of its names.
+    fn names(text: &str, class: Class) -> bool {
+        let text = text.to_lowercase();
+        let plural = grammar().plural(class).to_lowercase();
+        grammar().names(class).any(|name| text.contains(&name.to_lowercase())) || text.contains(&plural)
+    }
+
+    #[test]
+    fn a_sentence_names_its_object_and_its_destination() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for class in Class::all().filter(|class| class.in_vocabulary()) {
+            let roles = [Role { class, slice: false, bound: None, expert: None }, role("Microwave")];
+            for skill in SkillKind::ALL {
+                let step = if skill == SkillKind::Put { put_subtask(0, 1) } else { subtask(skill, 0) };
+                for _ in 0..10 {
+                    let text = sentence(&roles, &step, &mut rng);
+                    assert!(names(&text, class), "{text}");
+                    assert!(skill != SkillKind::Put || names(&text, roles[1].class), "{text}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_instruction_for_a_chain_names_what_matters() {
+        let (roles, subtasks) = chain();
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for length in 1..=subtasks.len() {
+            for _ in 0..200 {
+                let text = instruction(&roles, &subtasks[..length], &mut rng);
+                assert!(!text.contains(['{', '}']) && !text.contains("  ") && !text.contains(" a a"), "{text}");
+                let wanted = if length <= 2 { usize::from(length == 2) } else { 1 };
+                assert!(names(&text, roles[wanted].class) || length == 3 && names(&text, roles[0].class), "{text}");
+                assert!(length < 8 || ["Bowl", "Fridge"].iter().all(|c| names(&text, role(c).class)), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn phrasings_are_many_and_the_same_for_the_same_random_numbers() {
+        let (roles, subtasks) = chain();
+        let texts = |seed| -> Vec<String> {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            (0..300).map(|_| sentence(&roles, &subtasks[0], &mut rng)).collect()
+        };
+        assert_eq!(texts(3), texts(3));
+        let different: std::collections::BTreeSet<String> =
+            texts(3).iter().map(|text| super::super::instruction::normalise(text)).collect();
+        assert!(different.len() > 100, "{}", different.len());
+    }
+
+    #[test]
+    fn twenty_phrasings() {
+        let (roles, subtasks) = chain();
+        let origins = [Some(role("Drawer").class), Some(role("CounterTop").class)];
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let texts: Vec<String> = (0..20)
+            .map(|number| match number % 5 {
+                0 => Story { roles: &roles, subtasks: &subtasks[..1], origins: &origins }.instruction(&mut rng),
+                1 => sentence(&roles, &subtasks[number % 8], &mut rng),
+                2 => Story { roles: &roles, subtasks: &subtasks[..2], origins: &origins }.instruction(&mut rng),
+                3 => instruction(&roles, &subtasks[3..6], &mut rng),
+                _ => instruction(&roles, &subtasks, &mut rng),
+            })
+            .collect();
+        insta::assert_snapshot!(texts.join("\n"));
+    }
 }

@@ -61,10 +61,7 @@ fn outcomes(story: &Story<'_>) -> Vec<Outcome> {
 /// Whether a slice of what was cut appears later.
 fn uses_slice(story: &Story<'_>, later: &[Subtask], whole: u8) -> bool {
     let class = story.class(whole);
-    later.iter().any(|subtask| {
-        story.class(subtask.object) == class
-            && story.roles.get(usize::from(subtask.object)).is_some_and(|role| role.slice)
-    })
+    later.iter().any(|subtask| story.class(subtask.object) == class && story.is_slice(subtask.object))
 }
 
 fn put(story: &Story<'_>, found: &mut Vec<Outcome>, thing: u8, place: u8) {
@@ -75,10 +72,7 @@ fn put(story: &Story<'_>, found: &mut Vec<Outcome>, thing: u8, place: u8) {
                 (*content, *things, *at) = (things.first().copied(), vec![thing], place);
                 return;
             }
-            let like = things.first().is_some_and(|&first| {
-                story.class(first) == story.class(thing)
-                    && story.roles[usize::from(first)].slice == story.roles[usize::from(thing)].slice
-            });
+            let like = things.first().is_some_and(|&first| story.alike(first, thing));
             if *at == place && like && content.is_none() {
                 things.push(thing);
                 return;
@@ -106,12 +100,12 @@ fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
             grammar().say("keep", &slots, rng)
         }
         Outcome::Cut(thing) => {
-            slots.insert("object", story.thing(*thing, rng));
+            slots.insert("object", story.thing(*thing, 0, rng));
             slots.insert("tool", "a knife".into());
             grammar().say("slice", &slots, rng)
         }
         Outcome::Lit { lamp, held } => {
-            slots.insert("object", story.thing(*lamp, rng));
+            slots.insert("object", story.thing(*lamp, 0, rng));
             match held {
                 Some(held) => {
                     slots.insert("held", described(story, *held, rng));
@@ -128,10 +122,10 @@ fn described(story: &Story<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
     let words = states(story, thing, rng);
     let class = story.class(thing);
     if words.is_empty() {
-        return story.thing(thing, rng);
+        return story.thing(thing, 0, rng);
     }
     let name = class.spoken();
-    if story.roles.get(usize::from(thing)).is_some_and(|role| role.slice) {
+    if story.is_slice(thing) {
         return match rng.random_range(0..3) {
             0 => with_article(&format!("{words} slice of {name}")),
             1 => format!("a slice of {words} {name}"),
@@ -157,7 +151,7 @@ fn several(story: &Story<'_>, things: &[u8], rng: &mut ChaCha8Rng) -> String {
     };
     let words = states(story, first, rng);
     let words = if words.is_empty() { words } else { format!("{words} ") };
-    if story.roles.get(usize::from(first)).is_some_and(|role| role.slice) {
+    if story.is_slice(first) {
         return format!("{number} {words}slices of {}", class.spoken());
     }
     format!("{number} {words}{}", grammar().plural(class))

@@ -11,10 +11,9 @@ use super::presets::Appraisal;
 use super::progress::{Report, Scalars};
 use super::rollout::{End, Rollout};
 use super::stats;
-use crate::agent::select::{self, Selection};
-use crate::agent::{Decision, Policy, Situation};
+use crate::agent::{Policy, RandomPolicy};
 use crate::domain::task::SceneRef;
-use crate::domain::{ActionType, Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
+use crate::domain::{Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
 use crate::house::expert::Expert;
 use crate::house::grading::{Grader, Grading};
 use crate::house::{House, generate};
@@ -66,32 +65,13 @@ pub struct Findings {
     pub swapped: Rate,
 }
 
-/// Uniform over possible actions, then over candidate classes.
-struct Chance(ChaCha8Rng);
-
-impl Policy for Chance {
-    fn name(&self) -> &str {
-        "random"
-    }
-
-    fn begin(&mut self, seed: u64) {
-        self.0 = ChaCha8Rng::seed_from_u64(seed);
-    }
-
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
-        let candidates = situation.house.candidates();
-        let (actions, objects) = ([0.0; ActionType::COUNT], [0.0; Class::VOCABULARY]);
-        Ok(select::decide(&actions, &objects, &candidates, Selection::Sample(&mut self.0)))
-    }
-}
-
 /// Measures a policy.
 ///
 /// # Errors
 /// When the policy fails.
 pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn Report) -> anyhow::Result<Findings> {
     let mut findings = Findings::default();
-    let mut chance = Chance(ChaCha8Rng::seed_from_u64(0));
+    let mut chance = RandomPolicy::new();
     let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
     let mut number = 0;
     while findings.agent.trials < appraisal.tasks {

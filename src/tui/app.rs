@@ -216,7 +216,7 @@ impl App {
         let now = self.now.as_ref()?;
         let cells = self.picture_area()?.as_size();
         let labels = if self.labels && !self.running { self.labelled(now) } else { Vec::new() };
-        (!cells.is_empty_area()).then(|| Job {
+        (cells.width > 0 && cells.height > 0).then(|| Job {
             frame: now.frame.clone(),
             letters: self.letters.clone(),
             classes: self.names.clone(),
@@ -253,20 +253,13 @@ impl App {
     }
 
     fn write(&mut self, entry: Entry) {
+        if self.log.back() == Some(&entry) {
+            return;
+        }
         if self.log.len() == LOG {
             self.log.pop_front();
         }
         self.log.push_back(entry);
-    }
-}
-
-trait EmptyArea {
-    fn is_empty_area(&self) -> bool;
-}
-
-impl EmptyArea for Size {
-    fn is_empty_area(&self) -> bool {
-        self.width == 0 || self.height == 0
     }
 }
 

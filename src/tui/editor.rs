@@ -50,7 +50,7 @@ impl Editor {
             .chars()
             .map(|c| if c.is_whitespace() { ' ' } else { c })
             .filter(|c| !c.is_control())
-            .take(super::engine::LONGEST_INSTRUCTION)
+            .take(crate::language::instruction::LONGEST)
             .collect();
         self.area.insert_str(line);
         self.keep_one_line();

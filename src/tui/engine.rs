@@ -10,11 +10,8 @@ use crate::domain::{Action, Cell, Scene, Task, World};
 use crate::house::grading::{Grader, Grading, describe};
 use crate::house::view::{Candidate, Frame, View};
 use crate::house::{House, Outcome};
-use crate::language::instruction::normalise;
+use crate::language::instruction;
 use crate::run::rollout::{End, Rollout, Tick};
-
-/// The longest instruction that is taken, in characters.
-pub const LONGEST_INSTRUCTION: usize = 1000;
 
 /// Everything that a screen shows of the present state.
 #[derive(Clone, Debug)]
@@ -39,6 +36,8 @@ pub struct Snapshot {
     pub step: u32,
     /// After how many it ends.
     pub horizon: Option<u32>,
+    /// How many the expert takes for the task.
+    pub expert_steps: Option<u32>,
     /// The task, where one applies.
     pub progress: Option<Progress>,
     /// Why the episode is over, if it is.
@@ -84,6 +83,7 @@ pub struct Engine {
     rollout: Rollout,
     start: World,
     task: Option<Task>,
+    limited: bool,
     seed: u64,
     episode: u32,
     path: Vec<Cell>,
@@ -113,6 +113,7 @@ impl Engine {
             seed: openings.seed(),
             openings,
             task: opening.task,
+            limited: opening.limited,
             episode: 1,
             path: Vec::new(),
             completed_at: Vec::new(),
@@ -142,6 +143,11 @@ impl Engine {
     /// Which policy decides.
     pub fn policy(&self) -> PolicyKind {
         self.kind
+    }
+
+    /// Whether a policy is loaded.
+    pub fn has_policy(&self) -> bool {
+        self.policy.is_some()
     }
 
     /// What the policy would do now. Decided once a state, and again when the instruction or the policy changes.
@@ -220,11 +226,12 @@ impl Engine {
     /// # Errors
     /// When the text is empty, too long, or holds control characters.
     pub fn instruct(&mut self, text: &str) -> anyhow::Result<&'static str> {
-        let text = checked(text)?;
+        let text = instruction::parse(text)?;
         self.rollout.instruction = text;
         self.decision = None;
-        let asked =
-            self.task.as_ref().is_some_and(|task| normalise(&task.instruction) == normalise(&self.rollout.instruction));
+        let asked = self.task.as_ref().is_some_and(|task| {
+            instruction::normalise(&task.instruction) == instruction::normalise(&self.rollout.instruction)
+        });
         Ok(match (self.rollout.grader.is_some(), asked) {
             (true, true) => "the task's own words",
             (true, false) => {
@@ -245,10 +252,14 @@ impl Engine {
     /// Puts the house back to its start, with the present instruction.
     pub fn reset(&mut self) {
         let instruction = std::mem::take(&mut self.rollout.instruction);
-        let opening =
-            Opening { scene: self.rollout.house.scene().clone(), world: self.start.clone(), task: self.task.take() };
+        let opening = Opening {
+            scene: self.rollout.house.scene().clone(),
+            world: self.start.clone(),
+            task: self.task.take(),
+            limited: self.limited,
+        };
         self.enter(opening);
-        if let Ok(words) = checked(&instruction) {
+        if let Ok(words) = instruction::parse(&instruction) {
             // The text was checked when it came in.
             let _ = self.instruct(&words);
         }
@@ -283,6 +294,7 @@ impl Engine {
     fn enter(&mut self, opening: Opening) {
         self.rollout = rollout_of(&opening);
         self.task = opening.task;
+        self.limited = opening.limited;
         self.episode += 1;
         self.path = vec![opening.world.agent.cell];
         self.completed_at.clear();
@@ -324,6 +336,7 @@ impl Engine {
             instruction: self.rollout.instruction.clone(),
             step: self.rollout.steps(),
             horizon: self.rollout.horizon,
+            expert_steps: self.task.as_ref().filter(|_| self.rollout.grader.is_some()).map(|task| task.expert_steps),
             progress,
             end: self.rollout.end(),
             path: self.path.clone(),
@@ -337,21 +350,80 @@ fn rollout_of(opening: &Opening) -> Rollout {
     match &opening.task {
         Some(task) => {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
-            Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon))
+            Rollout::new(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
         }
         None => Rollout::new(house, "look around".into(), None, None),
     }
 }
 
-/// An instruction as it may be typed: one line of readable text.
-fn checked(text: &str) -> anyhow::Result<String> {
-    let text = text.trim();
-    anyhow::ensure!(!text.is_empty(), "the instruction is empty");
-    let length = text.chars().count();
-    anyhow::ensure!(
-        length <= LONGEST_INSTRUCTION,
-        "the instruction has {length} characters; at most {LONGEST_INSTRUCTION} are taken"
-    );
-    anyhow::ensure!(!text.chars().any(char::is_control), "the instruction holds control characters");
-    Ok(text.to_string())
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::ActionType;
+    use crate::tui::testing;
+
+    #[test]
+    fn another_instruction_ends_the_task_and_its_own_words_bring_it_back_at_a_reset() {
+        let mut engine = testing::engine();
+        let words = engine.instruction().to_string();
+        assert_eq!(engine.instruct("open the fridge").unwrap(), "the task no longer applies");
+        assert!(engine.progress().is_none());
+        engine.reset();
+        assert_eq!(engine.instruction(), "open the fridge", "a reset keeps what was typed");
+        assert!(engine.progress().is_none());
+        assert!(engine.instruct(&words.to_uppercase()).unwrap().contains("reset"));
+        engine.reset();
+        assert_eq!(engine.progress().unwrap().subtasks.len(), 2);
+    }
+
+    #[test]
+    fn the_expert_without_a_task_says_so_and_solves_one() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Expert).unwrap();
+        for _ in 0..48 {
+            engine.step().unwrap();
+            if engine.end().is_some() {
+                break;
+            }
+        }
+        assert_eq!(engine.end(), Some(End::Success));
+        assert_eq!(engine.progress().unwrap().completed_at.len(), 2);
+        engine.reset();
+        engine.instruct("dance").unwrap();
+        assert!(engine.think().unwrap_err().to_string().contains("the expert needs a task"));
+    }
+
+    #[test]
+    fn unfit_instructions_change_nothing() {
+        let mut engine = testing::engine();
+        let words = engine.instruction().to_string();
+        for text in ["", "   ", "open\x1b[2J the door", &"word ".repeat(2_000)] {
+            assert!(engine.instruct(text).is_err(), "{text:.20}");
+        }
+        assert_eq!(engine.instruction(), words);
+        assert!(engine.progress().is_some());
+    }
+
+    #[test]
+    fn a_state_is_decided_once_and_the_decision_is_what_happens() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Random).unwrap();
+        let first = engine.think().unwrap().action;
+        assert_eq!(engine.think().unwrap().action, first);
+        let words = engine.words(first);
+        assert_eq!(engine.step().unwrap().action, words);
+    }
+
+    #[test]
+    fn a_reset_brings_back_the_world_and_the_path_begins_anew() {
+        let mut engine = testing::engine();
+        let start = engine.snapshot();
+        engine.act(Action::navigate(ActionType::MoveAhead));
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        assert_eq!(engine.snapshot().step, 2);
+        engine.reset();
+        let again = engine.snapshot();
+        assert_eq!((again.world, again.step, again.path.len()), (start.world, 0, 1));
+        assert_eq!(again.episode, 2);
+    }
 }

@@ -60,9 +60,9 @@ impl Layout {
         let right = width - left - 2;
         let mind = if body >= 30 { 13 } else { 9 };
         let below = body - mind;
-        let map = (right * 45 / 100).max(22).min(2 * below).min(72);
-        let words = right - map - 1;
-        let task = (below * 40 / 100).clamp(5, 12);
+        let map = (right * 45 / 100).max(22).min(2 * below + 2).min(80);
+        let words = right - map - 2;
+        let task = (below / 2).clamp(6, 12);
         let x = left + 2;
         Some(Layout {
             header: rect(0, 0, width, 1),
@@ -71,7 +71,7 @@ impl Layout {
             mind: rect(x, 1, right, mind),
             task: rect(x, 1 + mind, words, task),
             log: rect(x, 1 + mind + task, words, below - task),
-            map: rect(x + words + 1, 1 + mind, map, below),
+            map: rect(x + words + 2, 1 + mind, map, below),
             instruction: rect(0, height - 2, width, 1),
             status: rect(0, height - 1, width, 1),
         })

@@ -21,6 +21,8 @@ pub struct Opening {
     pub world: World,
     /// What is asked.
     pub task: Option<Task>,
+    /// The episode ends at the task's horizon.
+    pub limited: bool,
 }
 
 /// Where to begin.
@@ -90,21 +92,22 @@ impl Openings {
                 let (scene, world) = generate::house(*room, self.seed);
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
                 let reference = SceneRef::Generated { room: *room, seed: self.seed };
-                let _ = (&mut rng, &reference, LENGTH);
-                let task: Option<Task> = None;
+                let task = (1..=LENGTH)
+                    .rev()
+                    .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
                 let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
-                Ok(Opening { scene: Arc::new(scene), world, task })
+                Ok(Opening { scene: Arc::new(scene), world, task, limited: false })
             }
             Start::Recorded { scene, trajectories } => {
                 let at = self.seed as usize % trajectories.len().max(1);
                 let trajectory = trajectories.get(at).context("no demonstration was recorded in this scene")?;
                 let world = trajectory.start.clone();
-                Ok(Opening { scene: scene.clone(), world, task: Some(task_of(trajectory)) })
+                Ok(Opening { scene: scene.clone(), world, task: Some(task_of(trajectory)), limited: false })
             }
             Start::Tasks { tasks, index } => {
                 let task = tasks.get(*index).context("the task set is empty")?;
                 let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
-                Ok(Opening { scene: setting.scene, world: setting.world, task: Some(task.clone()) })
+                Ok(Opening { scene: setting.scene, world: setting.world, task: Some(task.clone()), limited: true })
             }
         }
     }

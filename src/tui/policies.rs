@@ -1,6 +1,6 @@
 //! The policies that may act, made on demand: loading the agent takes a while.
 
-use crate::agent::Policy;
+use crate::agent::{ExpertPolicy, Policy, RandomPolicy};
 
 /// Who acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl PolicyKind {
 }
 
 /// Loads the agent, wherever its checkpoint lies.
-pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send>;
+pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Box<dyn Policy>>>;
 
 /// Makes policies.
 pub struct Policies {
@@ -54,41 +54,8 @@ impl Policies {
     pub fn make(&self, kind: PolicyKind) -> anyhow::Result<Box<dyn Policy>> {
         match kind {
             PolicyKind::Agent => (self.agent)(),
-            PolicyKind::Expert => anyhow::bail!("not yet"),
-            PolicyKind::Random => Ok(Box::new(RandomPolicy(rand_chacha::rand_core::SeedableRng::seed_from_u64(0)))),
+            PolicyKind::Expert => Ok(Box::new(ExpertPolicy::new())),
+            PolicyKind::Random => Ok(Box::new(RandomPolicy::new())),
         }
-    }
-}
-
-struct RandomPolicy(rand_chacha::ChaCha8Rng);
-impl Policy for RandomPolicy {
-    fn name(&self) -> &str {
-        "random"
-    }
-    fn begin(&mut self, seed: u64) {
-        self.0 = rand_chacha::rand_core::SeedableRng::seed_from_u64(seed)
-    }
-    fn decide(&mut self, s: &mut crate::agent::Situation<'_>) -> anyhow::Result<crate::agent::Decision> {
-        use crate::domain::{Action, ActionType};
-        use rand::Rng;
-        let c = s.house.candidates();
-        let n = self.0.random_range(0..5 + c.len());
-        let action = if n < 5 { Action::navigate(ActionType::ALL[n]) } else { c[n - 5].action() };
-        let mut actions = [None; 12];
-        for a in &mut actions[..5] {
-            *a = Some(0.1)
-        }
-        for x in &c {
-            actions[x.kind.index()] = Some(0.2)
-        }
-        let objects = c
-            .iter()
-            .map(|x| (x.class, 0.2, true))
-            .chain(crate::domain::Class::all().take(4).map(|c| (c, 0.05, false)))
-            .collect();
-        Ok(crate::agent::Decision {
-            action,
-            mind: Some(crate::agent::Mind { actions, objects, entropy: 0.62, greedy: action }),
-        })
     }
 }

@@ -31,6 +31,8 @@ pub struct Screen {
     pub policy: PolicyKind,
     /// A person acts at first.
     pub manual: bool,
+    /// The policy runs as soon as it is there.
+    pub runs: bool,
     /// Where libtorch's messages go.
     pub log: Option<std::fs::File>,
 }
@@ -53,7 +55,7 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     watch_signals(tell.clone())?;
     let guard =
         terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let graphics = graphics(screen.protocol);
+    let graphics = graphics(screen.protocol, ability);
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
 
@@ -64,6 +66,9 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
         reports.send(Msg::Report(report)).is_ok()
     })?;
     let pictures = tell.clone();
+    if screen.runs && !screen.manual {
+        commands.send(Command::Run(true))?;
+    }
     let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
     let farewell = converse(Conversation::new(app, display, commands, encoder), &messages);
@@ -183,7 +188,7 @@ fn ability() -> Ability {
 }
 
 /// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
-fn graphics(asked: Option<Protocol>) -> Graphics {
+fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
     let cell_pixels = match crossterm::terminal::window_size() {
         Ok(window) if window.width > 0 && window.height > 0 => {
             ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
@@ -195,9 +200,12 @@ fn graphics(asked: Option<Protocol>) -> Graphics {
         None => {
             let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
             let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
-            match reason == detect::UNKNOWN && detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false) {
-                true => (Protocol::Sixel, "the terminal says that it has sixels".into()),
-                false => (protocol, reason),
+            if reason == detect::UNKNOWN && detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false) {
+                (Protocol::Sixel, "the terminal says that it has sixels".into())
+            } else if protocol == Protocol::HalfBlocks && !ability.shades() {
+                (Protocol::Ascii, "the terminal has few colours".into())
+            } else {
+                (protocol, reason)
             }
         }
     };

@@ -40,6 +40,7 @@ pub fn engine() -> Engine {
             steps: vec![],
         }],
         boxes: vec![],
+        choices: vec![],
     };
     let start = Start::Recorded { scene, trajectories: vec![trajectory] };
     let openings = Openings::new(start, 5, Scenes::in_folder(None));

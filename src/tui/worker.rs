@@ -155,6 +155,8 @@ impl<T: Fn(Report) -> bool> Worker<T> {
     /// Carries out a command; false when nobody listens any more.
     fn obey(&mut self, command: Command) -> bool {
         match command {
+            // Without a policy there is nothing to run; that it is missing was told.
+            Command::Run(true) if !self.engine.has_policy() => true,
             Command::Run(running) => {
                 let over = running && self.over();
                 self.due = Instant::now();
@@ -187,7 +189,7 @@ impl<T: Fn(Report) -> bool> Worker<T> {
                 self.run(false) && self.show() && self.think()
             }
             Command::Next => {
-                self.run(false);
+                self.due = Instant::now() + self.pace.between_steps();
                 match self.engine.next() {
                     Ok(()) => self.show() && self.think(),
                     Err(error) => self.fail(&error),
@@ -217,7 +219,11 @@ impl<T: Fn(Report) -> bool> Worker<T> {
         (self.tell)(Report::Busy(None));
         match chosen {
             Ok(()) => self.show() && self.think(),
-            Err(error) => self.fail(&error) && self.run(false),
+            Err(error) => {
+                self.run(false);
+                let before = self.show() && (!self.engine.has_policy() || self.think());
+                before && self.fail(&error)
+            }
         }
     }
 
@@ -261,5 +267,73 @@ impl<T: Fn(Report) -> bool> Worker<T> {
     fn fail(&self, error: &anyhow::Error) -> bool {
         tracing::warn!("{error:#}");
         (self.tell)(Report::Failed(format!("{error:#}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+    use crate::domain::ActionType;
+    use crate::tui::testing;
+
+    /// A worker in the kitchen, and what it tells.
+    fn start() -> (Sender<Command>, Receiver<Report>) {
+        let (tell, reports) = channel();
+        let commands = super::start(|| Ok(testing::engine()), move |report| tell.send(report).is_ok()).unwrap();
+        (commands, reports)
+    }
+
+    fn wait(reports: &Receiver<Report>, mut wanted: impl FnMut(&Report) -> bool) -> Report {
+        loop {
+            let report = reports.recv_timeout(Duration::from_secs(60)).unwrap();
+            if wanted(&report) {
+                return report;
+            }
+        }
+    }
+
+    #[test]
+    fn the_house_is_shown_before_the_policy_is_loaded() {
+        let (_commands, reports) = start();
+        assert!(matches!(reports.recv().unwrap(), Report::Seen(_)));
+        assert!(matches!(reports.recv().unwrap(), Report::Busy(Some(_))));
+        wait(&reports, |report| matches!(report, Report::Thought(..)));
+    }
+
+    #[test]
+    fn it_runs_until_told_to_stop_and_steps_one_at_a_time() {
+        let (commands, reports) = start();
+        commands.send(Command::Pace((0..9).fold(Pace::START, |pace, _| pace.faster()))).unwrap();
+        commands.send(Command::Run(true)).unwrap();
+        wait(&reports, |report| matches!(report, Report::Stepped(event) if event.step >= 5));
+        commands.send(Command::Run(false)).unwrap();
+        wait(&reports, |report| matches!(report, Report::Running(false)));
+        commands.send(Command::Reset).unwrap();
+        wait(&reports, |report| matches!(report, Report::Seen(now) if now.step == 0));
+        commands.send(Command::Act(Action::navigate(ActionType::RotateLeft))).unwrap();
+        let report = wait(&reports, |report| matches!(report, Report::Stepped(_)));
+        assert!(matches!(report, Report::Stepped(event) if event.by_hand && event.step == 1));
+    }
+
+    #[test]
+    fn a_policy_that_cannot_be_loaded_is_told_and_the_house_stays() {
+        let (commands, reports) = start();
+        commands.send(Command::Choose(PolicyKind::Agent)).unwrap();
+        let report = wait(&reports, |report| matches!(report, Report::Failed(_)));
+        assert!(matches!(report, Report::Failed(reason) if reason.contains("there is no checkpoint")));
+        commands.send(Command::Step).unwrap();
+        wait(&reports, |report| matches!(report, Report::Stepped(_)));
+    }
+
+    #[test]
+    fn it_ends_when_nobody_commands_any_more() {
+        let (commands, reports) = start();
+        wait(&reports, |report| matches!(report, Report::Thought(..)));
+        drop(commands);
+        while let Ok(report) = reports.recv_timeout(Duration::from_secs(60)) {
+            assert!(!matches!(report, Report::Stepped(_)));
+        }
     }
 }

@@ -123,3 +123,82 @@ fn original(world: &World, instance: Instance) -> Original {
         None => Original { instance, slice: None },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::super::house;
+    use super::*;
+    use crate::domain::Room;
+
+    fn tasks(count: u64) -> impl Iterator<Item = (Scene, Task)> {
+        (0..count).map(|number| {
+            let (room, seed) = (Room::ALL[number as usize % 4], number);
+            let (scene, world) = house(room, seed);
+            let mut rng = ChaCha8Rng::seed_from_u64(number);
+            let length = 1 + (number as usize / 4) % 8;
+            let task = task(&scene, &world, SceneRef::Generated { room, seed }, length, &mut rng);
+            let task = task.unwrap_or_else(|| panic!("no task of {length} in {}", scene.name));
+            assert_eq!((task.subtasks.len(), task.sentences.len()), (length, length));
+            (scene, task)
+        })
+    }
+
+    /// Solves a task from what it says alone; the steps taken.
+    fn solve_again(scene: Scene, task: &Task) -> Result<u32, String> {
+        let mut grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+        let mut house = House::new(Arc::new(scene), task.start.clone().unwrap());
+        let mut expert = Expert::new();
+        for step in 0..task.horizon {
+            if grader.is_done() {
+                return Ok(step);
+            }
+            let action = expert.next(&mut house, &grader).map_err(|no_way| no_way.to_string())?;
+            let outcome = house.step(action);
+            let world = house.world().clone();
+            grader.observe(house.scene(), &world, action, outcome);
+        }
+        if grader.is_done() { Ok(task.horizon) } else { Err(grader.waits_for(house.scene(), house.world())) }
+    }
+
+    fn assert_solvable(count: u64) {
+        let failures: Vec<String> = tasks(count)
+            .filter_map(|(scene, task)| match solve_again(scene, &task) {
+                Ok(steps) if steps == task.expert_steps => None,
+                other => Some(format!("{} {:?}: {other:?}, not {}", task.id, task.instruction, task.expert_steps)),
+            })
+            .collect();
+        assert!(failures.is_empty(), "{} of {count}: {failures:#?}", failures.len());
+    }
+
+    #[test]
+    fn the_expert_solves_every_task_of_a_sample() {
+        assert_solvable(64);
+    }
+
+    #[test]
+    #[ignore = "minutes: the full count behind the sample"]
+    fn the_expert_solves_ten_thousand_of_ten_thousand_tasks() {
+        assert_solvable(10_000);
+    }
+
+    #[test]
+    fn the_same_random_numbers_give_the_same_task() {
+        let twice = [0, 1].map(|_| tasks(8).map(|(_, task)| task).collect::<Vec<_>>());
+        assert_eq!(twice[0], twice[1]);
+    }
+
+    #[test]
+    fn what_a_task_starts_with_in_the_hand_is_a_bound_role() {
+        for (scene, task) in tasks(32) {
+            let start = task.start.unwrap();
+            assert!(scene.has_cell(start.agent.cell));
+            let bound: Vec<Instance> = task.roles.iter().filter_map(|role| role.bound).collect();
+            assert_eq!(bound, start.held.map(Instance::Object).into_iter().collect::<Vec<_>>());
+            let takes_hand = |skill| !matches!(skill, SkillKind::Pickup | SkillKind::Toggle);
+            assert!(start.held.is_some() || !takes_hand(task.subtasks[0].skill));
+            assert!(task.roles.iter().all(|role| role.expert.is_some()), "{}", task.id);
+        }
+    }
+}

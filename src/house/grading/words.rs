@@ -3,7 +3,7 @@
 use super::{Grader, Grading};
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::world::Instance;
-use crate::domain::{Class, Scene, World};
+use crate::domain::{Scene, World};
 
 /// The role's thing in words: "the apple", "the slice of apple".
 fn thing(roles: &[Role], role: u8) -> String {

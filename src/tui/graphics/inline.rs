@@ -380,3 +380,48 @@ const MARKS: [char; 297] = [
     '\u{1D243}',
     '\u{1D244}',
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::app::App;
+    use crate::tui::graphics::Protocol;
+    use crate::tui::testing;
+    use crate::tui::theme::Ability;
+
+    fn job(protocol: Protocol) -> Job {
+        let app: App = testing::app(120, 36, protocol, Ability::FULL);
+        app.job().unwrap()
+    }
+
+    #[test]
+    fn kitty_gets_a_png_in_small_pieces_and_is_told_not_to_answer() {
+        let sequence = kitty(&job(Protocol::Kitty));
+        let pieces: Vec<&str> = sequence.split_terminator("\x1b\\").collect();
+        assert!(pieces[0].starts_with("\x1b_Ga=T,U=1,f=100,i=83,c="), "{}", &pieces[0][..60]);
+        let mut data = String::new();
+        for (at, piece) in pieces.iter().enumerate() {
+            let (control, piece) = piece.split_once(';').unwrap();
+            assert!(control.contains("q=2") && piece.len() <= PIECE);
+            assert_eq!(control.ends_with("m=0"), at == pieces.len() - 1);
+            data.push_str(piece);
+        }
+        let png = STANDARD.decode(data).unwrap();
+        let image = image::load_from_memory(&png).unwrap();
+        assert_eq!((image.width(), image.height()), (300, 300));
+    }
+
+    #[test]
+    fn placeholders_number_rows_and_columns() {
+        assert_eq!(placeholder(0, 0), "\u{10EEEE}\u{305}\u{305}");
+        assert_eq!(placeholder(1, 2), "\u{10EEEE}\u{30D}\u{30E}");
+    }
+
+    #[test]
+    fn iterm2_scales_to_cells_and_sixel_starts_a_device_control_string() {
+        let sequence = iterm2(&job(Protocol::Iterm2));
+        assert!(sequence.starts_with("\x1b]1337;File=inline=1;size=") && sequence.ends_with('\x07'));
+        assert!(sequence.contains(";width=50;height=25;"), "{}", &sequence[..90]);
+        assert!(sixel(&job(Protocol::Sixel)).contains("\x1bP"));
+    }
+}

@@ -23,9 +23,9 @@ impl Widget for Sees<'_> {
                 let pose = now.world.agent;
                 let heading = ["north", "east", "south", "west"][pose.heading.quarters().rem_euclid(4) as usize];
                 match pose.horizon {
-                    0 => format!("facing {heading}"),
-                    up if up < 0 => format!("facing {heading}, {} up", -up),
-                    down => format!("facing {heading}, {down} down"),
+                    0 => heading.to_string(),
+                    up if up < 0 => format!("{heading}, {} up", -up),
+                    down => format!("{heading}, {down} down"),
                 }
             }
             None => String::new(),

@@ -7,7 +7,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::{fit, panel};
-use crate::domain::place::Rect as Floor;
+use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Instance, Pose};
 use crate::tui::app::App;
 use crate::tui::engine::Snapshot;
@@ -18,6 +18,8 @@ pub struct Map<'a>(pub &'a App);
 
 /// Furniture that begins higher above the floor than this hangs over other furniture and is left out, in millimetres.
 const OVERHEAD: i32 = 1200;
+/// The side of the smallest square that is drawn, in millimetres.
+const FINEST: i32 = 50;
 /// How far the shade of what the agent looks at reaches, in millimetres.
 const GAZE: f32 = 3000.0;
 
@@ -28,6 +30,9 @@ const WALL: Color = Color::Rgb(120, 124, 130);
 const PATH: Color = Color::Rgb(86, 140, 190);
 const AGENT: Color = Color::Rgb(80, 220, 255);
 const TARGET: Color = Color::Rgb(255, 214, 0);
+const INK: Color = Color::Rgb(16, 16, 18);
+/// Names are cut to no fewer columns than this.
+const SHORTEST: usize = 5;
 
 impl Widget for Map<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
@@ -43,11 +48,12 @@ impl Widget for Map<'_> {
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
         let right = target.map_or(String::new(), |(_, words)| words.clone());
         let inner = panel(buf, area, "Map", &right);
-        let Some(plan) = Plan::fitting(now, inner) else { return };
+        let ground = Ground::of(now);
+        let Some(plan) = Plan::fitting(&ground, inner) else { return };
         if app.ability.shades() {
-            plan.shaded(now, buf)
+            plan.shaded(&ground, buf)
         } else {
-            plan.lettered(app, now, buf)
+            plan.lettered(app, &ground, buf)
         }
         plan.marks(app, now, target.map(|(target, _)| target), buf);
     }
@@ -64,27 +70,18 @@ struct Plan {
 }
 
 impl Plan {
-    fn fitting(now: &Snapshot, area: Rect) -> Option<Plan> {
-        let bounds = bounds(now)?;
+    fn fitting(ground: &Ground, area: Rect) -> Option<Plan> {
+        let bounds = ground.bounds?;
         let (width, depth) = (bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1]);
         let (columns, squares) = (i32::from(area.width), 2 * i32::from(area.height));
         if columns == 0 || squares == 0 {
             return None;
         }
         let needed = (width as u32).div_ceil(columns as u32).max((depth as u32).div_ceil(squares as u32)) as i32;
-        // Whole and half cells keep the grid regular.
-        let side = if needed <= 125 {
-            125
-        } else if needed <= 250 {
-            250
-        } else {
-            needed
-        };
-        // A cell's centre is at a multiple of 250 mm; the drawing starts at a cell's edge.
-        let snapped = |v: i32| (v - 125).div_euclid(250) * 250 + 125;
-        let spare = |have: i32, want: i32| (have - want.div_euclid(side)).max(0) / 2;
-        let west = snapped(bounds.min[0] - spare(columns, width) * side);
-        let north = snapped(bounds.max[1] + spare(squares, depth) * side) + 250;
+        let side = needed.max(FINEST);
+        let spare = |have: i32, want: i32| (have * side - want).max(0) / 2;
+        let west = bounds.min[0] - spare(columns, width);
+        let north = bounds.max[1] + spare(squares, depth);
         Some(Plan { area, side, west, north })
     }
 
@@ -105,10 +102,10 @@ impl Plan {
         inside.then(|| (self.area.x + column as u16, self.area.y + row as u16))
     }
 
-    fn shaded(&self, now: &Snapshot, buf: &mut Buffer) {
+    fn shaded(&self, ground: &Ground, buf: &mut Buffer) {
         let shade = |column: u16, square: u16| {
             let (x, z) = self.point(column, square);
-            colour_at(now, x, z)
+            ground.colour(x, z)
         };
         for row in 0..self.area.height {
             for column in 0..self.area.width {
@@ -122,43 +119,53 @@ impl Plan {
                 };
             }
         }
-        self.names(now, buf);
+        self.names(ground, buf);
     }
 
-    /// Names furniture where its name fits, the largest first.
-    fn names(&self, now: &Snapshot, buf: &mut Buffer) {
-        let mut pieces: Vec<(Floor, Class)> = furniture(now).collect();
-        pieces.sort_by_key(|(floor, class)| (std::cmp::Reverse(extent(floor)), *class));
+    /// Names furniture where its name fits and it is not under something else, the largest first.
+    fn names(&self, ground: &Ground, buf: &mut Buffer) {
+        let mut pieces = ground.furniture.clone();
+        pieces.sort_by_key(|piece| (std::cmp::Reverse(extent(&piece.floor)), piece.class, piece.fixture));
         let mut taken: Vec<Rect> = Vec::new();
-        for (floor, class) in pieces {
+        let mut named: Vec<u16> = Vec::new();
+        for piece in pieces {
+            let floor = piece.floor;
             let columns = ((floor.max[0] - floor.min[0]) / self.side) as usize;
-            let middle = ((floor.min[0] + floor.max[0]) / 2, (floor.min[1] + floor.max[1]) / 2);
-            let Some((x, y)) = self.position(middle.0, middle.1) else { continue };
-            let word = class.spoken();
-            let name = if word.width() <= columns { word.to_string() } else { fit(word, columns.max(1)) };
-            if name.chars().count() < 3 {
+            let (x, z) = ((floor.min[0] + floor.max[0]) / 2, (floor.min[1] + floor.max[1]) / 2);
+            let name = fit(piece.class.spoken(), columns);
+            let whole = name == piece.class.spoken();
+            let Some((column, row)) = self.position(x, z) else { continue };
+            if named.contains(&piece.fixture)
+                || (!whole && columns < SHORTEST)
+                || ground.class(x, z) != Some(piece.class)
+            {
                 continue;
             }
             let width = name.width() as u16;
-            let place =
-                Rect { x: x.saturating_sub(width / 2).max(self.area.x), y, width, height: 1 }.intersection(self.area);
-            if taken.iter().any(|other| other.intersects(place)) {
+            let left = column.saturating_sub(width / 2).max(self.area.x);
+            let place = Rect { x: left, y: row, width, height: 1 }.intersection(self.area);
+            if taken
+                .iter()
+                .any(|other| other.intersects(Rect { x: place.x.saturating_sub(1), width: width + 2, ..place }))
+            {
                 continue;
             }
-            let colour = furniture_colour(class);
-            buf.set_stringn(place.x, place.y, &name, usize::from(place.width), Style::new().fg(ink(colour)).bg(colour));
+            let style = Style::new().fg(INK).bg(furniture_colour(piece.class));
+            buf.set_stringn(place.x, place.y, &name, usize::from(place.width), style);
             taken.push(place);
+            named.push(piece.fixture);
         }
     }
 
     /// Without colours: a letter for furniture, dots to walk on.
-    fn lettered(&self, app: &App, now: &Snapshot, buf: &mut Buffer) {
+    fn lettered(&self, app: &App, ground: &Ground, buf: &mut Buffer) {
+        let now = ground.now;
         for row in 0..self.area.height {
             for column in 0..self.area.width {
                 let (x, upper) = self.point(column, 2 * row);
                 let z = upper - self.side / 2;
                 let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
-                let symbol = if let Some(class) = class_at(now, x, z) {
+                let symbol = if let Some(class) = ground.class(x, z) {
                     app.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
                     '#'
@@ -212,58 +219,75 @@ impl Plan {
     }
 }
 
-/// What the whole plan covers.
-fn bounds(now: &Snapshot) -> Option<Floor> {
-    let cells = now.scene.cells.iter().map(|cell| {
-        let at = cell.centre(0);
-        Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(125)
-    });
-    cells
-        .chain(now.scene.walls.iter().map(|wall| wall.footprint()))
-        .chain(furniture(now).map(|(floor, _)| floor))
-        .reduce(|a, b| Floor {
+/// A box of a piece of furniture, from above.
+#[derive(Clone, Copy)]
+struct Piece {
+    floor: Floor,
+    class: Class,
+    fixture: u16,
+}
+
+/// What is where on the floor.
+struct Ground<'a> {
+    now: &'a Snapshot,
+    /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
+    furniture: Vec<Piece>,
+    /// What the whole plan covers.
+    bounds: Option<Floor>,
+}
+
+impl<'a> Ground<'a> {
+    fn of(now: &'a Snapshot) -> Ground<'a> {
+        let floor = now.scene.floor();
+        let fixtures = (0u16..).zip(&now.scene.fixtures);
+        let mut parts: Vec<_> = fixtures
+            .flat_map(|(i, fixture)| fixture.body.iter().map(move |part| (part, fixture.class, i)))
+            .filter(|(part, ..)| part.min.y - floor < OVERHEAD)
+            .collect();
+        parts.sort_by_key(|(part, ..)| part.max.y);
+        let piece = |(part, class, fixture): (&Cuboid, Class, u16)| Piece { floor: part.footprint(), class, fixture };
+        let furniture: Vec<Piece> = parts.into_iter().map(piece).collect();
+        let cells = now.scene.cells.iter().map(|cell| {
+            let at = cell.centre(0);
+            Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(Cell::SIDE / 2)
+        });
+        let walls = now.scene.walls.iter().map(|wall| wall.footprint());
+        let bounds = cells.chain(walls).chain(furniture.iter().map(|piece| piece.floor)).reduce(|a, b| Floor {
             min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1])],
             max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1])],
-        })
+        });
+        Ground { now, furniture, bounds }
+    }
+
+    /// The furniture at a point, the highest of it.
+    fn class(&self, x: i32, z: i32) -> Option<Class> {
+        self.furniture.iter().rev().find(|piece| piece.floor.contains(x, z)).map(|piece| piece.class)
+    }
+
+    fn colour(&self, x: i32, z: i32) -> Option<Color> {
+        if !self.bounds?.contains(x, z) {
+            return None;
+        }
+        if let Some(class) = self.class(x, z) {
+            return Some(furniture_colour(class));
+        }
+        let now = self.now;
+        if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
+            return Some(WALL);
+        }
+        let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
+        if !now.scene.has_cell(cell) {
+            return Some(GROUND);
+        }
+        if now.path.contains(&cell) {
+            return Some(PATH);
+        }
+        Some(if gazed_at(now.world.agent, x, z) { SEEN } else { WALKABLE })
+    }
 }
 
 fn extent(floor: &Floor) -> i64 {
     i64::from(floor.max[0] - floor.min[0]) * i64::from(floor.max[1] - floor.min[1])
-}
-
-/// The furniture that stands on the floor or on other furniture, box by box, lowest first.
-fn furniture(now: &Snapshot) -> impl Iterator<Item = (Floor, Class)> + '_ {
-    let floor = now.scene.floor();
-    let parts =
-        now.scene.fixtures.iter().flat_map(|fixture| fixture.body.iter().map(move |part| (part, fixture.class)));
-    let mut parts: Vec<_> = parts.filter(move |(part, _)| part.min.y - floor < OVERHEAD).collect();
-    parts.sort_by_key(|(part, _)| part.max.y);
-    parts.into_iter().map(|(part, class)| (part.footprint(), class))
-}
-
-/// The furniture at a point, the highest of it.
-fn class_at(now: &Snapshot, x: i32, z: i32) -> Option<Class> {
-    furniture(now).filter(|(floor, _)| floor.contains(x, z)).last().map(|(_, class)| class)
-}
-
-fn colour_at(now: &Snapshot, x: i32, z: i32) -> Option<Color> {
-    if let Some(class) = class_at(now, x, z) {
-        return Some(furniture_colour(class));
-    }
-    if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
-        return Some(WALL);
-    }
-    let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
-    let at = cell.centre(0);
-    let near_middle = (x - at.x).abs() <= 63 && (z - at.z).abs() <= 63;
-    if now.path.contains(&cell) && near_middle {
-        return Some(PATH);
-    }
-    if now.scene.has_cell(cell) {
-        return Some(if gazed_at(now.world.agent, x, z) { SEEN } else { WALKABLE });
-    }
-    let room = bounds(now)?;
-    room.contains(x, z).then_some(GROUND)
 }
 
 /// Whether a point lies in the 60 degrees that the agent looks into.
@@ -294,8 +318,4 @@ fn furniture_colour(class: Class) -> Color {
     ];
     let (r, g, b) = COLOURS[class.index() * 5 % COLOURS.len()];
     Color::Rgb(r, g, b)
-}
-
-fn ink(_background: Color) -> Color {
-    Color::Rgb(16, 16, 18)
 }

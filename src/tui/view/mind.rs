@@ -2,14 +2,16 @@
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::{bar, fit, panel, put, share, wrap};
 use crate::agent::{Decision, Mind};
-use crate::domain::{ActionType, World};
+use crate::domain::{ActionType, Class};
 use crate::tui::app::App;
+use crate::tui::engine::Snapshot;
 use crate::tui::theme::THEME;
 
 /// The panel with the distribution.
@@ -25,107 +27,112 @@ impl Widget for MindPanel<'_> {
         let right = match (&app.busy, mind) {
             (Some(busy), _) => format!("{busy} ..."),
             (None, Some(mind)) => format!("{} · entropy {:.2}", app.policy.name(), mind.entropy),
+            (None, None) if app.thought.is_some() => format!("{} · no probabilities", app.policy.name()),
             (None, None) => app.policy.name().to_string(),
         };
         let inner = panel(buf, area, "Mind", &right);
-        match (&app.thought, &app.trouble) {
-            (Some((decision, _)), _) if mind.is_some() => {
-                if let (Some(mind), Some(now)) = (mind, &app.now) {
-                    distribution(inner, buf, decision, mind, &now.world);
-                }
-            }
-            (_, Some(trouble)) => {
-                for (row, line) in (0..).zip(wrap(trouble, usize::from(inner.width), "")) {
+        match (&app.thought, &app.now, &app.trouble) {
+            (Some((decision, _)), Some(now), _) => Table { decision, mind, now }.render(inner, buf),
+            (_, _, Some(trouble)) => {
+                let lines = wrap(trouble, usize::from(inner.width), "");
+                let below = lines.len() as u16 + 1;
+                for (row, line) in (0..).zip(lines) {
                     put(buf, inner, row, line, THEME.bad);
                 }
+                put(buf, inner, below, "e: the expert acts   x: chance acts   m: you act", THEME.quiet);
             }
-            (Some((_, words)), None) => {
-                Line::from(vec![Span::raw("next  "), Span::styled(format!("> {words}"), THEME.chosen)])
-                    .render(inner, buf);
-                let text = format!("The {} policy has no probabilities to show.", app.policy.name());
-                put(buf, inner, 2, text, THEME.quiet);
-            }
-            (None, None) => {}
+            _ => {}
         }
     }
 }
 
-fn distribution(area: Rect, buf: &mut Buffer, decision: &Decision, mind: &Mind, world: &World) {
-    let wide = area.height >= 12 && area.width >= 2 + 32 + OBJECTS;
-    let (actions, objects) = if area.height >= 12 {
-        let beside = if wide { OBJECTS } else { 0 };
-        let actions = Rect { width: area.width - beside - 2 * u16::from(wide), height: 12, ..area };
-        (
-            actions,
-            if wide {
-                Rect { x: actions.right() + 2, width: OBJECTS, ..area }
-            } else {
-                Rect { y: area.y + 12, height: area.height - 12, ..area }
-            },
-        )
-    } else {
-        (Rect { height: 6, ..area }, Rect { y: area.y + 6, height: area.height.saturating_sub(6), ..area })
-    };
-    let columns = ActionType::COUNT as u16 / actions.height;
-    let width = (actions.width - 2 * (columns - 1)) / columns;
-    for (at, kind) in (0u16..).zip(ActionType::ALL) {
-        let (column, row) = (at / actions.height, at % actions.height);
-        let place = Rect { x: actions.x + column * (width + 2), y: actions.y + row, width, height: 1 };
-        action(place, buf, kind, decision, mind.actions[kind.index()], world);
-    }
-    if wide { object_list(objects, buf, decision, mind, world) } else { object_line(objects, buf, mind) }
+/// The 12 actions, and the object classes where there is a distribution over them.
+struct Table<'a> {
+    decision: &'a Decision,
+    mind: Option<&'a Mind>,
+    now: &'a Snapshot,
 }
 
-fn action(area: Rect, buf: &mut Buffer, kind: ActionType, decision: &Decision, p: Option<f32>, world: &World) {
-    let chosen = decision.action.kind == kind;
-    let mark = if chosen { ">" } else { " " };
-    let name = format!("{mark} {:<11} ", kind.name());
-    let room = usize::from(area.width).saturating_sub(name.width());
-    let line = match p {
-        Some(p) => {
-            let style = if chosen { THEME.chosen } else { ratatui::style::Style::new() };
-            Line::from(vec![
+impl Widget for Table<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let tall = area.height >= 12;
+        let wide = tall && area.width >= 2 + 32 + OBJECTS;
+        let rows = if tall { 12 } else { 6 };
+        let beside = if wide { OBJECTS + 2 } else { 0 };
+        let actions = Rect { width: area.width - beside, height: rows, ..area };
+        let columns = ActionType::COUNT as u16 / rows;
+        let width = (actions.width - 2 * (columns - 1)) / columns;
+        for (at, kind) in (0u16..).zip(ActionType::ALL) {
+            let (column, row) = (at / rows, at % rows);
+            let place = Rect { x: actions.x + column * (width + 2), y: actions.y + row, width, height: 1 };
+            self.action(place, buf, kind);
+        }
+        let Some(mind) = self.mind else { return };
+        if wide {
+            let objects = Rect { x: actions.right() + 2, width: OBJECTS, ..area };
+            object_list(objects, buf, self.target_class(), mind);
+        } else {
+            let objects = Rect { y: actions.bottom(), height: area.height.saturating_sub(rows), ..area };
+            object_line(objects, buf, self.target_class(), mind);
+        }
+    }
+}
+
+impl Table<'_> {
+    fn target_class(&self) -> Option<Class> {
+        self.now.world.class_of(&self.now.scene, self.decision.action.target?)
+    }
+
+    fn action(&self, area: Rect, buf: &mut Buffer, kind: ActionType) {
+        let chosen = self.decision.action.kind == kind;
+        let style = if chosen { THEME.chosen } else { Style::new() };
+        let name = format!("{} {:<11} ", if chosen { ">" } else { " " }, kind.name());
+        let room = usize::from(area.width).saturating_sub(name.width());
+        let possible = !kind.is_interaction() || self.now.candidates.iter().any(|candidate| candidate.kind == kind);
+        let line = match (self.mind.map(|mind| mind.actions[kind.index()]), possible || chosen) {
+            (Some(Some(p)), _) => Line::from(vec![
                 Span::styled(name, style),
                 Span::styled(bar(p, room.saturating_sub(4)), if chosen { THEME.chosen } else { THEME.bar }),
                 Span::styled(format!(" {:>3}", share(p)), style),
-            ])
-        }
-        None => Line::styled(format!("{name}{}", fit(&masked(kind, world, room), room)), THEME.masked),
-    };
-    line.render(area, buf);
+            ]),
+            (None, true) => {
+                let class = self.target_class().filter(|_| chosen).map_or("", Class::spoken);
+                Line::styled(format!("{name}{}", fit(class, room)), style)
+            }
+            (Some(None), _) | (None, false) => {
+                Line::styled(format!("{name}{}", fit(masked(kind, self.now, room), room)), THEME.masked)
+            }
+        };
+        line.render(area, buf);
+    }
 }
 
-/// Why an action cannot be chosen now, in at most about `room` columns.
-fn masked(kind: ActionType, world: &World, room: usize) -> String {
+/// Why an action cannot be chosen now, in words that fit where they can.
+fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
+    let held = now.world.held.and_then(|held| now.world.object(held));
     let (long, short) = match kind {
-        ActionType::Pickup if world.held.is_some() => ("masked: the hand is full", "hand full"),
-        ActionType::Pickup => ("masked: nothing to pick up in reach", "no thing"),
-        ActionType::Put if world.held.is_none() => ("masked: the hand is empty", "hand empty"),
+        ActionType::Pickup if held.is_some() => ("masked: the hand is full", "hand full"),
+        ActionType::Pickup => ("masked: nothing to pick up in reach", "none near"),
+        ActionType::Put if held.is_none() => ("masked: the hand is empty", "hand empty"),
         ActionType::Put => ("masked: no place for it in reach", "no place"),
-        ActionType::Open => ("masked: nothing to open in reach", "no door"),
+        ActionType::Open => ("masked: nothing to open in reach", "none near"),
         ActionType::Close => ("masked: nothing open in reach", "none open"),
-        ActionType::ToggleOn => ("masked: nothing to switch on in reach", "no switch"),
+        ActionType::ToggleOn => ("masked: nothing to switch on in reach", "none near"),
         ActionType::ToggleOff => ("masked: nothing on in reach", "none on"),
-        ActionType::Slice => ("masked: needs a knife and something to cut", "no knife"),
+        ActionType::Slice if held.is_none_or(|held| !held.class.is_knife()) => {
+            ("masked: no knife in the hand", "no knife")
+        }
+        ActionType::Slice => ("masked: nothing to slice in reach", "none near"),
         _ => ("masked", "masked"),
     };
-    if long.width() <= room { long.into() } else { short.into() }
+    if long.width() <= room { long } else { short }
 }
 
 /// One class a row, with bars.
-fn object_list(area: Rect, buf: &mut Buffer, decision: &Decision, mind: &Mind, world: &World) {
+fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &Mind) {
     put(buf, area, 0, "object", THEME.quiet);
-    let target = decision.action.target.and_then(|instance| match instance {
-        crate::domain::Instance::Object(index) => world.object(index).map(|object| object.class),
-        crate::domain::Instance::Fixture(_) => None,
-    });
     for (row, &(class, p, candidate)) in (1..area.height).zip(&mind.objects) {
-        let chosen = target == Some(class);
-        let style = match (chosen, candidate) {
-            (true, _) => THEME.chosen,
-            (false, true) => ratatui::style::Style::new(),
-            (false, false) => THEME.masked,
-        };
+        let style = object_style(target == Some(class), candidate);
         let name = fit(class.spoken(), 13);
         let width = usize::from(area.width).saturating_sub(13 + 1 + 4);
         let line = Line::from(vec![
@@ -137,8 +144,16 @@ fn object_list(area: Rect, buf: &mut Buffer, decision: &Decision, mind: &Mind, w
     }
 }
 
+fn object_style(chosen: bool, candidate: bool) -> Style {
+    match (chosen, candidate) {
+        (true, _) => THEME.chosen,
+        (false, true) => Style::new(),
+        (false, false) => THEME.masked,
+    }
+}
+
 /// As many classes as fit in a few lines.
-fn object_line(area: Rect, buf: &mut Buffer, mind: &Mind) {
+fn object_line(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &Mind) {
     let mut lines = vec![Line::default()];
     let mut used = 0;
     for &(class, p, candidate) in &mind.objects {
@@ -151,7 +166,7 @@ fn object_line(area: Rect, buf: &mut Buffer, mind: &Mind) {
             used = 0;
         }
         used += text.width();
-        let style = if candidate { ratatui::style::Style::new() } else { THEME.masked };
+        let style = object_style(target == Some(class), candidate);
         if let Some(line) = lines.last_mut() {
             line.push_span(Span::styled(text, style));
         }

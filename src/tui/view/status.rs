@@ -19,11 +19,15 @@ impl Widget for Header<'_> {
         let app = self.0;
         let mut words = vec![];
         if let Some(now) = &app.now {
+            let room = now.scene.room.spoken();
             words.push(now.scene.name.clone());
-            words.push(now.scene.room.spoken().to_string());
-            words.push(match now.horizon {
-                Some(horizon) => format!("step {}/{horizon}", now.step),
-                None => format!("step {}", now.step),
+            if !now.scene.name.starts_with(room) {
+                words.push(room.to_string());
+            }
+            words.push(match (now.horizon, now.expert_steps) {
+                (Some(horizon), _) => format!("step {}/{horizon}", now.step),
+                (None, Some(expert)) => format!("step {} (expert: {expert})", now.step),
+                (None, None) => format!("step {}", now.step),
             });
             words.push(format!("seed {}", now.seed));
         }
