@@ -137,6 +137,28 @@ fn a_missed_threshold_ends_with_2() {
 }
 
 #[test]
+fn an_interrupted_run_ends_with_130_and_a_partial_summary() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 3);
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("sprint"));
+    command.current_dir(sprint.folder.path()).env("SPRINT_HOME", sprint.path("home"));
+    command.args("eval --tasks tasks.json --policy random --seeds 100000 --out run".split_whitespace());
+    let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let begun = || std::fs::metadata(sprint.path("run/episodes.jsonl")).is_ok_and(|file| file.len() > 0);
+    let patience = std::time::Instant::now();
+    while !begun() && patience.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let told = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(told.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let summary: Value = serde_json::from_str(&sprint.read("run/summary.json")).unwrap();
+    let lines = sprint.read("run/episodes.jsonl").lines().count();
+    assert_eq!((&summary["partial"], &summary["episodes"]), (&Value::Bool(true), &Value::from(lines)));
+    assert!(lines > 0);
+}
+
+#[test]
 fn a_run_is_continued_and_another_is_refused() {
     let sprint = Sprint::new();
     sprint.sample("tasks.json", 1, 4);

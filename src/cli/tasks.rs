@@ -197,7 +197,7 @@ impl Show {
         match wanted {
             None => {
                 for (number, task) in set.tasks.iter().enumerate() {
-                    writeln!(out, "{number:>4}  {:<28} {}", task.id, told(task, false))?;
+                    writeln!(out, "{number:>4}  {}  [{}]", told(task, false), task.id)?;
                 }
             }
             Some(wanted) => {

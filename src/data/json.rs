@@ -67,12 +67,24 @@ pub fn parse<T: DeserializeOwned>(bytes: &[u8], version: u32) -> anyhow::Result<
     })
 }
 
-/// Writes a JSON file atomically: into a temporary file beside it, then renamed.
+/// Writes a JSON file atomically, in one line.
 ///
 /// # Errors
 /// When the folder cannot be written to; the old file, if any, is untouched then.
 pub fn write<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
-    let mut text = serde_json::to_vec_pretty(value).with_context(|| format!("cannot write {}", path.display()))?;
+    write_line(path, serde_json::to_vec(value))
+}
+
+/// Writes a JSON file atomically, indented for people.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
+    write_line(path, serde_json::to_vec_pretty(value))
+}
+
+fn write_line(path: &Path, text: serde_json::Result<Vec<u8>>) -> anyhow::Result<()> {
+    let mut text = text.with_context(|| format!("cannot write {}", path.display()))?;
     text.push(b'\n');
     write_bytes(path, &text)
 }
@@ -94,6 +106,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     }
     let mut file = builder.prefix(".sprint-").tempfile_in(folder).with_context(context)?;
     file.write_all(bytes).with_context(context)?;
+    file.as_file().sync_all().with_context(context)?;
     file.persist(path).with_context(context)?;
     Ok(())
 }

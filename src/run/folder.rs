@@ -91,7 +91,7 @@ impl RunFolder {
             if entries.next().is_some() {
                 bail!("{name} is not empty and holds no run; choose another folder with --out");
             }
-            json::write(&manifest_path, manifest)?;
+            json::write_pretty(&manifest_path, manifest)?;
         }
         let episodes_path = path.join(Self::EPISODES);
         let context = || format!("cannot write {}", episodes_path.display());
@@ -130,7 +130,7 @@ impl RunFolder {
     /// # Errors
     /// When the folder cannot be written to.
     pub fn write_summary(&self, summary: &super::report::Summary) -> anyhow::Result<()> {
-        json::write(&self.path.join("summary.json"), summary)?;
+        json::write_pretty(&self.path.join("summary.json"), summary)?;
         json::write_bytes(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
         json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)
     }

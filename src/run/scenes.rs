@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use anyhow::{Context, anyhow, bail};
 use sha2::{Digest, Sha256};
 
-use crate::data::json;
+use crate::data::{dataset, json};
 use crate::domain::task::SceneRef;
 use crate::domain::{Instance, Scene, Task, TaskSet, World};
 use crate::house::validate::{self, Misfit};
@@ -59,13 +59,7 @@ impl Scenes {
             return Ok(scene.clone());
         }
         let Some(folder) = &self.folder else { bail!("no folder of scenes is known, so there is no scene {name:?}") };
-        let path = folder.join(format!("{name}.json"));
-        let scene =
-            json::read::<Scene>(&path, Scene::FORMAT).with_context(|| format!("there is no scene {name:?}"))?.value;
-        validate::scene(&scene).with_context(|| format!("{}", path.display()))?;
-        if scene.name != name {
-            bail!("{}: name: {:?}, which is not the file's name", path.display(), scene.name);
-        }
+        let scene = dataset::read_scene(folder, name).with_context(|| format!("there is no scene {name:?}"))?;
         let scene = Arc::new(scene);
         self.read.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), scene.clone());
         Ok(scene)

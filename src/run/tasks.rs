@@ -14,7 +14,7 @@ use crate::data::Dataset;
 use crate::data::alfred::tasks::span_task;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Task, TaskSet, Trajectory};
-use crate::house::generate;
+use crate::house::{generate, validate};
 use crate::language::phrases;
 
 /// The seeds of sampled tasks' houses lie from here on, those of collected demonstrations far below: no task is played in a
@@ -137,6 +137,8 @@ pub fn sample_dataset(
                 SceneRef::Generated { room, seed } => Some(generate::house(*room, *seed).0.into()),
             };
             let scene = scene.with_context(|| format!("trajectory {}: its scene is absent", trajectory.id))?;
+            validate::world(&scene, &trajectory.start)
+                .with_context(|| format!("trajectory {}: start", trajectory.id))?;
             let mut task = span_task(id, &trajectory, &scene, span.clone())
                 .map_err(|problem| anyhow::anyhow!("trajectory {}: {problem}", trajectory.id))?;
             let mut rng = wish.source(place as u64, 0);
@@ -156,8 +158,9 @@ pub fn sample_dataset(
     }
     let tasks: Vec<Task> = tasks.into_iter().flatten().collect();
     ensure!(tasks.len() == wish.count, "the dataset changed while it was read");
-    let folder = relative(&dataset.folder().join("scenes"), set_folder)?;
-    Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes: Some(folder), tasks })
+    let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
+    let scenes = named.then(|| relative(&dataset.folder().join("scenes"), set_folder)).transpose()?;
+    Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes, tasks })
 }
 
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
@@ -181,7 +184,14 @@ fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::dataset::{Manifest, Writer};
     use crate::data::taskset;
+    use crate::domain::skill::Original;
+    use crate::domain::trajectory::Annotation;
+    use crate::domain::{Class, Instance, Role, SkillKind, Subtask};
+    use crate::house::expert::Expert;
+    use crate::house::grading::{Grader, Grading};
+    use crate::house::testing::kitchen_house;
     use crate::run::scenes::Scenes;
 
     fn wish(length: usize, count: usize, seed: u64) -> Wish {
@@ -207,6 +217,82 @@ mod tests {
             assert_eq!(task.subtasks.len(), 3);
             assert!(matches!(task.scene, SceneRef::Generated { room: Room::Kitchen, .. }));
         }
+    }
+
+    /// A dataset of one demonstration in the test kitchen: a mug is taken, and put on the table.
+    fn dataset(folder: &Path) -> Dataset {
+        let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
+        let roles = vec![role("Mug"), role("DiningTable")];
+        let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };
+        let skills = vec![subtask(SkillKind::Pickup, None), subtask(SkillKind::Put, Some(1))];
+        let mut house = kitchen_house();
+        let (scene, start) = (house.scene().clone(), house.world().clone());
+        let mut grader = Grader::new(Grading::Class, &roles, &skills, None);
+        let (mut expert, mut actions, mut skill_starts) = (Expert::new(), Vec::new(), vec![0]);
+        while !grader.is_done() {
+            let action = expert.next(&mut house, &grader).unwrap();
+            let outcome = house.step(action);
+            actions.push(action);
+            if grader.observe(&scene, house.world(), action, outcome) && !grader.is_done() {
+                skill_starts.push(actions.len() as u32);
+            }
+        }
+        let expert = |number| Original { instance: grader.binding(number).unwrap(), slice: None };
+        let roles: Vec<Role> =
+            (0..).zip(roles).map(|(number, role)| Role { expert: Some(expert(number)), ..role }).collect();
+        let mut writer = Writer::new(folder).unwrap();
+        writer.scene(&scene).unwrap();
+        let trajectory = Trajectory {
+            id: "mug".into(),
+            split: "train".into(),
+            scene: SceneRef::Named(scene.name.clone()),
+            start,
+            actions,
+            roles,
+            skills,
+            skill_starts,
+            goal: None,
+            annotations: vec![Annotation {
+                goal: "Set the table.".into(),
+                steps: vec!["grab the cup".into(), "put the cup down".into()],
+            }],
+            boxes: Vec::new(),
+        };
+        writer.trajectory(&trajectory).unwrap();
+        let manifest = Manifest {
+            format_version: Manifest::FORMAT,
+            source: "test".into(),
+            counts: BTreeMap::new(),
+            scenes: 1,
+            held_out: Vec::new(),
+            skipped: Vec::new(),
+        };
+        writer.finish(&manifest).unwrap();
+        Dataset::open(folder).unwrap()
+    }
+
+    #[test]
+    fn a_span_starts_where_the_expert_led_and_is_told_in_either_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let dataset = dataset(folder.path());
+        let sample =
+            |length, count, phrasing| sample_dataset(&wish(length, count, 5), &dataset, None, phrasing, folder.path());
+        let told = sample(1, 2, Phrasing::Annotators).unwrap();
+        let put = told.tasks.iter().find(|task| task.subtasks[0].skill == SkillKind::Put).unwrap();
+        assert_eq!(put.instruction, "put the cup down");
+        assert_eq!(put.source, Some(("mug".into(), 1)));
+        let start = put.start.as_ref().unwrap();
+        assert_eq!(start.held.map(Instance::Object), put.roles[usize::from(put.subtasks[0].object)].bound);
+        assert!(start.held.is_some(), "the mug is in the hand already");
+        assert_eq!(sample(2, 1, Phrasing::Annotators).unwrap().tasks[0].instruction, "Set the table.");
+        let own = sample(1, 2, Phrasing::Own).unwrap();
+        assert!(own.tasks.iter().all(|task| !task.instruction.is_empty() && !task.instruction.contains("cup down")));
+        for set in [told, own] {
+            taskset::check(&set).unwrap();
+            Scenes::of(&folder.path().join("set.json"), &set).check(&set.tasks).unwrap();
+        }
+        let error = sample(1, 3, Phrasing::Own).unwrap_err().to_string();
+        assert!(error.contains("2 spans of 1 subtasks"), "{error}");
     }
 
     #[test]
