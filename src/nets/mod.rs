@@ -18,3 +18,5 @@ mod encoder_stack;
 mod mpnet;
 mod pooling;
 mod transformer;
+#[cfg(test)]
+pub mod testing;

@@ -103,6 +103,7 @@ mod tests {
 
     #[test]
     fn the_heads_have_12_and_82_entries_and_depend_on_the_sentence() {
+        let _chance = crate::nets::testing::chance();
         tch::manual_seed(1);
         let store = nn::VarStore::new(Device::Cpu);
         let spec = PolicySpec { history: 5, embedding: 6, channels: [8; 4], hidden: vec![16], dropout: 0.2 };

@@ -134,6 +134,7 @@ mod tests {
 
     #[test]
     fn a_frame_becomes_a_seven_by_seven_map_whatever_the_batch() {
+        let _chance = crate::nets::testing::chance();
         tch::manual_seed(3);
         let store = nn::VarStore::new(Device::Cpu);
         let spec = VisualSpec { input: 112, channels: [8, 8, 8, 16] };

@@ -235,6 +235,7 @@ mod tests {
 
     #[test]
     fn a_few_frames_are_learned_by_heart() {
+        let _chance = crate::nets::testing::chance();
         let (_, last) = trained(250, u64::MAX);
         assert!(last.values["held_out_action_accuracy"] > 0.95, "{last:?}");
         assert!(last.values["held_out_object_accuracy"] > 0.95, "{last:?}");
@@ -242,6 +243,7 @@ mod tests {
 
     #[test]
     fn a_training_that_was_stopped_and_resumed_equals_the_uninterrupted_one_to_the_bit() {
+        let _chance = crate::nets::testing::chance();
         let (whole, resumed) = (trained(8, u64::MAX).0, trained(8, 3).0);
         assert_eq!(whole.len(), resumed.len());
         for ((name, one), (_, other)) in whole.iter().zip(&resumed) {

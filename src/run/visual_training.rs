@@ -248,6 +248,7 @@ mod tests {
 
     #[test]
     fn the_encoder_learns_what_a_few_frames_show_and_every_frame_gets_its_map() {
+        let _chance = crate::nets::testing::chance();
         let footage = footage();
         assert_eq!(footage.frames(), 10);
         let mut preset = Preset::named("l-bc").unwrap();

@@ -422,7 +422,7 @@ mod tests {
         let job_of = job(Protocol::Iterm2);
         let sequence = iterm2(&job_of);
         assert!(sequence.starts_with("\x1b]1337;File=inline=1;size=") && sequence.ends_with('\x07'));
-        let size = format!(";width={};height={};", job_of.area.width, job_of.area.height);
+        let size = format!(";width={};height={};", job_of.cells.width, job_of.cells.height);
         assert!(sequence.contains(&size), "{}", &sequence[..90]);
         assert!(sixel(&job(Protocol::Sixel)).contains("\x1bP"));
     }
