@@ -14,6 +14,7 @@ mod import;
 mod logging;
 mod policies;
 mod pretrain;
+mod relabel;
 mod replay;
 mod shell;
 mod stop;
@@ -42,6 +43,8 @@ enum Command {
     Import(import::Import),
     /// Collect demonstrations in generated houses
     Collect(collect::Collect),
+    /// Label a dataset's runs of skills, to learn from them
+    Relabel(relabel::Relabel),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
     /// Re-run recorded demonstrations in the simulator
@@ -101,6 +104,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
+        Command::Relabel(relabel) => relabel.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),

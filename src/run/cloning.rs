@@ -185,12 +185,14 @@ mod tests {
 
     fn items() -> Items {
         let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
-        let span = |first: u32| Span { first, start: first, end: first + 6, texts: vec![0, 1] };
+        let span =
+            |text| move |first: u32| Span { trajectory: 0, skills: 0..1, first, start: first, end: first + 6, text };
         Items {
             labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
             texts: vec!["one".into(), "two".into()],
-            training: (0..4).map(|i| span(6 * i)).collect(),
-            held_out: vec![span(0)],
+            training: (0..8).map(|i| span(i % 2)(i / 2 * 6)).collect(),
+            held_out: vec![span(0)(0), span(1)(0)],
+            firsts: vec![0, FRAMES as u32],
         }
     }
 

@@ -12,6 +12,7 @@ pub mod page;
 pub mod presets;
 pub mod pretrain;
 pub mod progress;
+pub mod relabel;
 pub mod replay;
 pub mod report;
 pub mod rollout;

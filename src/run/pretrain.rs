@@ -16,7 +16,8 @@ use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceS
 use crate::agent::learned::SharedEmbedder;
 use crate::data::dataset::Dataset;
 use crate::data::features::{Features, Header};
-use crate::data::items::Items;
+use crate::data::items::{Composites, Items, Selection, Source};
+use crate::data::summaries::Summaries;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -83,7 +84,10 @@ impl Pretraining {
         let Some(features) = self.features(&networks, &footage, &digests, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
-        let items = Items::of(&footage.trajectories, footage.labels()?, self.preset.hold_out);
+        let selection = Selection::of(Composites::Whole);
+        let summaries = Summaries::default();
+        let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
+        let items = Items::of(&source, footage.labels()?, &selection, self.preset.hold_out)?;
         let Some(sentences) = self.embed(&items.texts, &mut report, stop)? else { return Ok(Trained::Stopped) };
         let material = Material { items: &items, features: &features, sentences: &sentences };
         let config = |steps: u64| self.config(&digest, footage.trajectories.len() as u64, steps);
