@@ -8,6 +8,7 @@ mod bar;
 mod collect;
 mod doctor;
 mod embed;
+mod encode;
 mod explore;
 mod eval;
 mod import;
@@ -45,6 +46,8 @@ enum Command {
     Collect(collect::Collect),
     /// Label a dataset's runs of skills, to learn from them
     Relabel(relabel::Relabel),
+    /// Draw and encode every frame of a dataset, ahead of a training
+    Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
     /// Re-run recorded demonstrations in the simulator
@@ -105,6 +108,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
         Command::Relabel(relabel) => relabel.run(),
+        Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),

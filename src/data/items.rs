@@ -300,7 +300,7 @@ mod tests {
         let three = [trajectory(vec![0, 2, 3], 5)];
         let concat = items(&three, Composites::Concat, 0, &[]);
         assert_eq!(edges(&concat), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 0, 5), (0, 2, 5)]);
-        assert_eq!(concat.texts[concat.training[3].text as usize], "Step 0. Step 1.");
+        assert_eq!(concat.texts[concat.training[3].text as usize], "Step 0. step 1.");
         assert_eq!(concat.training[5].skills, 1..3);
         let dropped = items(&three, Composites::Concat, 0, &["t".to_string()]);
         assert_eq!(edges(&dropped), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 2, 5)]);

@@ -91,8 +91,8 @@ impl Noun {
         Noun { modifiers: Vec::new(), head: class.spoken().to_string() }
     }
 
-    /// What a sentence calls a thing of that class: its longest name, with the words of looks before it. The first one counts, or
-    /// the last one for a place, as the place comes after what is put there.
+    /// What a sentence calls a thing of that class: its longest name, with the words of looks before it. The first one with an
+    /// article counts, or for a place the first one that something is put "in" or "on".
     pub fn find(class: Class, sentence: &str, is_place: bool) -> Option<Noun> {
         let words = words(sentence);
         let ends = |at: usize| words.get(at).is_none_or(|word| is_mark(word) || table().words.after.contains(word));
@@ -110,8 +110,11 @@ impl Noun {
                     Some((from, to)) if at <= from && to <= at + name.len() => name.len() > to - from,
                     Some((from, to)) if from <= at && at + name.len() <= to => false,
                     Some((from, _)) => {
-                        is_place && is_entered(&words, at) && (!is_entered(&words, from) || at < from)
-                            || !is_place && at < from
+                        let rank = |at: usize| {
+                            let led_in = if is_place { is_entered(&words, at) } else { is_determined(&words, at) };
+                            (!led_in, at)
+                        };
+                        rank(at) < rank(from)
                     }
                 };
                 if better {
@@ -188,6 +191,15 @@ fn is_entered(words: &[String], at: usize) -> bool {
     before.is_some_and(|word| ["in", "on", "into", "onto", "inside", "to", "within", "atop"].contains(&word.as_str()))
 }
 
+/// Whether an article or the like leads to the name: in "light the lamp", it leads to the lamp.
+fn is_determined(words: &[String], at: usize) -> bool {
+    let before = words[..at].iter().rev().find(|word| !table().words.modifiers.contains(*word));
+    let determiners = [
+        "the", "a", "an", "your", "another", "other", "second", "one", "two", "this", "that", "first", "clean", "dirty",
+    ];
+    before.is_some_and(|word| determiners.contains(&word.as_str()))
+}
+
 fn is_mark(word: &str) -> bool {
     !word.chars().all(|c| c.is_alphanumeric() || c == '\'' || c == '-')
 }
@@ -245,6 +257,7 @@ mod tests {
     fn of_two_tables_the_one_that_something_is_put_on_is_meant() {
         assert_eq!(found("SideTable", "Walk past the white table and put it on the black table.", true), "black table");
         assert_eq!(found("Bowl", "Put the bowl on the counter", false), "bowl");
+        assert_eq!(found("FloorLamp", "Light the floor lamp.", false), "floor lamp");
     }
 
     #[test]

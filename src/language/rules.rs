@@ -557,7 +557,7 @@ mod tests {
             roles.extend(["Apple", "Bread"].map(slice_role));
             let sentences = vec![told; subtasks.len()];
             let text = summary(&Passage { roles: &roles, subtasks: &subtasks, sentences: &sentences });
-            let last = subtasks[subtasks.len() - 1];
+            let last = &subtasks[subtasks.len() - 1];
             let class = roles[usize::from(last.receptacle.unwrap_or(last.object))].class;
             prop_assert!(text.split(' ').count() <= LONGEST && text.ends_with('.'), "{}", text);
             prop_assert!(text.matches('.').count() == 1, "{}", text);

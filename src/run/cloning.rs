@@ -42,9 +42,7 @@ impl Material<'_> {
         let mut bytes = Vec::new();
         let (mut actions, mut objects) = (Vec::new(), Vec::new());
         for item in items {
-            for frame in item.stack(history as u32) {
-                self.features.gather(frame, &mut bytes);
-            }
+            self.features.gather_all(item.stack(history as u32), &mut bytes)?;
             let label = self.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
@@ -177,7 +175,7 @@ mod tests {
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];
         maps.copy_data_u8(&mut bytes, maps.numel());
-        let mut writer = Writer::create(folder.path(), header.clone()).unwrap();
+        let mut writer = Writer::open(folder.path(), header.clone()).unwrap();
         writer.add(&bytes).unwrap();
         writer.finish().unwrap();
         Features::read(folder.path(), &header).unwrap().unwrap()

@@ -4,6 +4,7 @@ pub mod appraise;
 pub mod card;
 pub mod cloning;
 pub mod collect;
+pub mod encoding;
 pub mod episode;
 pub mod evaluate;
 pub mod folder;
