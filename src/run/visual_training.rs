@@ -134,6 +134,7 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
     Ok((Tensor::from_slice(&images.concat()).view([n, 3, side, side]), known))
 }
 
+/// Footage for tests.
 #[cfg(test)]
 pub mod testing {
     use super::*;
