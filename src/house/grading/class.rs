@@ -168,7 +168,7 @@ fn holds_changed(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verd
     let changed = match subtask.skill {
         SkillKind::Clean => object.clean,
         SkillKind::Heat => object.hot,
-        _ => object.cold && !a_fridge_is_open(step),
+        _ => object.cold && !(subtask.closes && a_fridge_is_open(step)),
     };
     if !changed {
         return Verdict::Unchanged;
