@@ -1,1 +1,6 @@
-//!
+//! Instructions: how they are read, and the grammar in which the program itself asks for things.
+
+pub mod grammar;
+pub mod instruction;
+pub mod phrases;
+pub mod summary;

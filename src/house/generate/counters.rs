@@ -153,7 +153,7 @@ fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: Build, site: Site, un
             body.push(here.cuboid([0, width], [height - SLAB, height], [0, depth + 20]));
         }
         let under = if unit == Unit::Sink { height - BASIN - 60 } else { height - SLAB };
-        body.extend(below(out, rng, here, unit, width, under, depth));
+        body.extend(below(out, rng, here, unit, width, under, build));
         appliance(out, rng, here, unit, width, height);
         if build.wall_cabinets > 0 && !matches!(unit, Unit::Stove | Unit::Corner) && rng.random_bool(0.75) {
             wall_cabinet(out, rng, here, width, build.wall_cabinets);
@@ -200,8 +200,9 @@ fn below(
     unit: Unit,
     width: i32,
     top: i32,
-    depth: i32,
+    build: Build,
 ) -> Vec<Cuboid> {
+    let Build { height, depth, .. } = build;
     let carcass = site.cuboid([0, width], [0, top], [0, depth - FRONT]);
     let inside = [10, width - 10];
     let all_drawers = matches!(unit, Unit::Plain | Unit::Coffee | Unit::Microwave) && rng.random_bool(0.3);
@@ -220,6 +221,10 @@ fn below(
             let door_top = if drawered { top - 170 } else { top };
             cabinet(out, site, inside, [KICK, door_top - 5], [0, depth]);
             let mut rest = vec![site.cuboid([0, width], [0, KICK], [0, depth - 40])];
+            if unit == Unit::Sink {
+                // A panel before the basin.
+                rest.push(site.cuboid([0, width], [top, height - SLAB], [depth - 50, depth - FRONT]));
+            }
             if drawered {
                 drawer(out, site, inside, [door_top + 5, top - 5], depth);
                 rest.push(site.cuboid([0, width], [door_top, top], [0, depth - FRONT]));

@@ -81,6 +81,11 @@ fn stays_on_floor(class: Class) -> bool {
     )
 }
 
+/// Things that only hang.
+pub fn hangs(class: Class) -> bool {
+    rooms().shapes.get(&class).is_some_and(|form| form.hangs)
+}
+
 /// How likely an object is to be in a receptacle of that class, next to the others that may hold it.
 fn weight(receptacle: Class, content: Class) -> u32 {
     let usual = match receptacle.name() {
@@ -110,6 +115,7 @@ fn in_receptacle(scene: &Scene, taken: &mut Vec<Taken>, object: Object, rng: &mu
         .iter()
         .enumerate()
         .filter(|(_, fixture)| fixture.class.holds(object.class) && !fixture.surfaces.is_empty())
+        .filter(|(_, fixture)| !hangs(object.class) || fixture.class.name().ends_with("Holder"))
         .map(|(index, fixture)| (index, weight(fixture.class, object.class)))
         .collect();
     let total: u32 = holders.iter().map(|(_, weight)| weight).sum();

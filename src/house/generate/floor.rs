@@ -59,11 +59,11 @@ impl Floor {
         let notch = rng.random_bool(plan.notch).then(|| {
             let cut = [pick(rng, [750, width / 3], Cell::SIDE), pick(rng, [750, depth / 3], Cell::SIDE)];
             let mut notch = Rect { min: bounds.min, max: bounds.max };
-            for axis in 0..2 {
+            for (axis, cut) in cut.into_iter().enumerate() {
                 if rng.random_bool(0.5) {
-                    notch.min[axis] = bounds.max[axis] - cut[axis];
+                    notch.min[axis] = bounds.max[axis] - cut;
                 } else {
-                    notch.max[axis] = bounds.min[axis] + cut[axis];
+                    notch.max[axis] = bounds.min[axis] + cut;
                 }
             }
             notch
@@ -87,8 +87,16 @@ impl Floor {
 
     /// The bodies of the walls.
     pub fn wall_bodies(&self) -> Vec<Cuboid> {
-        let body = |wall: &Wall| wall.site.cuboid([-100, wall.length + 100], [0, CEILING], [-100, 0]);
-        self.walls.iter().map(body).collect()
+        let count = self.walls.len();
+        let body = |(index, wall): (usize, &Wall)| {
+            // Round the corners of the room; a corner that points into it needs nothing.
+            let before = self.walls[(index + count - 1) % count].site.facing;
+            let after = self.walls[(index + 1) % count].site.facing;
+            let start = if before.left() == wall.site.facing { -100 } else { 0 };
+            let end = if wall.site.facing.left() == after { 100 } else { 0 };
+            wall.site.cuboid([start, wall.length + end], [0, CEILING], [-100, 0])
+        };
+        self.walls.iter().enumerate().map(body).collect()
     }
 
     /// The outline of the room without its notch.

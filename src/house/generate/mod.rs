@@ -1,6 +1,7 @@
 //! Generated houses: rooms with ALFRED's statistics, unlimited, the same for the same seed on every machine.
 
 mod builder;
+mod chain;
 mod counters;
 mod fill;
 mod floor;
@@ -8,6 +9,9 @@ mod furnish;
 mod pieces;
 mod rooms;
 mod site;
+mod tasks;
+
+pub use tasks::task;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

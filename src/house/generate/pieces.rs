@@ -116,7 +116,7 @@ fn tub(out: &mut Builder, site: Site, build: Build) {
 fn bin(out: &mut Builder, site: Site, build: Build) {
     let Build { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
-    let ground = surface(site.floor + 60, inset(site.rect([0, width], [0, depth]), 95));
+    let ground = surface(site.floor + 60, inset(site.rect([0, width], [0, depth]), 80));
     out.add("GarbageCan", site.point(width / 2, 0, depth / 2), site.facing, vec![body], vec![ground]);
 }
 

@@ -148,7 +148,9 @@ fn pieces(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Cuboid> {
             pieces = pieces
                 .into_iter()
                 .flat_map(|piece| {
-                    let cut = if other.class.info().openable { front } else { *hole };
+                    // A basin is open above, whatever its rim was measured to be.
+                    let basin = Cuboid { max: Point { y: hole.max.y.max(piece.max.y), ..hole.max }, ..*hole };
+                    let cut = if other.class.info().openable { front } else { basin };
                     if (open || hidden(&piece)) && meet(&piece, &cut) { without(piece, &cut) } else { vec![piece] }
                 })
                 .collect();
