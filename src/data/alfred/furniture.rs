@@ -78,7 +78,7 @@ const TABLE: &[Furniture] = &[
     row("Desk", Block, &[Floor(790)], [1320, 600], [1320, 790, 600], Floor(0), 0),
     row("DeskLamp", Thing, &[], [0, 0], [230, 420, 160], Pivot(0), 0),
     row("DiningTable", Block, &[Floor(787)], [1210, 720], [1210, 787, 720], Floor(0), 0),
-    row("Drawer", Shell, &[Pivot(-40)], [370, 190], [420, 180, 350], Pivot(-90), 150),
+    row("Drawer", Shell, &[Pivot(-40)], [400, 220], [500, 150, 420], Pivot(-85), 20),
     row("Dresser", Block, &[Floor(850)], [970, 470], [1000, 850, 480], Floor(0), 0),
     row("Faucet", Thing, &[], [0, 0], [200, 280, 80], Pivot(-140), 0),
     row("FloorLamp", Thing, &[], [0, 0], [430, 1540, 390], Floor(0), 0),

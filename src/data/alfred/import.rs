@@ -204,10 +204,19 @@ fn parse(file: &Source) -> Result<Parsed, String> {
     let text = std::fs::read(&file.path).map_err(|error| error.to_string())?;
     // The test splits publish no plan: further states of their scenes.
     if file.split.starts_with("tests") {
-        let data: SceneOnly = serde_json::from_slice(&text).map_err(|error| error.to_string())?;
+        let data: SceneOnly = read_fields(&text)?;
         return Ok(Parsed::Setting(Setting::new(&data.scene)?));
     }
     parse_recording(&text, &file.id, &file.split).map(|recording| Parsed::Recording(Box::new(recording)))
+}
+
+/// Reads JSON; what is wrong begins with the field.
+fn read_fields<T: serde::de::DeserializeOwned>(text: &[u8]) -> Result<T, String> {
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    serde_path_to_error::deserialize(&mut reader).map_err(|error| match error.path().to_string().as_str() {
+        "." => error.inner().to_string(),
+        field => format!("{field}: {}", error.inner()),
+    })
 }
 
 /// Reads and checks one `traj_data.json`.
@@ -215,7 +224,7 @@ fn parse(file: &Source) -> Result<Parsed, String> {
 /// # Errors
 /// What is wrong with it, naming the field.
 pub fn parse_recording(text: &[u8], id: &str, split: &str) -> Result<Recording, String> {
-    let data: TrajData = serde_json::from_slice(text).map_err(|error| error.to_string())?;
+    let data: TrajData = read_fields(text)?;
     Recording::new(id.to_owned(), split.to_owned(), data)
 }
 
