@@ -76,9 +76,12 @@ impl Dataset {
     /// When `dataset.json` is absent, malformed, or of another version.
     pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
         let path = folder.join("dataset.json");
-        let manifest: Manifest = read(&path, Manifest::FORMAT).with_context(|| {
-            format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
-        })?;
+        let read = json::read(&path, Manifest::FORMAT);
+        let manifest: Manifest = read
+            .with_context(|| {
+                format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
+            })?
+            .value;
         Ok(Dataset { folder: folder.to_owned(), manifest })
     }
 

@@ -257,6 +257,7 @@ mod tests {
                 steps: vec!["grab the cup".into(), "put the cup down".into()],
             }],
             boxes: Vec::new(),
+            choices: Vec::new(),
         };
         writer.trajectory(&trajectory).unwrap();
         let manifest = Manifest {

