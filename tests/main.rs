@@ -1,1 +1,12 @@
 //! One test binary: its modules are the scenarios.
+
+// Helpers of tests may fail loudly, and say on standard error why a test was skipped.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
+
+mod explore;
+mod eval;
+mod floors;
+mod command_line;
+mod generated;
+mod properties;
+mod scenarios;

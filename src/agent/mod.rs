@@ -1,5 +1,14 @@
 //! Agents: what decides the next action.
 
+pub mod checkpoint;
+pub mod expert;
+pub mod learned;
 pub mod policy;
+pub mod random;
+pub mod seeker;
+pub mod select;
 
+pub use expert::ExpertPolicy;
+pub use learned::LearnedPolicy;
 pub use policy::{Decision, Mind, Policy, Situation};
+pub use random::RandomPolicy;

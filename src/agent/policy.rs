@@ -10,6 +10,8 @@ pub struct Situation<'a> {
     pub house: &'a mut House,
     /// What is asked.
     pub instruction: &'a str,
+    /// How many steps the episode has taken; deciding twice at one step looks once.
+    pub step: u32,
     /// How far the task has come, where there is a task. Only the expert reads it.
     pub grader: Option<&'a Grader>,
 }

@@ -1,13 +1,12 @@
 //! `sprint doctor`: what was found on this machine, and the remedy for what was not.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use super::{Ending, logging, terminal};
+use super::{Ending, logging, policies};
 use crate::nets::{device, home, sentence};
 
 /// Prints what was found.
@@ -103,7 +102,7 @@ fn encoder() -> Finding {
 }
 
 fn graphics() -> Finding {
-    let (protocol, reason) = terminal::guess(|name| std::env::var(name).ok());
+    let (protocol, reason) = crate::tui::graphics::detect::guess(|name| std::env::var(name).ok());
     Finding::good("terminal", format!("{} ({reason})", protocol.name()))
 }
 
@@ -126,34 +125,12 @@ fn cache() -> Finding {
 }
 
 fn checkpoints() -> Finding {
-    let found: Vec<String> = checkpoint_folders()
-        .iter()
-        .filter_map(|folder| folder.read_dir().ok())
-        .flatten()
-        .filter_map(Result::ok)
-        .map(|entry| entry.path())
-        .filter(|path| path.join("config.json").is_file() && path.join("model.safetensors").is_file())
-        .map(|path| path.display().to_string())
-        .collect();
+    let found: Vec<String> = policies::checkpoints().iter().map(|path| path.display().to_string()).collect();
     if found.is_empty() {
         let remedy = "run in the repository's folder, or train one with `sprint collect` and `sprint pretrain`";
         return Finding::bad("checkpoints", "none in checkpoints/", remedy);
     }
     Finding::good("checkpoints", found.join(", "))
-}
-
-/// `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in.
-fn checkpoint_folders() -> Vec<PathBuf> {
-    let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
-    let near: Option<PathBuf> = program
-        .iter()
-        .flat_map(|path| path.ancestors().skip(1).take(3))
-        .map(|folder| folder.join("checkpoints"))
-        .find(|folder| folder.is_dir());
-    let here = Path::new("checkpoints").canonicalize().ok().filter(|folder| folder.is_dir());
-    let mut folders: Vec<PathBuf> = here.into_iter().chain(near).collect();
-    folders.dedup();
-    folders
 }
 
 fn log_file() -> Finding {

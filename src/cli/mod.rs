@@ -4,11 +4,20 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod bar;
+mod collect;
 mod doctor;
 mod embed;
+mod explore;
+mod eval;
+mod import;
 mod logging;
+mod policies;
+mod pretrain;
+mod replay;
 mod shell;
-mod terminal;
+mod stop;
+mod tasks;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
@@ -21,8 +30,22 @@ struct Cli {
 /// One variant a subcommand; each carries the arguments that its own file defines.
 #[derive(Subcommand)]
 enum Command {
+    /// Watch an agent in a house, and tell it what to do
+    Explore(explore::Explore),
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
+    /// Play a task set, and write a run folder with every episode and a summary
+    Eval(eval::Eval),
+    /// Sample, check and show task sets
+    Tasks(tasks::Tasks),
+    /// Make a dataset folder of ALFRED's published files
+    Import(import::Import),
+    /// Collect demonstrations in generated houses
+    Collect(collect::Collect),
+    /// Train an agent on a dataset
+    Pretrain(pretrain::Pretrain),
+    /// Re-run recorded demonstrations in the simulator
+    Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
     Embed(embed::Embed),
     /// Print a completion script for a shell
@@ -72,7 +95,14 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<Ending> {
     match command {
+        Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
+        Command::Eval(eval) => eval.run(),
+        Command::Tasks(tasks) => tasks.run(),
+        Command::Import(import) => import.run(),
+        Command::Collect(collect) => collect.run(),
+        Command::Pretrain(pretrain) => pretrain.run(),
+        Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),
         Command::Man => shell::man(),
@@ -83,6 +113,11 @@ fn run(command: Command) -> anyhow::Result<Ending> {
 fn reader_left(error: &anyhow::Error) -> bool {
     let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
     kind == Some(std::io::ErrorKind::BrokenPipe)
+}
+
+/// How many threads: what was asked for, or one a core.
+fn threads(asked: Option<u16>) -> usize {
+    asked.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
 }
 
 /// The one place that prints an error: its chain, outermost first.

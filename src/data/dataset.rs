@@ -5,11 +5,13 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context, bail, ensure};
-use serde::de::DeserializeOwned;
+use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
+use super::{json, taskset};
 use crate::domain::{Scene, TaskSet, Trajectory};
+use crate::house::validate;
 
 /// How much of a split there is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,9 +76,12 @@ impl Dataset {
     /// When `dataset.json` is absent, malformed, or of another version.
     pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
         let path = folder.join("dataset.json");
-        let manifest: Manifest = read(&path, Manifest::FORMAT).with_context(|| {
-            format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
-        })?;
+        let read = json::read(&path, Manifest::FORMAT);
+        let manifest: Manifest = read
+            .with_context(|| {
+                format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
+            })?
+            .value;
         Ok(Dataset { folder: folder.to_owned(), manifest })
     }
 
@@ -137,45 +142,39 @@ impl Dataset {
         }))
     }
 
+    /// Identifies the trajectories: the first 16 digits of the sha256 of their file.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn digest(&self) -> anyhow::Result<String> {
+        let path = self.folder.join("trajectories.jsonl.zst");
+        let mut file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
+        let mut hash = Sha256::new();
+        std::io::copy(&mut file, &mut hash).with_context(|| path.display().to_string())?;
+        Ok(format!("{:x}", hash.finalize())[..16].to_string())
+    }
+
     /// Reads a task set of the dataset, e.g. `eval_100`.
     ///
     /// # Errors
     /// When its file is absent, malformed, or of another version.
     pub fn tasks(&self, name: &str) -> anyhow::Result<TaskSet> {
-        read(&self.folder.join("tasks").join(format!("{name}.json")), TaskSet::FORMAT)
+        Ok(taskset::read(&self.folder.join("tasks").join(format!("{name}.json")))?.value)
     }
 }
 
 /// Reads the scene of that name from a folder of scene files.
 ///
 /// # Errors
-/// When its file is absent, malformed, of another version, or without cells.
+/// When its file is absent, malformed, of another version, or no scene that can be lived in.
 pub fn read_scene(folder: &Path, name: &str) -> anyhow::Result<Scene> {
     let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     ensure!(plain, "{name:?} is not the name of a scene");
     let path = folder.join(format!("{name}.json"));
-    let mut scene: Scene = read(&path, Scene::FORMAT)?;
-    ensure!(!scene.cells.is_empty(), "{}: cells: is empty; the agent has nowhere to stand", path.display());
-    scene.cells.sort_unstable();
-    scene.cells.dedup();
+    let scene: Scene = json::read(&path, Scene::FORMAT)?.value;
+    validate::scene(&scene).with_context(|| path.display().to_string())?;
+    ensure!(scene.name == name, "{}: name: {:?} is not the file's name", path.display(), scene.name);
     Ok(scene)
-}
-
-/// Reads a JSON file whose `format_version` must be `version`.
-///
-/// # Errors
-/// When it is absent, malformed, or of another version.
-pub fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<T> {
-    #[derive(Deserialize)]
-    struct Versioned {
-        format_version: u32,
-    }
-    let text = std::fs::read(path).with_context(|| path.display().to_string())?;
-    let found: Versioned = serde_json::from_slice(&text).with_context(|| path.display().to_string())?;
-    if found.format_version != version {
-        bail!("{}: format_version: {} was found, this program reads {version}", path.display(), found.format_version);
-    }
-    serde_json::from_slice(&text).with_context(|| path.display().to_string())
 }
 
 /// Writes a dataset folder. `dataset.json` comes last: a folder without it is not a dataset.
@@ -207,7 +206,7 @@ impl Writer {
     /// # Errors
     /// When the file cannot be written.
     pub fn scene(&self, scene: &Scene) -> anyhow::Result<()> {
-        write(&self.folder.join("scenes").join(format!("{}.json", scene.name)), scene)
+        json::write(&self.folder.join("scenes").join(format!("{}.json", scene.name)), scene)
     }
 
     /// Appends a trajectory.
@@ -225,7 +224,7 @@ impl Writer {
     /// # Errors
     /// When the file cannot be written.
     pub fn tasks(&self, file: &str, set: &TaskSet) -> anyhow::Result<()> {
-        write(&self.folder.join("tasks").join(format!("{file}.json")), set)
+        json::write(&self.folder.join("tasks").join(format!("{file}.json")), set)
     }
 
     /// Completes the dataset.
@@ -236,21 +235,8 @@ impl Writer {
         let path = self.folder.join("trajectories.jsonl.zst");
         let file = self.trajectories.finish()?;
         keep(file, &path)?;
-        write(&self.folder.join("dataset.json"), manifest)
+        json::write(&self.folder.join("dataset.json"), manifest)
     }
-}
-
-/// Writes a value as JSON to a file that appears complete or not at all.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
-    let mut text = serde_json::to_vec(value)?;
-    text.push(b'\n');
-    file.write_all(&text).with_context(|| path.display().to_string())?;
-    keep(file, path)
 }
 
 /// Gives a temporary file its name, readable as other files are.
@@ -312,11 +298,11 @@ mod tests {
     fn another_version_an_unknown_field_and_a_scene_without_cells_are_errors_that_name_file_and_field() {
         let folder = tempfile::tempdir().unwrap();
         let empty = Scene { cells: vec![], ..scene() };
-        write(&folder.path().join("hall.json"), &empty).unwrap();
+        json::write(&folder.path().join("hall.json"), &empty).unwrap();
         let text = |error: anyhow::Error| format!("{error:#}");
         let error = text(read_scene(folder.path(), "hall").unwrap_err());
         assert!(error.contains("hall.json") && error.contains("cells"), "{error}");
-        write(&folder.path().join("hall.json"), &Scene { format_version: 9, ..scene() }).unwrap();
+        json::write(&folder.path().join("hall.json"), &Scene { format_version: 9, ..scene() }).unwrap();
         let error = text(read_scene(folder.path(), "hall").unwrap_err());
         assert!(error.contains("hall.json") && error.contains("format_version") && error.contains('9'), "{error}");
         std::fs::write(folder.path().join("hall.json"), r#"{"format_version": 1, "colour": 3}"#).unwrap();

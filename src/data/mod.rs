@@ -1,6 +1,10 @@
-//! Data: dataset folders, and the importer that makes one of ALFRED's published files.
+//! Data: task files, dataset folders, the importer that makes one of ALFRED's published files, and what is derived for training.
 
 pub mod alfred;
 pub mod dataset;
+pub mod features;
+pub mod items;
+pub mod json;
+pub mod taskset;
 
 pub use dataset::Dataset;

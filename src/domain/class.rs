@@ -123,6 +123,25 @@ impl Class {
         matches!(self.name(), "Knife" | "ButterKnife")
     }
 
+    /// "in" or "on", as one says it of a receptacle.
+    pub fn preposition(self) -> &'static str {
+        let inside = matches!(
+            self.name(),
+            "Sink"
+                | "Bathtub"
+                | "Bowl"
+                | "Cup"
+                | "Mug"
+                | "Pot"
+                | "Pan"
+                | "GarbageCan"
+                | "Box"
+                | "Safe"
+                | "CoffeeMachine"
+        );
+        if inside || self.info().openable && self.info().receptacle { "in" } else { "on" }
+    }
+
     /// Whether `self` is a receptacle in which people keep `content`.
     pub fn holds(self, content: Class) -> bool {
         let wanted = &self.info().holds;

@@ -46,9 +46,17 @@ pub struct Trajectory {
     /// pixel edges of a 300 x 300 image; all zero where none was recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub boxes: Vec<[u16; 4]>,
+    /// Where actions were disturbed on purpose: what the expert would have done at each step. Empty when it did just that.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub choices: Vec<Action>,
 }
 
 impl Trajectory {
+    /// What a learner should do at a step.
+    pub fn choice(&self, step: usize) -> Option<Action> {
+        self.choices.get(step).or_else(|| self.actions.get(step)).copied()
+    }
+
     /// The actions of one skill, as a range of positions.
     pub fn skill_range(&self, skill: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.skill_starts.get(i).map_or(self.actions.len(), |&start| start as usize);

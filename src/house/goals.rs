@@ -55,3 +55,47 @@ fn movables(wanted: Option<Class>, world: &World) -> impl Iterator<Item = u16> {
     let carriers = (0u16..).zip(&world.objects).filter(move |(_, object)| names(wanted, object.class));
     carriers.filter(|(_, object)| object.class.info().receptacle).map(|(index, _)| index)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{kitchen, named};
+    use super::*;
+    use crate::domain::Parent;
+
+    fn goal(kind: GoalKind, object: &str, receptacle: &str) -> Goal {
+        let (object, receptacle) = (Class::named(object).unwrap(), Class::named(receptacle));
+        Goal { kind, object, sliced: false, receptacle, movable: None, lamp: None }
+    }
+
+    #[test]
+    fn a_goal_matches_by_part_of_a_name_and_through_what_carries_it() {
+        let (scene, world) = kitchen();
+        let simple =
+            |object, receptacle| goal_met(&goal(GoalKind::PickAndPlaceSimple, object, receptacle), &scene, &world);
+        assert!(simple("Knife", "Drawer"), "the butter knife is a knife");
+        assert!(simple("Spoon", "DiningTable"), "on a plate on the table");
+        assert!(!simple("Spoon", "Fridge"));
+    }
+
+    #[test]
+    fn two_things_must_be_in_the_same_receptacle() {
+        let (scene, mut world) = kitchen();
+        let two = goal(GoalKind::PickTwoObjAndPlace, "Mug", "DiningTable");
+        assert!(!goal_met(&two, &scene, &world));
+        let Instance::Object(second) = named(&scene, &world, "Mug2") else { panic!("no mug") };
+        world.objects[usize::from(second)].parent = Parent::In(named(&scene, &world, "DiningTable"));
+        assert!(goal_met(&two, &scene, &world));
+    }
+
+    #[test]
+    fn the_changed_thing_itself_must_be_in_place() {
+        let (scene, mut world) = kitchen();
+        let cool = goal(GoalKind::PickCoolThenPlaceInRecep, "Mug", "DiningTable");
+        let Instance::Object(second) = named(&scene, &world, "Mug2") else { panic!("no mug") };
+        world.objects[usize::from(second)].cold = true;
+        assert!(!goal_met(&cool, &scene, &world), "the cold mug is in the cabinet");
+        let Instance::Object(first) = named(&scene, &world, "Mug") else { panic!("no mug") };
+        world.objects[usize::from(first)].cold = true;
+        assert!(goal_met(&cool, &scene, &world));
+    }
+}

@@ -14,6 +14,7 @@ pub mod rules;
 pub mod session;
 #[cfg(test)]
 pub mod testing;
+pub mod validate;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};

@@ -2,7 +2,7 @@
 
 use crate::domain::place::Rect;
 use crate::domain::world::{Instance, Object, Parent, World};
-use crate::domain::{Point, Scene};
+use crate::domain::{Fixture, Point, Scene};
 
 /// The raster of points that are tried, in millimetres.
 const RASTER: i32 = 50;
@@ -30,9 +30,10 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 
 /// The pivot that `object` gets in `receptacle`, or `None` when there is no room. `object.turn` is already what it will be.
 ///
-/// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. Two passes: first a point
-/// where the whole outline is free and on the surface, then one where only the pivot is. In a movable receptacle: at its
-/// pivot, moved aside for each thing that already lies there.
+/// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. First a point where the whole
+/// outline is free and on the surface, then one where only the pivot is; where walls stand around, before both a free point
+/// away from them, where it can be seen. In a movable receptacle: at its pivot, moved aside for each thing that already lies
+/// there.
 pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
         Instance::Object(holder) => {
@@ -67,21 +68,63 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 }
             }
             points.sort_by_key(|&(level, distance, at)| (level, distance, at));
-            let fits = |level: usize, at: Point, whole: bool| {
+            let fits = |level: usize, at: Point, pass: Pass| {
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
                 let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
-                let clear = taken
-                    .iter()
-                    .filter(|(y, _)| same_level(*y))
-                    .all(|(_, other)| if whole { !overlap(&ground, other) } else { !other.contains(at.x, at.z) });
-                clear && (!whole || surface.areas.iter().any(|area| area.grown(RASTER).contains(at.x, at.z)))
+                let (x, z) = (at.x - shift.x, at.z - shift.z);
+                let on = |area: &Rect| match pass {
+                    Pass::Inside => away_from_walls(fixture, area).contains(x, z),
+                    Pass::Whole => area.grown(RASTER).contains(x, z),
+                    Pass::Pivot => true,
+                };
+                let free = |other: &Rect| match pass {
+                    Pass::Pivot => !other.contains(at.x, at.z),
+                    Pass::Inside | Pass::Whole => !overlap(&ground, other),
+                };
+                taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
+                    && surface.areas.iter().any(on)
             };
-            [true, false]
-                .into_iter()
-                .find_map(|whole| points.iter().find(|&&(level, _, at)| fits(level, at, whole)).map(|&(_, _, at)| at))
+            let passes = [Pass::Inside, Pass::Whole, Pass::Pivot].into_iter();
+            passes
+                .filter(|&pass| pass != Pass::Inside || has_walls(fixture))
+                .find_map(|pass| points.iter().find(|&&(level, _, at)| fits(level, at, pass)).map(|&(_, _, at)| at))
         }
     }
+}
+
+/// How hard a place is to please, hardest first.
+#[derive(Clone, Copy, PartialEq)]
+enum Pass {
+    /// Away from the walls, and all of the object free.
+    Inside,
+    /// All of the object free.
+    Whole,
+    /// Its pivot free.
+    Pivot,
+}
+
+/// Whether walls stand around what lies in it.
+fn has_walls(fixture: &Fixture) -> bool {
+    fixture.class.info().openable || is_tub(fixture)
+}
+
+fn is_tub(fixture: &Fixture) -> bool {
+    matches!(fixture.class.name(), "Sink" | "Bathtub")
+}
+
+/// The middle third of a surface; behind a door all of its depth.
+fn away_from_walls(fixture: &Fixture, area: &Rect) -> Rect {
+    let across_x = fixture.facing.step().0 == 0;
+    let mut middle = *area;
+    for (axis, across) in [(0, across_x), (1, !across_x)] {
+        if across || is_tub(fixture) {
+            let third = (area.max[axis] - area.min[axis]) / 3;
+            middle.min[axis] += third;
+            middle.max[axis] -= third;
+        }
+    }
+    middle
 }
 
 fn object_height(scene: &Scene, object: &Object) -> i32 {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Reason};
 use super::render::Renderer;
 use super::rules;
 use super::view::{self, Candidate, Frame, View};
-use crate::domain::{Action, Scene, World};
+use crate::domain::{Action, Instance, Scene, World};
 
 /// A scene with a world in it. Frames are drawn on demand: stepping without looking costs no drawing.
 pub struct House {
@@ -14,7 +14,8 @@ pub struct House {
     world: World,
     renderer: Renderer,
     view: Option<View>,
-    frame: Option<Frame>,
+    /// The renderer's frame shows the present state.
+    drawn: bool,
 }
 
 impl House {
@@ -23,7 +24,7 @@ impl House {
 
     /// A house in the given state.
     pub fn new(scene: Arc<Scene>, world: World) -> House {
-        House { scene, world, renderer: Renderer::new(House::FRAME), view: None, frame: None }
+        House { scene, world, renderer: Renderer::new(House::FRAME), view: None, drawn: false }
     }
 
     /// The floor plan.
@@ -46,10 +47,11 @@ impl House {
     pub fn step(&mut self, action: Action) -> Outcome {
         if let Some(target) = action.target
             && action.kind.is_interaction()
-            && let Err(reason) = rules::check(&self.scene, &self.world, action)
-                .and_then(|()| view::reachable(&self.scene.clone(), &self.world.clone(), self.view(), target))
         {
-            return Outcome::Impossible(reason);
+            let may = rules::check(&self.scene, &self.world, action);
+            if let Err(reason) = may.and_then(|()| self.reach(target)) {
+                return Outcome::Impossible(reason);
+            }
         }
         let outcome = rules::apply(&self.scene, &mut self.world, action);
         if outcome.is_done() {
@@ -60,27 +62,61 @@ impl House {
 
     /// What the agent sees, 300 x 300.
     pub fn frame(&mut self) -> &Frame {
-        let (renderer, scene, world) = (&mut self.renderer, &self.scene, &self.world);
-        self.frame.get_or_insert_with(|| renderer.draw(scene, world).clone())
+        if !self.drawn {
+            self.renderer.draw(&self.scene, &self.world);
+            self.drawn = true;
+        }
+        self.renderer.frame()
     }
 
     /// Which instances the frame shows.
     pub fn view(&mut self) -> &View {
-        if self.view.is_none() {
-            self.view = Some(View::of(self.frame()));
-        }
-        self.view.get_or_insert_default()
+        let (renderer, scene, world) = (&mut self.renderer, &self.scene, &self.world);
+        let drawn = self.drawn;
+        self.view.get_or_insert_with(|| match drawn {
+            true => View::of(renderer.frame()),
+            // Without the colours, which nobody has asked for yet.
+            false => renderer.look(scene, world),
+        })
     }
 
     /// Every interaction that is possible now, nearest first.
     pub fn candidates(&mut self) -> Vec<Candidate> {
         self.view();
-        let empty = View::default();
-        view::candidates(&self.scene, &self.world, self.view.as_ref().unwrap_or(&empty))
+        let nothing = View::default();
+        view::candidates(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing))
+    }
+
+    fn reach(&mut self, target: Instance) -> Result<(), Reason> {
+        self.view();
+        let nothing = View::default();
+        view::reachable(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing), target)
     }
 
     fn forget(&mut self) {
         self.view = None;
-        self.frame = None;
+        self.drawn = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::kitchen_house;
+    use super::*;
+    use crate::domain::Heading;
+
+    #[test]
+    fn looking_without_colours_sees_what_the_frame_shows() {
+        let mut house = kitchen_house();
+        let mut seen = 0;
+        for heading in Heading::ALL {
+            let mut world = house.world().clone();
+            world.agent.heading = heading;
+            house.restore(world);
+            let looked = house.view().clone();
+            seen += looked.sightings.len();
+            assert_eq!(View::of(house.frame()), looked);
+        }
+        assert!(seen > 0, "nothing was in view in any direction");
     }
 }

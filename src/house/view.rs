@@ -64,23 +64,32 @@ pub struct View {
 impl View {
     /// Reads a frame. Every pixel counts as one of a 300 x 300 frame, whatever the frame's size.
     pub fn of(frame: &Frame) -> View {
+        View::of_rows(frame.height, frame.ids.chunks_exact(frame.width).map(|row| row.iter().copied()))
+    }
+
+    /// Reads the rows of a square image of `size` rows, each pixel as in [`Frame::ids`].
+    pub fn of_rows<Row: Iterator<Item = u16>>(size: usize, rows: impl Iterator<Item = Row>) -> View {
         let mut found: std::collections::BTreeMap<u16, Sighting> = std::collections::BTreeMap::new();
-        for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
-            let mut x = 0;
-            while x < row.len() {
-                let id = row[x];
-                let run = row[x..].iter().take_while(|&&other| other == id).count();
-                if let Some(instance) = decode(id) {
-                    let (left, right, y) = (x as u16, (x + run - 1) as u16, y as u16);
-                    let seen = found.entry(id).or_insert(Sighting { instance, pixels: 0, bounds: [left, y, right, y] });
-                    seen.pixels += run as u32;
-                    let [l, t, r, b] = seen.bounds;
-                    seen.bounds = [l.min(left), t.min(y), r.max(right), b.max(y)];
+        for (y, row) in (0u16..).zip(rows) {
+            let mut add = |id: u16, left: u16, end: u16| {
+                let Some(instance) = decode(id) else { return };
+                let right = end - 1;
+                let seen = found.entry(id).or_insert(Sighting { instance, pixels: 0, bounds: [left, y, right, y] });
+                seen.pixels += u32::from(end - left);
+                let [l, t, r, b] = seen.bounds;
+                seen.bounds = [l.min(left), t.min(y), r.max(right), b.max(y)];
+            };
+            let (mut run, mut from, mut end) = (0, 0, 0);
+            for (x, id) in (0u16..).zip(row) {
+                if id != run {
+                    add(run, from, x);
+                    (run, from) = (id, x);
                 }
-                x += run;
+                end = x + 1;
             }
+            add(run, from, end);
         }
-        let scale = 90_000.0 / (frame.width * frame.height).max(1) as f32;
+        let scale = 90_000.0 / (size * size).max(1) as f32;
         let enough = |sighting: &Sighting| sighting.pixels as f32 * scale >= FEWEST_PIXELS as f32;
         View { sightings: found.into_values().filter(enough).collect() }
     }

@@ -7,7 +7,6 @@ use super::grammar::{Slots, grammar, with_article};
 use super::summary;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::{Class, Instance, Parent, Scene, World};
-use crate::house::grading::preposition;
 
 /// What is known of a task when it is put into words.
 #[derive(Clone, Copy, Debug)]
@@ -188,7 +187,7 @@ fn rule(skill: SkillKind) -> &'static str {
 /// "the counter" and what goes with it, for where a thing is.
 fn origin_slots(origin: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, String)> {
     let place = format!("the {}", grammar().name(origin, rng));
-    let at = preposition(origin);
+    let at = origin.preposition();
     let from = match (at, rng.random_bool(0.5)) {
         ("in", true) => "out of",
         ("on", true) => "off",
@@ -206,7 +205,7 @@ fn origin_slots(origin: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, Strin
 pub(super) fn destination_slots(class: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, String)> {
     let name = grammar().name(class, rng);
     let dest = if class.info().pickupable && rng.random_bool(0.3) { with_article(name) } else { format!("the {name}") };
-    let mut slots = vec![("to", format!("{} {dest}", preposition(class)))];
+    let mut slots = vec![("to", format!("{} {dest}", class.preposition()))];
     if class.info().openable && !class.info().pickupable {
         slots.push(("inside", dest.clone()));
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-use tch::Device;
+pub use tch::Device;
 
 /// The libtorch version that the bindings are written for.
 pub const LIBTORCH_VERSION: &str = "2.11.0";

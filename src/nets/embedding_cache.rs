@@ -50,7 +50,7 @@ impl EmbeddingCache {
     /// When the file cannot be made or read, or was written by another version of the format; it may be deleted.
     pub fn open(folder: &Path, encoder: &str, width: usize) -> anyhow::Result<EmbeddingCache> {
         std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-        let path = folder.join(format!("{}.embeddings", &encoder[..encoder.len().min(16)]));
+        let path = folder.join(format!("{}.embeddings", encoder.chars().take(16).collect::<String>()));
         let file = OpenOptions::new().read(true).append(true).create(true).open(&path);
         let file = file.with_context(|| format!("{} cannot be opened", path.display()))?;
         let mut cache = EmbeddingCache { path, file, header: 0, width, records: HashMap::new(), end: 0 };

@@ -4,15 +4,25 @@ use tch::{Kind, Tensor};
 
 use super::weights::{Form, Tensors};
 
-/// A fully connected layer's weights.
+/// A fully connected layer, its weight kept as `[inputs, outputs]`: for the few rows of a short sentence the product
+/// is a third faster than with the published `[outputs, inputs]`.
 pub(super) struct Dense {
     weight: Tensor,
     bias: Tensor,
 }
 
 impl Dense {
+    /// Joins published layers that read the same input into one.
+    fn join(parts: &[Dense]) -> Dense {
+        let weights: Vec<&Tensor> = parts.iter().map(|part| &part.weight).collect();
+        let biases: Vec<&Tensor> = parts.iter().map(|part| &part.bias).collect();
+        Dense { weight: Tensor::cat(&weights, 1), bias: Tensor::cat(&biases, 0) }
+    }
+
+    /// `[batch, tokens, outputs]` from `[batch, tokens, inputs]`.
     pub(super) fn forward(&self, input: &Tensor) -> Tensor {
-        input.linear(&self.weight, Some(&self.bias))
+        let (batch, tokens) = (input.size()[0], input.size()[1]);
+        self.bias.addmm(&input.reshape([batch * tokens, -1]), &self.weight).view([batch, tokens, -1])
     }
 }
 
@@ -42,7 +52,8 @@ impl Shelf<'_> {
     }
 
     pub(super) fn dense(&self, name: &str) -> anyhow::Result<Dense> {
-        Ok(Dense { weight: self.tensor(&format!("{name}.weight"))?, bias: self.tensor(&format!("{name}.bias"))? })
+        let weight = self.tensor(&format!("{name}.weight"))?.tr().contiguous();
+        Ok(Dense { weight, bias: self.tensor(&format!("{name}.bias"))? })
     }
 
     pub(super) fn norm(&self, name: &str) -> anyhow::Result<Norm> {
@@ -105,14 +116,9 @@ impl Stack {
     pub(super) fn take(shelf: &Shelf<'_>, names: &LayerNames, layers: i64, heads: i64) -> anyhow::Result<Stack> {
         let layers = (0..layers).map(|layer| {
             let at = |name: &str| format!("encoder.layer.{layer}.{name}");
-            let parts = [names.query, names.key, names.value].map(|name| shelf.dense(&at(name)));
-            let [query, key, value] = parts;
-            let (query, key, value) = (query?, key?, value?);
+            let [query, key, value] = [names.query, names.key, names.value].map(|name| shelf.dense(&at(name)));
             Ok(Layer {
-                query_key_value: Dense {
-                    weight: Tensor::cat(&[query.weight, key.weight, value.weight], 0),
-                    bias: Tensor::cat(&[query.bias, key.bias, value.bias], 0),
-                },
+                query_key_value: Dense::join(&[query?, key?, value?]),
                 attention_output: shelf.dense(&at(names.output))?,
                 attention_norm: shelf.norm(&at(names.attention_norm))?,
                 inner: shelf.dense(&at("intermediate.dense"))?,

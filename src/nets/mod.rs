@@ -1,4 +1,4 @@
-//! Networks: weights files, sentence encoders, and where they compute.
+//! Networks: weights files, sentence encoders, the visual encoder and the policy, and where they compute.
 
 pub mod device;
 pub mod home;
@@ -7,8 +7,16 @@ pub mod weights;
 pub mod embedding_cache;
 pub mod sentence;
 
+pub mod film;
+pub mod policy;
+pub mod shrink;
+pub mod sight_heads;
+pub mod visual;
+
 mod bert;
 mod encoder_stack;
 mod mpnet;
 mod pooling;
 mod transformer;
+#[cfg(test)]
+pub mod testing;

@@ -70,6 +70,7 @@ impl Rollout {
         policy.decide(&mut Situation {
             house: &mut self.house,
             instruction: &self.instruction,
+            step: self.steps,
             grader: self.grader.as_ref(),
         })
     }

@@ -1,62 +1,182 @@
-//! What furniture fills: boxes from its surfaces, from its pivot, and from what class of thing it is.
+//! What furniture fills: boxes from its surfaces, its pivot, how it was seen, and what class of thing it is.
 
+use super::fit::{Subject, within};
 use super::fixtures::Found;
-use super::furniture::{self, Build, Furniture};
-use super::support::ahead_of;
+use super::furniture::{self, Build, Furniture, Height};
+use super::support::{MARGIN, ahead_of};
 use crate::domain::place::{Cuboid, Rect};
-use crate::domain::scene::Surface;
-use crate::domain::{Heading, Point};
+use crate::domain::{Cell, Fixture, Heading, Point};
 
-/// How far a body reaches beyond the surface's own margin, in millimetres.
-const RIM: i32 = 30;
-/// Thickness of a shelf and of a sofa's back.
+/// Thickness of a shelf.
 const BOARD: i32 = 30;
+/// First guesses of a seat's back and arms.
 const BACK: i32 = 180;
+const ARM: i32 = 100;
+/// How high the arms rise above the seat, and how high a toilet's bowl is.
+const ARM_RISE: i32 = 180;
+const BOWL: i32 = 420;
+/// Walls of tubs and cupboards around their contents.
+const WALL: i32 = 30;
+/// A cupboard's contents need at least this height.
+const HEADROOM: i32 = 60;
 
-/// The boxes of a fixture's body.
-pub fn body(found: &Found, surfaces: &[Surface], facing: Heading, floor: i32) -> Vec<Cuboid> {
-    let row = furniture::of(found.name.class);
-    let own = own_box(found, row, facing, floor);
-    let Some(lowest) = surfaces.first() else { return vec![own] };
-    let highest = surfaces.iter().map(|surface| surface.height).fold(lowest.height, i32::max);
-    let over = |rect: &Rect, bottom: i32, top: i32| upright(*rect, bottom.min(top - 10), top);
-    match row.build {
-        Build::Block => {
-            let top = surfaces.last().unwrap_or(lowest);
-            let areas = top.areas.iter();
-            areas.map(|area| over(&area.grown(RIM), floor, highest)).collect()
-        }
-        Build::Seat => {
-            let mut parts: Vec<Cuboid> =
-                lowest.areas.iter().map(|area| over(&area.grown(RIM), floor, lowest.height)).collect();
-            parts.extend(lowest.areas.iter().map(|area| {
-                let back = behind(&area.grown(RIM), facing, BACK);
-                upright(back, floor, lowest.height + 350)
-            }));
-            parts
-        }
-        Build::Board => lowest.areas.iter().map(|area| over(area, lowest.height - BOARD, lowest.height)).collect(),
-        Build::Tub => {
-            let outline = outline(surfaces).grown(RIM);
-            let bottom = if matches!(row.bottom, furniture::Height::Floor(_)) { floor } else { lowest.height - 20 };
-            let top = (bottom + row.body[1]).max(lowest.height + 100);
-            vec![upright(outline, bottom, top)]
-        }
-        Build::Shell => {
-            let inside = outline(surfaces).grown(RIM);
-            let width = union(&inside, &own.footprint());
-            let bottom = own.min.y.min(lowest.height - 20);
-            vec![upright(width, bottom, own.max.y.max(highest + 250))]
-        }
-        Build::Thing => vec![own],
+/// Gives a fixture its body, and cuts the surfaces that lie inside it to fit. The fixture comes with surfaces and facing.
+pub fn furnish(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell]) {
+    let floor = agent_y - 900;
+    let row = furniture::of(fixture.class);
+    let first = first_guess(fixture, row, floor);
+    let areas = fixture.surfaces.first().map_or(0, |surface| surface.areas.len());
+    if row.build == Build::Block && areas > 1 {
+        // An outline of several parts: each goes down to the floor, and the contents tell more than any view.
+        let top = fixture.surfaces.last().map_or(first.max.y, |surface| surface.height);
+        let surfaces = fixture.surfaces.iter().flat_map(|surface| &surface.areas);
+        fixture.body = surfaces.map(|area| upright(*area, floor, top.max(floor + 10))).collect();
+        return;
+    }
+    let shape = fixture.clone();
+    let parts = |outer: Cuboid| parts(outer, &shape, row, floor);
+    let mut subject = Subject::new(fixture.clone(), row.build, &found.uses, agent_y, cells, &parts);
+    let high = first.min.y > floor + 1200;
+    if high {
+        subject.cells = &[];
+    }
+    let on_floor = matches!(row.bottom, Height::Floor(_));
+    let top_known = matches!(row.build, Build::Block | Build::Toilet);
+    subject.free = [true, !on_floor, true, true, !top_known, true];
+    subject.contents = contents(fixture, row);
+    let outer = subject.fit(first);
+    fixture.body = parts(outer);
+    if matches!(row.build, Build::Tub | Build::Shell | Build::Board) {
+        let inset = if row.build == Build::Board { 0 } else { WALL };
+        within(&mut fixture.surfaces, &outer, inset);
     }
 }
 
+/// The outer box before any view is looked at.
+fn first_guess(fixture: &Fixture, row: &Furniture, floor: i32) -> Cuboid {
+    let own = own_box(fixture.pivot, row, fixture.facing, floor);
+    let (Some(lowest), Some(highest)) = (fixture.surfaces.first(), fixture.surfaces.last()) else { return own };
+    let area = outline(fixture);
+    match row.build {
+        Build::Thing => own,
+        Build::Block => upright(area, floor, highest.height.max(floor + 20)),
+        Build::Toilet => {
+            let front = strip(&area, fixture.facing, 350);
+            upright(union(&area, &front), floor, highest.height.max(floor + 20))
+        }
+        Build::Seat => {
+            let [left, right] = [fixture.facing.left(), fixture.facing.right()].map(|side| strip(&area, side, ARM));
+            let back = strip(&area, fixture.facing.right().right(), BACK);
+            let all = union(&union(&area, &back), &union(&left, &right));
+            upright(all, floor, lowest.height.max(floor + 20) + row.body[1] / 2)
+        }
+        Build::Board => upright(area, lowest.height - BOARD, lowest.height),
+        Build::Tub => {
+            let outline = area.grown(WALL - MARGIN / 2);
+            let bottom = if matches!(row.bottom, Height::Floor(_)) { floor } else { lowest.height - 20 };
+            upright(outline, bottom, (bottom + row.body[1]).max(lowest.height + HEADROOM))
+        }
+        Build::Shell => {
+            let inside = area.grown(WALL - MARGIN / 2);
+            let bottom = own.min.y.min(lowest.height - 20);
+            upright(union(&inside, &own.footprint()), bottom, own.max.y.max(highest.height + HEADROOM))
+        }
+    }
+}
+
+/// What the outer box has to contain: where things stood, without the margin.
+fn contents(fixture: &Fixture, row: &Furniture) -> Option<Cuboid> {
+    let (lowest, highest) = (fixture.surfaces.first()?, fixture.surfaces.last()?);
+    let area = outline(fixture);
+    match row.build {
+        Build::Thing | Build::Board => None,
+        Build::Block | Build::Seat | Build::Toilet => {
+            let points = area.grown(-MARGIN);
+            let points = if points.min[0] <= points.max[0] && points.min[1] <= points.max[1] { points } else { area };
+            Some(upright(points, lowest.height, lowest.height))
+        }
+        Build::Tub | Build::Shell => {
+            // Neighbours may have been taken for contents: only the inner part has to be inside.
+            let inset = |axis: usize| (area.max[axis] - area.min[axis]) / 4;
+            let min = [area.min[0] + inset(0), area.min[1] + inset(1)];
+            let max = [area.max[0] - inset(0), area.max[1] - inset(1)];
+            Some(upright(Rect { min, max }, lowest.height, highest.height + HEADROOM))
+        }
+    }
+}
+
+/// The boxes that an outer box stands for.
+fn parts(outer: Cuboid, fixture: &Fixture, row: &Furniture, floor: i32) -> Vec<Cuboid> {
+    let Some(lowest) = fixture.surfaces.first() else { return vec![outer] };
+    let (all, area) = (outer.footprint(), outline(fixture));
+    match row.build {
+        Build::Seat => {
+            let seat = shrunk_behind(&all, &area, fixture.facing);
+            let top = lowest.height.max(floor + 10);
+            let mut parts = vec![upright(seat, floor, top)];
+            let back = remainder(&all, &seat, fixture.facing.right().right());
+            parts.extend(back.map(|back| upright(back, floor, outer.max.y.max(top))));
+            let arm_top = (top + ARM_RISE).min(outer.max.y.max(top));
+            for side in [fixture.facing.left(), fixture.facing.right()] {
+                parts.extend(remainder(&all, &seat, side).map(|arm| upright(arm, floor, arm_top)));
+            }
+            parts
+        }
+        Build::Toilet => {
+            let tank = area.grown(WALL - MARGIN / 2);
+            let bowl = remainder(&union(&all, &tank), &tank, fixture.facing);
+            let bowl = bowl.map(|bowl| upright(bowl, floor, floor + BOWL));
+            bowl.into_iter().chain([upright(tank, floor, lowest.height.max(floor + 10))]).collect()
+        }
+        _ => vec![outer],
+    }
+}
+
+/// The seat of an outer rectangle: what is left when back and arms are taken off where nothing lay.
+fn shrunk_behind(all: &Rect, area: &Rect, facing: Heading) -> Rect {
+    let mut seat = Rect {
+        min: [area.min[0].clamp(all.min[0], all.max[0]), area.min[1].clamp(all.min[1], all.max[1])],
+        max: [area.max[0].clamp(all.min[0], all.max[0]), area.max[1].clamp(all.min[1], all.max[1])],
+    };
+    // Nothing stands before the seat.
+    match facing {
+        Heading::North => seat.max[1] = all.max[1],
+        Heading::South => seat.min[1] = all.min[1],
+        Heading::East => seat.max[0] = all.max[0],
+        Heading::West => seat.min[0] = all.min[0],
+    }
+    seat
+}
+
+/// What of `all` lies beyond `part` on one side, as deep as it goes.
+fn remainder(all: &Rect, part: &Rect, side: Heading) -> Option<Rect> {
+    let mut rest = *all;
+    match side {
+        Heading::North => rest.min[1] = part.max[1],
+        Heading::South => rest.max[1] = part.min[1],
+        Heading::East => rest.min[0] = part.max[0],
+        Heading::West => rest.max[0] = part.min[0],
+    }
+    (0..2).all(|axis| rest.max[axis] - rest.min[axis] > 20).then_some(rest)
+}
+
+/// The strip of that depth beyond one side of a rectangle.
+fn strip(rect: &Rect, side: Heading, depth: i32) -> Rect {
+    let mut strip = *rect;
+    match side {
+        Heading::North => (strip.min[1], strip.max[1]) = (rect.max[1], rect.max[1] + depth),
+        Heading::South => (strip.min[1], strip.max[1]) = (rect.min[1] - depth, rect.min[1]),
+        Heading::East => (strip.min[0], strip.max[0]) = (rect.max[0], rect.max[0] + depth),
+        Heading::West => (strip.min[0], strip.max[0]) = (rect.min[0] - depth, rect.min[0]),
+    }
+    strip
+}
+
 /// The box that the class's own size gives.
-fn own_box(found: &Found, row: &Furniture, facing: Heading, floor: i32) -> Cuboid {
+fn own_box(pivot: Point, row: &Furniture, facing: Heading, floor: i32) -> Cuboid {
     let [width, height, depth] = row.body;
-    let footprint = ahead_of(found.pivot, facing, [width, depth], -row.behind);
-    let bottom = row.bottom.above(found.pivot.y, floor);
+    let footprint = ahead_of(pivot, facing, [width, depth], -row.behind);
+    let bottom = row.bottom.above(pivot.y, floor);
     upright(footprint, bottom, bottom + height)
 }
 
@@ -71,17 +191,8 @@ fn union(a: &Rect, b: &Rect) -> Rect {
     }
 }
 
-fn outline(surfaces: &[Surface]) -> Rect {
-    let areas = surfaces.iter().flat_map(|surface| &surface.areas);
+/// The rectangle around all surfaces.
+fn outline(fixture: &Fixture) -> Rect {
+    let areas = fixture.surfaces.iter().flat_map(|surface| &surface.areas);
     areas.copied().reduce(|a, b| union(&a, &b)).unwrap_or(Rect { min: [0, 0], max: [0, 0] })
-}
-
-/// The strip of that depth behind a rectangle.
-fn behind(rect: &Rect, facing: Heading, depth: i32) -> Rect {
-    match facing {
-        Heading::North => Rect { min: [rect.min[0], rect.min[1] - depth], max: [rect.max[0], rect.min[1]] },
-        Heading::South => Rect { min: [rect.min[0], rect.max[1]], max: [rect.max[0], rect.max[1] + depth] },
-        Heading::East => Rect { min: [rect.min[0] - depth, rect.min[1]], max: [rect.min[0], rect.max[1]] },
-        Heading::West => Rect { min: [rect.max[0], rect.min[1]], max: [rect.max[0] + depth, rect.max[1]] },
-    }
 }

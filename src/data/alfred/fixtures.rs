@@ -10,7 +10,8 @@ use crate::domain::{ActionType, Class, Point, SkillKind};
 
 /// Two mentions of one class nearer than this are the same thing, in millimetres.
 const SAME: f32 = 30.0;
-/// A basin lies up to this far from the sink whose place its id gives, in millimetres.
+/// A basin lies up to this far, seen from above, from the sink whose place its id gives, in millimetres. Some sinks have
+/// their place on the floor.
 const BASIN: f32 = 600.0;
 /// Ids are rounded to the centimetre on each axis; twice the rounding, in millimetres.
 pub const ROUNDING: f32 = 11.0;
@@ -85,9 +86,9 @@ impl Inventory {
                     }
                 };
                 if let Some((name, (_, point))) = placed {
-                    let near = if name.part == Part::Basin { BASIN } else { ROUNDING };
                     let entry = pivots.entry(name).or_default();
-                    if point.distance(name.at) <= near {
+                    let basin = name.part == Part::Basin && point.floor_distance(name.at) <= BASIN;
+                    if basin || point.distance(name.at) <= ROUNDING {
                         *entry = Some(point);
                     }
                 }
@@ -139,8 +140,9 @@ impl Inventory {
     fn add_loose(&mut self, class: Class, point: Point) {
         let near = |found: &Found| {
             if is_basin(class) {
-                let limit = if found.exact { SAME } else { BASIN };
-                is_basin(found.name.class) && found.name.part == Part::Basin && found.pivot.distance(point) < limit
+                let (pivot, basin) = (found.pivot, found.name.part == Part::Basin);
+                let unsure = !found.exact && pivot.floor_distance(point) < BASIN;
+                is_basin(found.name.class) && basin && (unsure || pivot.distance(point) < SAME)
             } else {
                 found.name.class == class && found.pivot.distance(point) < SAME
             }

@@ -18,6 +18,8 @@ pub enum Build {
     Block,
     /// A block with a back that rises behind it: sofas.
     Seat,
+    /// A bowl before a tank that things stand on.
+    Toilet,
     /// A thin board under the surface: shelves.
     Board,
     /// A tub open at the top, whose contents lie inside: sinks, garbage cans.
@@ -47,7 +49,7 @@ pub struct Furniture {
     pub behind: i32,
 }
 
-use Build::{Block, Board, Seat, Shell, Thing, Tub};
+use Build::{Block, Board, Seat, Shell, Thing, Toilet, Tub};
 use Height::{Floor, Pivot};
 
 const fn row(
@@ -98,7 +100,7 @@ const TABLE: &[Furniture] = &[
     row("Sofa", Seat, &[Floor(480)], [1330, 520], [1900, 850, 860], Floor(0), 0),
     row("StoveBurner", Thing, &[Pivot(10)], [100, 100], [210, 20, 210], Pivot(-10), 0),
     row("TVStand", Block, &[Floor(600)], [1000, 400], [1100, 600, 450], Floor(0), 0),
-    row("Toilet", Block, &[Floor(1050)], [480, 200], [480, 1050, 300], Floor(0), 0),
+    row("Toilet", Toilet, &[Floor(1050)], [480, 200], [480, 1050, 300], Floor(0), 0),
     row("ToiletPaperHanger", Thing, &[Pivot(0)], [60, 60], [160, 100, 100], Pivot(-50), 0),
     row("TowelHolder", Thing, &[Pivot(-600)], [100, 100], [500, 60, 80], Pivot(-30), 0),
 ];

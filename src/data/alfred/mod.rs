@@ -4,6 +4,7 @@ pub mod bodies;
 pub mod cover;
 pub mod facing;
 pub mod files;
+pub mod fit;
 pub mod fixtures;
 pub mod furniture;
 pub mod import;

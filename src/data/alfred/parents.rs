@@ -23,11 +23,11 @@ pub fn parents(
     let setting = &recording.setting;
     let mut parents: Vec<Option<Parent>> = vec![None; setting.objects.len()];
     for (object, holder) in recording.recorded_holders(inventory) {
-        let holder = match holder {
-            Holder::Fixture(number) => Instance::Fixture(number),
-            Holder::Object(number) => Instance::Object(number),
-        };
-        parents[usize::from(object)] = Some(Parent::In(holder));
+        parents[usize::from(object)] = Some(match holder {
+            Holder::None => Parent::Floor,
+            Holder::Fixture(number) => Parent::In(Instance::Fixture(number)),
+            Holder::Object(number) => Parent::In(Instance::Object(number)),
+        });
     }
     (0..parents.len())
         .map(|number| {

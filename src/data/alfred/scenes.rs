@@ -42,15 +42,17 @@ pub fn build(
         let found = &inventory.found[number];
         let facing = facing::facing(found, &cells);
         let surfaces = support::surfaces(&inventory, number as u16, &assigned, &cells, facing, floor);
-        Fixture {
+        let mut fixture = Fixture {
             id: found.name.text(),
             class: found.name.class,
             pivot: found.pivot,
             facing,
-            body: bodies::body(found, &surfaces, facing, floor),
+            body: Vec::new(),
             surfaces,
             stand: found.vetted.or_else(|| found.walked_to.first().copied()),
-        }
+        };
+        bodies::furnish(&mut fixture, found, agent_y, &cells);
+        fixture
     };
     let fixtures: Vec<Fixture> = (0..inventory.found.len()).map(fixture).collect();
     let walls = walls::around(&cells, &fixtures, floor);

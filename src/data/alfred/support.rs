@@ -13,7 +13,7 @@ const HEIGHT_WEIGHT: f32 = 4.0;
 /// A neighbour farther than this says nothing, in millimetres.
 const LIMIT: f32 = 500.0;
 /// Around the outermost contents.
-const MARGIN: i32 = 50;
+pub const MARGIN: i32 = 50;
 /// Half the side of the square around a cell's middle that no furniture fills.
 const WALKED: i32 = 150;
 /// Shelves of one receptacle are farther apart than this.
@@ -35,6 +35,8 @@ pub struct Standing {
 /// What is recorded to hold an object at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Holder {
+    /// None: it was taken from a receptacle that was shut, so it lies on or beside it.
+    None,
     /// A fixture.
     Fixture(u16),
     /// A movable object.
@@ -51,6 +53,7 @@ impl Recording {
     pub fn recorded_holders(&self, inventory: &Inventory) -> Vec<(u16, Holder)> {
         let mut moved = vec![false; self.setting.objects.len()];
         let mut holders = Vec::new();
+        let mut opened: Vec<u16> = Vec::new();
         let mut steps = self.steps.iter().peekable();
         for (number, skill) in self.skills.iter().enumerate() {
             if skill.kind == SkillKind::Pickup
@@ -58,7 +61,13 @@ impl Recording {
                 && !moved[usize::from(object)]
                 && let Some((class, place)) = skill.receptacle_at
             {
-                let fixture = inventory.at(class, place).map(Holder::Fixture);
+                let here = |step: &&super::recording::Step| step.skill == number && step.kind == ActionType::Open;
+                let opens = self.steps.iter().filter(here).filter_map(|step| inventory.number(step.target?));
+                opened.extend(opens);
+                let fixture = inventory.at(class, place).map(|fixture| match class.info().openable {
+                    true if !opened.contains(&fixture) => Holder::None,
+                    _ => Holder::Fixture(fixture),
+                });
                 let movable = || {
                     let holder = self.setting.object_at(class, place).filter(|&holder| !moved[usize::from(holder)]);
                     holder.map(Holder::Object)
@@ -66,6 +75,9 @@ impl Recording {
                 holders.extend(fixture.or_else(movable).map(|holder| (object, holder)));
             }
             while let Some(step) = steps.next_if(|step| step.skill == number) {
+                if step.kind == ActionType::Open {
+                    opened.extend(step.target.and_then(|name| inventory.number(name)));
+                }
                 if step.kind == ActionType::Pickup
                     && let Some(name) = step.target
                     && let Some(object) = self.object(name.whole(), None)

@@ -1,6 +1,7 @@
 //! The three official task sets, rebuilt from trajectories: which spans they are lies in an index of identifiers.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::Context;
@@ -150,26 +151,13 @@ pub fn build<'a>(
     })
 }
 
-/// Cuts a span out of a trajectory: the expert's actions before it are replayed, and what they handled stays bound.
+/// An official task: a span with the words that the index names.
 fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Result<Task, String> {
     let span = entry.first..entry.first.saturating_add(entry.skills);
-    let skills = trajectory
-        .skills
-        .get(span.clone())
-        .filter(|skills| !skills.is_empty())
-        .ok_or_else(|| format!("skills {span:?} do not exist; there are {}", trajectory.skills.len()))?;
+    let task = span_task(id, trajectory, scene, span.clone())?;
     let annotation = trajectory.annotations.get(entry.annotator);
     let annotation = annotation.ok_or_else(|| format!("annotator {} does not exist", entry.annotator))?;
-    let sentences = annotation.steps.get(span.clone()).map(<[String]>::to_vec).unwrap_or_default();
-    let from = trajectory.skill_range(span.start).start;
-    let until = trajectory.skill_range(span.end - 1).end;
-    let mut start = trajectory.start.clone();
-    for (number, &action) in trajectory.actions[..from].iter().enumerate() {
-        if let crate::house::Outcome::Impossible(reason) = rules::apply(scene, &mut start, action) {
-            return Err(format!("the expert's action {number} is not possible: {reason}"));
-        }
-    }
-    let (roles, subtasks) = roles(trajectory, span.clone(), &start);
+    let sentences = annotation.steps.get(span).map(<[String]>::to_vec).unwrap_or_default();
     let joined = || sentences.join(" ");
     let (instruction, reworded) = match &entry.wording {
         Wording::Goal => (annotation.goal.clone(), false),
@@ -180,26 +168,48 @@ fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Res
     if instruction.is_empty() {
         return Err(format!("annotator {} has no sentence for it", entry.annotator));
     }
-    debug_assert_eq!(skills.len(), subtasks.len());
+    Ok(Task { instruction, sentences, reworded, ..task })
+}
+
+/// Cuts a span out of a trajectory, without words yet: the expert's actions before it are replayed, and what they handled
+/// stays bound.
+///
+/// # Errors
+/// When there is no such span, or the actions before it are not possible.
+pub fn span_task(id: String, trajectory: &Trajectory, scene: &Scene, span: Range<usize>) -> Result<Task, String> {
+    if span.is_empty() || span.end > trajectory.skills.len() {
+        return Err(format!("skills {span:?} do not exist; there are {}", trajectory.skills.len()));
+    }
+    let from = trajectory.skill_range(span.start).start;
+    let until = trajectory.skill_range(span.end - 1).end;
+    let before = trajectory.actions.get(..from).filter(|_| from < until && until <= trajectory.actions.len());
+    let before = before.ok_or_else(|| format!("skill_starts: skills {span:?} are not a run of its actions"))?;
+    let mut start = trajectory.start.clone();
+    for (number, &action) in before.iter().enumerate() {
+        if let crate::house::Outcome::Impossible(reason) = rules::apply(scene, &mut start, action) {
+            return Err(format!("the expert's action {number} is not possible: {reason}"));
+        }
+    }
+    let (roles, subtasks) = roles(trajectory, span.clone(), &start)?;
     let expert_steps = (until - from) as u32;
     Ok(Task {
         id,
         scene: trajectory.scene.clone(),
         start: Some(start),
-        instruction,
-        sentences,
+        instruction: String::new(),
+        sentences: Vec::new(),
         roles,
         subtasks,
         expert_steps,
         horizon: 2 * expert_steps,
         goal: trajectory.goal.clone(),
         source: Some((trajectory.id.clone(), span.start as u8)),
-        reworded,
+        reworded: false,
     })
 }
 
 /// The roles that a span is about, renumbered; those that the skills before it handled carry what they are bound to.
-fn roles(trajectory: &Trajectory, span: std::ops::Range<usize>, start: &World) -> (Vec<Role>, Vec<Subtask>) {
+fn roles(trajectory: &Trajectory, span: Range<usize>, start: &World) -> Result<(Vec<Role>, Vec<Subtask>), String> {
     let used = |skill: &Subtask| std::iter::once(skill.object).chain(skill.receptacle);
     let before: Vec<u8> = trajectory.skills[..span.start].iter().flat_map(used).collect();
     let mut numbers: Vec<u8> = Vec::new();
@@ -216,11 +226,12 @@ fn roles(trajectory: &Trajectory, span: std::ops::Range<usize>, start: &World) -
         subtask.receptacle = subtask.receptacle.map(&mut renumber);
     }
     let role = |number: &u8| {
-        let role = trajectory.roles[usize::from(*number)].clone();
+        let role = trajectory.roles.get(usize::from(*number)).ok_or_else(|| format!("there is no role {number}"))?;
         let bound = role.expert.filter(|_| before.contains(number)).and_then(|expert| now(expert, start));
-        Role { bound, ..role }
+        Ok(Role { bound, ..role.clone() })
     };
-    (numbers.iter().map(role).collect(), subtasks)
+    let roles = numbers.iter().map(role).collect::<Result<_, String>>()?;
+    Ok((roles, subtasks))
 }
 
 /// The instance that an original is in a world.

@@ -64,6 +64,7 @@ pub fn resolve(
         goal: Some(recording.goal.clone()),
         annotations: recording.annotations.clone(),
         boxes,
+        choices: Vec::new(),
     })
 }
 

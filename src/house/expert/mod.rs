@@ -24,6 +24,9 @@ pub enum NoWay {
     /// There is nothing left to do.
     #[error("every subtask is done")]
     Finished,
+    /// The strict grader will not credit anything any more.
+    #[error("the whole goal is met: strict grading credits nothing more")]
+    CutShort,
     /// No thing would serve, or none would take what is held.
     #[error("there is no way to {subtask}: nothing here would serve for it")]
     Nothing {
@@ -45,6 +48,8 @@ pub struct Expert {
     plan: VecDeque<Action>,
     /// The world in which the next step of the plan is to be taken, and how far the task was.
     expected: Option<(World, usize)>,
+    /// The last choice.
+    last: Option<Action>,
 }
 
 impl Default for Expert {
@@ -56,7 +61,13 @@ impl Default for Expert {
 impl Expert {
     /// An expert without a plan.
     pub fn new() -> Expert {
-        Expert { scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None }
+        Expert { scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
+    }
+
+    /// Drops the plan: a new episode starts.
+    pub fn forget(&mut self) {
+        self.plan.clear();
+        self.expected = None;
     }
 
     /// The next action for the grader's current subtask.
@@ -77,7 +88,13 @@ impl Expert {
         let mut after = world.clone();
         rules::apply(&scene, &mut after, action);
         self.expected = Some((after, grader.completed()));
+        self.last = Some(action);
         Ok(action)
+    }
+
+    /// The interaction that the last choice was, or leads to.
+    pub fn aim(&self) -> Option<Action> {
+        self.plan.back().copied().or(self.last)
     }
 
     /// Turns to a scene; whether it is the one of the last step.

@@ -46,6 +46,9 @@ pub struct Intent {
 /// When nothing does.
 pub fn intent(scene: &Scene, world: &World, grader: &Grader) -> Result<Intent, NoWay> {
     let subtask = grader.subtask().ok_or(NoWay::Finished)?;
+    if grader.is_cut_short() {
+        return Err(NoWay::CutShort);
+    }
     let plan = Plan { scene, world, grader, subtask };
     let intent = if plan.awaits_close() { plan.close() } else { plan.skill() }?;
     Ok(intent)

@@ -1,6 +1,6 @@
 //! Where to stand for an interaction: a cheap look at the geometry first, then the frame that would be drawn there decides.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
 
@@ -37,6 +37,9 @@ pub struct Stand {
     pub score: f32,
 }
 
+/// From which cells an aim's target was found to be hidden: it then is, whichever way one looks.
+type Hidden = HashSet<(usize, usize)>;
+
 /// How a pose serves an aim.
 enum Sight {
     /// The target is the one that the action would choose by its class; with so many pixels.
@@ -54,6 +57,12 @@ pub struct Scout {
     renderer: Renderer,
     world: World,
     views: HashMap<Pose, View>,
+}
+
+impl Default for Scout {
+    fn default() -> Scout {
+        Scout::new()
+    }
 }
 
 impl Scout {
@@ -81,9 +90,7 @@ impl Scout {
         }
         let view = match self.views.entry(pose) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::hash_map::Entry::Vacant(entry) => {
-                entry.insert(View::of(self.renderer.draw(scene, world)))
-            }
+            std::collections::hash_map::Entry::Vacant(entry) => entry.insert(self.renderer.look(scene, world)),
         };
         let Some(sighting) = view.sighting(aim.target).copied() else { return Sight::Unseen };
         if view::reachable(scene, world, view, aim.target).is_err() {
@@ -115,32 +122,34 @@ impl Scout {
             propose(scene, &self.world, floor, paths, (index, aim), limit, &mut stands);
         }
         stands.sort_unstable_by(|a, b| a.score.total_cmp(&b.score).then_with(|| (a.aim, a.pose).cmp(&(b.aim, b.pose))));
-        if let Some(stand) = self.first_good(scene, aims, &stands, true) {
+        let mut hidden = Hidden::new();
+        if let Some(stand) = self.first_good(scene, aims, &stands, &mut hidden) {
             return Some(stand);
         }
         if limit.is_some() {
             return None;
         }
+        // Of furniture a corner may show where its middle is hidden.
+        hidden.retain(|&(aim, _)| matches!(aims[aim].target, Instance::Object(_)));
         // Nothing in the middle of a frame: every pose in whose frame any of the target would lie.
         let mut all = Vec::new();
         for (index, aim) in aims.iter().enumerate() {
             every_pose(scene, &self.world, floor, paths, (index, aim), &mut all);
         }
         all.sort_unstable_by(|a, b| a.score.total_cmp(&b.score).then_with(|| (a.aim, a.pose).cmp(&(b.aim, b.pose))));
-        if let Some(stand) = self.first_good(scene, aims, &all, false) {
+        if let Some(stand) = self.first_good(scene, aims, &all, &mut hidden) {
             return Some(stand);
         }
-        all.into_iter().find(|stand| matches!(self.sight(scene, stand.pose, &aims[stand.aim]), Sight::Rivalled))
+        let mut rest = all.into_iter().filter(|stand| !hidden.contains(&(stand.aim, stand.cell)));
+        rest.find(|stand| matches!(self.sight(scene, stand.pose, &aims[stand.aim]), Sight::Rivalled))
     }
 
     /// The first stand from which its target is well seen, or else the first from which it is seen at all.
-    fn first_good(&mut self, scene: &Scene, aims: &[Aim], stands: &[Stand], skip_hidden: bool) -> Option<Stand> {
+    fn first_good(&mut self, scene: &Scene, aims: &[Aim], stands: &[Stand], hidden: &mut Hidden) -> Option<Stand> {
         let mut poor: Option<(Stand, u32)> = None;
         let mut patience = PATIENCE;
-        // What is hidden from a cell is hidden from it whichever way one looks.
-        let mut hidden: Vec<(usize, usize)> = Vec::new();
         for &stand in stands {
-            if skip_hidden && hidden.contains(&(stand.aim, stand.cell)) {
+            if hidden.contains(&(stand.aim, stand.cell)) {
                 continue;
             }
             match self.sight(scene, stand.pose, &aims[stand.aim]) {
@@ -150,7 +159,9 @@ impl Scout {
                         poor = Some((stand, pixels));
                     }
                 }
-                Sight::Unseen => hidden.push((stand.aim, stand.cell)),
+                Sight::Unseen => {
+                    hidden.insert((stand.aim, stand.cell));
+                }
                 Sight::Rivalled | Sight::Forbidden => {}
             }
             if poor.is_some() {

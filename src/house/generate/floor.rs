@@ -59,11 +59,11 @@ impl Floor {
         let notch = rng.random_bool(plan.notch).then(|| {
             let cut = [pick(rng, [750, width / 3], Cell::SIDE), pick(rng, [750, depth / 3], Cell::SIDE)];
             let mut notch = Rect { min: bounds.min, max: bounds.max };
-            for axis in 0..2 {
+            for (axis, cut) in cut.into_iter().enumerate() {
                 if rng.random_bool(0.5) {
-                    notch.min[axis] = bounds.max[axis] - cut[axis];
+                    notch.min[axis] = bounds.max[axis] - cut;
                 } else {
-                    notch.max[axis] = bounds.min[axis] + cut[axis];
+                    notch.max[axis] = bounds.min[axis] + cut;
                 }
             }
             notch

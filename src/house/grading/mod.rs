@@ -13,7 +13,6 @@ use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Scene, World};
 
 pub use words::describe;
-pub(crate) use words::preposition;
 
 /// How subtasks are graded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -240,6 +239,11 @@ impl Grader {
         role.expert
     }
 
+    /// Strict: the whole goal was met before the last subtask was done; nothing more is credited.
+    pub fn is_cut_short(&self) -> bool {
+        self.finished && !self.is_done()
+    }
+
     /// Whether only the close is missing from the current subtask.
     pub fn is_half_done(&self) -> bool {
         self.pending.is_some()
@@ -253,5 +257,229 @@ impl Grader {
     /// What the current subtask still waits for, in words; empty when all are done.
     pub fn waits_for(&self, scene: &Scene, world: &World) -> String {
         words::waits_for(self, scene, world)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{closing, kitchen, named, put_subtask, role, slice_role, subtask};
+    use super::*;
+    use crate::domain::skill::{GoalKind, Literal, Original};
+    use crate::house::rules;
+    use ActionType::{Close, Open, Pickup, Put, Slice, ToggleOff, ToggleOn};
+
+    /// Acts by the rules alone (sight and reach do not matter to graders); after which steps a subtask was completed.
+    fn play(grader: &mut Grader, script: &[(ActionType, &str)]) -> Vec<usize> {
+        let (scene, mut world) = kitchen();
+        play_on(grader, &scene, &mut world, script)
+    }
+
+    fn play_on(grader: &mut Grader, scene: &Scene, world: &mut World, script: &[(ActionType, &str)]) -> Vec<usize> {
+        let mut completed = Vec::new();
+        for (step, &(kind, name)) in script.iter().enumerate() {
+            let target = match name.split_once('/') {
+                Some((whole, part)) => {
+                    let Instance::Object(whole) = named(scene, world, whole) else { panic!("{whole} has no slices") };
+                    let part = part.parse().unwrap();
+                    strict::resolve(world, Original { instance: Instance::Object(whole), slice: Some(part) }).unwrap()
+                }
+                None => named(scene, world, name),
+            };
+            let action = Action::interact(kind, target);
+            let outcome = rules::apply(scene, world, action);
+            assert!(outcome.is_done(), "step {step}, {kind} {name}: {outcome}");
+            if grader.observe(scene, world, action, outcome) {
+                completed.push(step);
+            }
+        }
+        completed
+    }
+
+    fn by_class(roles: &[Role], subtasks: &[Subtask]) -> Grader {
+        Grader::new(Grading::Class, roles, subtasks, None)
+    }
+
+    #[test]
+    fn a_pickup_out_of_a_fridge_is_complete_once_the_fridge_is_closed_while_it_is_held() {
+        let mut grader = by_class(&[role("Potato")], &[closing(subtask(SkillKind::Pickup, 0))]);
+        assert_eq!(play(&mut grader, &[(Open, "Fridge"), (Pickup, "Potato"), (Close, "Fridge")]), [2]);
+    }
+
+    #[test]
+    fn a_door_need_not_be_closed_where_the_agent_took_the_thing_from_a_table() {
+        let mut grader = by_class(&[role("Tomato")], &[closing(subtask(SkillKind::Pickup, 0))]);
+        assert_eq!(play(&mut grader, &[(Pickup, "Tomato")]), [0]);
+    }
+
+    #[test]
+    fn closing_another_door_does_not_complete_the_pickup() {
+        let mut grader = by_class(&[role("Potato")], &[closing(subtask(SkillKind::Pickup, 0))]);
+        let script = [(Open, "Safe"), (Open, "Fridge"), (Pickup, "Potato"), (Close, "Safe"), (Close, "Fridge")];
+        let script = script.map(|(kind, name)| (kind, if name == "Safe" { "Cabinet" } else { name }));
+        assert_eq!(play(&mut grader, &script), [4]);
+    }
+
+    #[test]
+    fn the_mug_that_the_agent_chose_is_the_one_that_counts_afterwards() {
+        let roles = [role("Mug"), role("SideTable")];
+        let subtasks = [subtask(SkillKind::Pickup, 0), put_subtask(0, 1)];
+        let mut grader = by_class(&roles, &subtasks);
+        let script = [
+            (Open, "Cabinet"),
+            (Pickup, "Mug2"),
+            (Put, "CounterTop"),
+            (Pickup, "Mug"),
+            (Put, "SideTable"),
+            (Pickup, "Mug2"),
+            (Put, "SideTable"),
+        ];
+        assert_eq!(play(&mut grader, &script), [1, 6]);
+        let (scene, world) = kitchen();
+        assert_eq!(grader.binding(0), Some(named(&scene, &world, "Mug2")));
+    }
+
+    #[test]
+    fn two_roles_of_a_class_need_two_things() {
+        let roles = [role("Mug"), role("SideTable"), role("Mug")];
+        let subtasks =
+            [subtask(SkillKind::Pickup, 0), put_subtask(0, 1), subtask(SkillKind::Pickup, 2), put_subtask(2, 1)];
+        let mut grader = by_class(&roles, &subtasks);
+        let script = [
+            (Pickup, "Mug"),
+            (Put, "SideTable"),
+            (Pickup, "Mug"),
+            (Put, "SideTable"),
+            (Open, "Cabinet"),
+            (Pickup, "Mug2"),
+            (Put, "SideTable"),
+        ];
+        assert_eq!(play(&mut grader, &script), [0, 1, 5, 6]);
+    }
+
+    #[test]
+    fn a_slice_must_be_of_the_apple_that_was_sliced_for_the_task() {
+        let roles = [role("Bread"), slice_role("Bread")];
+        let mut grader = by_class(&roles, &[subtask(SkillKind::Slice, 0), subtask(SkillKind::Pickup, 1)]);
+        let script = [(Pickup, "Knife"), (Slice, "Bread"), (Put, "CounterTop"), (Pickup, "Bread/3")];
+        assert_eq!(play(&mut grader, &script), [1, 3]);
+        let roles = [role("Apple"), slice_role("Apple")];
+        let mut grader = by_class(&roles, &[subtask(SkillKind::Slice, 0), subtask(SkillKind::Pickup, 1)]);
+        let script = [
+            (Pickup, "Knife"),
+            (Slice, "Apple2"),
+            (Open, "Fridge"),
+            (Slice, "Apple"),
+            (Put, "CounterTop"),
+            (Pickup, "Apple/1"),
+            (Put, "CounterTop"),
+            (Pickup, "Apple2/1"),
+        ];
+        assert_eq!(play(&mut grader, &script), [1, 7]);
+    }
+
+    #[test]
+    fn heating_is_complete_with_the_close_and_the_hot_thing_in_the_hand() {
+        let mut grader = by_class(&[role("Tomato")], &[subtask(SkillKind::Heat, 0)]);
+        let script = [
+            (Pickup, "Tomato"),
+            (Open, "Microwave"),
+            (Put, "Microwave"),
+            (Close, "Microwave"),
+            (ToggleOn, "Microwave"),
+            (ToggleOff, "Microwave"),
+            (Open, "Microwave"),
+            (Pickup, "Tomato"),
+            (Close, "Microwave"),
+        ];
+        assert_eq!(play(&mut grader, &script), [8]);
+    }
+
+    #[test]
+    fn rinsing_is_complete_with_the_clean_thing_back_in_the_hand() {
+        let mut grader = by_class(&[role("Mug")], &[subtask(SkillKind::Clean, 0)]);
+        let script = [
+            (Pickup, "Mug"),
+            (Put, "Sink"),
+            (Pickup, "Mug"),
+            (Put, "Sink"),
+            (ToggleOn, "Faucet"),
+            (ToggleOff, "Faucet"),
+            (Pickup, "Mug"),
+        ];
+        assert_eq!(play(&mut grader, &script), [6]);
+    }
+
+    #[test]
+    fn later_subtasks_are_not_looked_at_before_their_turn() {
+        let roles = [role("FloorLamp"), role("Mug")];
+        let subtasks = [subtask(SkillKind::Pickup, 1), subtask(SkillKind::Toggle, 0)];
+        let mut grader = by_class(&roles, &subtasks);
+        assert_eq!(play(&mut grader, &[(ToggleOn, "FloorLamp"), (Pickup, "Mug"), (Put, "SideTable")]), [1, 2]);
+    }
+
+    fn recorded(scene: &Scene, world: &World, subtask: Subtask, object: &str, last: Option<&str>) -> Subtask {
+        let original = |name: &str| Original { instance: named(scene, world, name), slice: None };
+        let literal =
+            Literal { needs_close: last.is_some(), object: original(object), last_target: last.map(original) };
+        Subtask { literal: Some(literal), ..subtask }
+    }
+
+    #[test]
+    fn strict_grading_wants_the_experts_own_mug() {
+        let (scene, world) = kitchen();
+        let wanted = recorded(&scene, &world, subtask(SkillKind::Pickup, 0), "Mug2", None);
+        let roles = [role("Mug")];
+        let script = [(Pickup, "Mug"), (Put, "SideTable"), (Open, "Cabinet"), (Pickup, "Mug2")];
+        let mut strict = Grader::new(Grading::Strict, &roles, std::slice::from_ref(&wanted), None);
+        assert_eq!(play(&mut strict, &script), [3]);
+        let mut class = Grader::new(Grading::Class, &roles, &[wanted], None);
+        assert_eq!(play(&mut class, &script), [0]);
+    }
+
+    #[test]
+    fn strict_grading_never_credits_the_close_after_a_put_that_meets_the_whole_goal() {
+        let (scene, world) = kitchen();
+        let expert = |name: &str| Some(Original { instance: named(&scene, &world, name), slice: None });
+        let roles =
+            [Role { expert: expert("Tomato"), ..role("Tomato") }, Role { expert: expert("Fridge"), ..role("Fridge") }];
+        let put = recorded(&scene, &world, closing(put_subtask(0, 1)), "Tomato", Some("Fridge"));
+        let goal = Goal {
+            kind: GoalKind::PickAndPlaceSimple,
+            object: roles[0].class,
+            sliced: false,
+            receptacle: Some(roles[1].class),
+            movable: None,
+            lamp: None,
+        };
+        let script = [(Pickup, "Tomato"), (Open, "Fridge"), (Put, "Fridge"), (Close, "Fridge")];
+        let mut strict = Grader::new(Grading::Strict, &roles, std::slice::from_ref(&put), Some(&goal));
+        assert!(play(&mut strict, &script).is_empty());
+        assert!(strict.waits_for(&scene, &world).contains("whole goal is met"));
+        let mut class = Grader::new(Grading::Class, &roles, &[put], Some(&goal));
+        assert_eq!(play(&mut class, &script), [3]);
+    }
+
+    #[test]
+    fn strict_grading_wants_a_close_after_the_pickup_even_where_the_expert_closed_before_it() {
+        let (scene, world) = kitchen();
+        let pickup = recorded(&scene, &world, subtask(SkillKind::Pickup, 0), "Laptop", Some("Laptop"));
+        let script = [(Close, "Laptop"), (Pickup, "Laptop")];
+        let mut strict = Grader::new(Grading::Strict, &[role("Laptop")], std::slice::from_ref(&pickup), None);
+        assert!(play(&mut strict, &script).is_empty());
+        let mut class = Grader::new(Grading::Class, &[role("Laptop")], &[pickup], None);
+        assert_eq!(play(&mut class, &script), [1]);
+    }
+
+    #[test]
+    fn a_grader_says_in_words_what_it_waits_for() {
+        let (scene, mut world) = kitchen();
+        let roles = [role("Tomato"), role("Fridge")];
+        let mut grader = by_class(&roles, &[closing(put_subtask(0, 1))]);
+        assert_eq!(describe(&roles, &grader.subtasks()[0]), "put the tomato in the fridge");
+        assert_eq!(grader.waits_for(&scene, &world), "waits for: the tomato in the fridge, then the fridge closed");
+        play_on(&mut grader, &scene, &mut world, &[(Pickup, "Tomato"), (Open, "Fridge"), (Put, "Fridge")]);
+        assert_eq!(grader.waits_for(&scene, &world), "waits for: the fridge closed");
+        play_on(&mut grader, &scene, &mut world, &[(Close, "Fridge")]);
+        assert_eq!(grader.waits_for(&scene, &world), "");
     }
 }

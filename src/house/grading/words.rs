@@ -3,7 +3,7 @@
 use super::{Grader, Grading};
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::world::Instance;
-use crate::domain::{Class, Scene, World};
+use crate::domain::{Scene, World};
 
 /// The role's thing in words: "the apple", "the slice of apple".
 fn thing(roles: &[Role], role: u8) -> String {
@@ -14,19 +14,10 @@ fn thing(roles: &[Role], role: u8) -> String {
     }
 }
 
-/// "in" or "on", as one says it of that receptacle.
-pub(crate) fn preposition(receptacle: Class) -> &'static str {
-    let inside = matches!(
-        receptacle.name(),
-        "Sink" | "Bathtub" | "Bowl" | "Cup" | "Mug" | "Pot" | "Pan" | "GarbageCan" | "Box" | "Safe" | "CoffeeMachine"
-    );
-    if inside || receptacle.info().openable && receptacle.info().receptacle { "in" } else { "on" }
-}
-
 /// "in the fridge", "on the dining table".
 fn place(roles: &[Role], role: Option<u8>) -> String {
     match role.and_then(|role| roles.get(usize::from(role))) {
-        Some(role) => format!("{} the {}", preposition(role.class), role.class),
+        Some(role) => format!("{} the {}", role.class.preposition(), role.class),
         None => "down".into(),
     }
 }

@@ -23,9 +23,19 @@ pub struct Figure {
     pub centre: Vec3,
     /// Its radius.
     pub radius: f32,
+    /// How high the bodies are together.
+    height: f32,
 }
 
 impl Figure {
+    /// How far it comes forward where it meets others. Measured heights of supports and of flat things are off by some
+    /// millimetres, which would bury a key in a table top.
+    pub fn forward(&self) -> f32 {
+        const FLAT: f32 = 0.06;
+        const FORWARD: f32 = 0.025;
+        if self.height < FLAT { FORWARD } else { 0.0 }
+    }
+
     fn of(solids: Vec<Solid>) -> Figure {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for solid in &solids {
@@ -37,7 +47,7 @@ impl Figure {
         if solids.is_empty() {
             return Figure::default();
         }
-        Figure { solids, centre: (low + high) / 2.0, radius: (high - low).length() / 2.0 }
+        Figure { solids, centre: (low + high) / 2.0, radius: (high - low).length() / 2.0, height: high.y - low.y }
     }
 }
 

@@ -22,6 +22,8 @@ pub struct Brush<'a> {
     /// Pixels per unit of slope, and the middle of the image.
     focal: f32,
     middle: f32,
+    /// How much nearer than it is an instance counts when surfaces are compared: a factor of its inverse depth.
+    forward: f32,
 }
 
 impl<'a> Brush<'a> {
@@ -29,7 +31,15 @@ impl<'a> Brush<'a> {
     pub fn new(raster: &'a mut Raster, camera: Camera) -> Brush<'a> {
         let middle = raster.size() as f32 / 2.0;
         let light = camera.turn() * Vec3::new(0.35, 0.8, -0.5).normalize();
-        Brush { light, up: camera.turn() * Vec3::Y, focal: middle / Camera::SLOPE, middle, raster, camera }
+        Brush {
+            light,
+            up: camera.turn() * Vec3::Y,
+            focal: middle / Camera::SLOPE,
+            middle,
+            raster,
+            camera,
+            forward: 1.0,
+        }
     }
 
     /// Whether a ball is partly in view.
@@ -39,6 +49,12 @@ impl<'a> Brush<'a> {
         let local = self.camera.local(centre);
         let side = |across: f32| across.abs() * COS - local.z * 0.5 < radius;
         local.z + radius > Camera::NEAR && side(local.x) && side(local.y)
+    }
+
+    /// From here on, bodies around `centre` come forward by so many metres where they meet others; their outlines stay.
+    pub fn bring_forward(&mut self, centre: Vec3, metres: f32) {
+        let depth = self.camera.local(centre).z.max(0.3);
+        self.forward = depth / (depth - metres);
     }
 
     /// Draws a body as part of instance `id`.
@@ -59,7 +75,7 @@ impl<'a> Brush<'a> {
 
     /// A lit colour. The normal is a unit vector of the camera's frame; `depth` in metres dims what is far.
     fn lit(&self, colour: Colour, normal: Vec3, depth: f32) -> u32 {
-        let shade = 0.62 + 0.3 * normal.dot(self.light) + 0.08 * normal.dot(self.up);
+        let shade = 0.80 + 0.20 * normal.dot(self.light) + 0.07 * normal.dot(self.up);
         pack(colour, shade * dimming(depth))
     }
 
@@ -81,7 +97,8 @@ impl<'a> Brush<'a> {
         let material = self.raster.material(material);
         // The plane n.p = d seen along the ray r is at inverse depth n.r / d.
         let (dx, dy) = (normal.x / (self.focal * distance), -normal.y / (self.focal * distance));
-        let plane = Plane { dx, dy, base: normal.z / distance - (dx + dy) * self.middle };
+        let base = normal.z / distance - (dx + dy) * self.middle;
+        let plane = Plane { dx: dx * self.forward, dy: dy * self.forward, base: base * self.forward };
         if !clipped {
             self.raster.polygon(pixels, &plane, material);
             return;
@@ -247,7 +264,8 @@ impl<'a> Brush<'a> {
             let number = self.raster.material(Material { rgb: pack(solid.colour, shade), id });
             darkest = if tone == 0 { number } else { darkest };
         }
-        let rays = (sphere(corner), sphere(right), sphere(down));
+        // Longer rays reach the body at larger inverse depths.
+        let rays = [corner, right, down].map(|ray| sphere(ray) * self.forward);
         self.raster.ellipsoid(rays, sphere(centre), edges, light, [darkest, TONES]);
     }
 }

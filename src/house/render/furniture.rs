@@ -17,9 +17,8 @@ const THIN: i32 = 2;
 
 /// Whether things may be built into it: it gives way to drawers, cabinets and basins.
 pub fn gives_way(fixture: &Fixture) -> bool {
-    !fixture.class.info().openable
-        && fixture.body.iter().any(|part| part.max.y - part.min.y >= SLAB)
-        && matches!(fixture.class.name(), "CounterTop" | "Desk" | "Dresser" | "SideTable" | "TVStand" | "DiningTable")
+    let solid = matches!(fixture.class.name(), "CounterTop" | "Dresser");
+    solid && fixture.body.iter().any(|part| part.max.y - part.min.y >= SLAB)
 }
 
 /// Whether it may be built into another.
@@ -37,15 +36,15 @@ pub fn build(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Solid> {
     let Some(look) = Look::of(fixture.class) else { return out };
     let surface = fixture.surfaces.first().map(|surface| Point::new(0, surface.height, 0).metres().y);
     let pieces = pieces(scene, index, states);
-    let whole = pieces.len() == 1;
+    let (uncut, whole) = (pieces == fixture.body, pieces.len() == 1);
     for (number, piece) in pieces.iter().enumerate() {
         let mut place = place(fixture.facing, piece, surface);
         place.centre += shift;
         let flat = piece.max.y - piece.min.y < SLAB;
         match (whole, Look::of_piece(fixture.class, number)) {
             _ if look.slab.is_some() => counter(look, &place, variant, flat, &mut out),
-            (true, _) => look.fill(&place, variant, &mut out),
-            (false, Some(part)) if pieces.len() == fixture.body.len() => part.fill(&place, variant, &mut out),
+            (false, Some(part)) if uncut => part.fill(&place, variant, &mut out),
+            _ if uncut && (whole || look.each) => look.fill(&place, variant, &mut out),
             _ => out.push(plain(&place, look.main(variant.seed), look.inner(variant.seed))),
         }
     }
@@ -149,7 +148,9 @@ fn pieces(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Cuboid> {
             pieces = pieces
                 .into_iter()
                 .flat_map(|piece| {
-                    let cut = if other.class.info().openable { front } else { *hole };
+                    // A basin is open above, whatever its rim was measured to be.
+                    let basin = Cuboid { max: Point { y: hole.max.y.max(piece.max.y), ..hole.max }, ..*hole };
+                    let cut = if other.class.info().openable { front } else { basin };
                     if (open || hidden(&piece)) && meet(&piece, &cut) { without(piece, &cut) } else { vec![piece] }
                 })
                 .collect();

@@ -35,6 +35,8 @@ enum Shape {
 struct Row {
     class: Class,
     piece: Option<usize>,
+    #[serde(default)]
+    each: bool,
     palette: Vec<String>,
     inner: Option<String>,
     flesh: Option<String>,
@@ -101,6 +103,8 @@ struct Part {
 pub struct Look {
     class: Class,
     piece: Option<usize>,
+    /// Every box of a body of several looks like this.
+    pub each: bool,
     palette: Vec<Colour>,
     inner: Option<Colour>,
     /// The colour inside, where it was cut.
@@ -180,10 +184,11 @@ fn part(row: PartRow) -> Option<Part> {
 
 fn look(row: Row) -> Option<Look> {
     let optional = |text: Option<String>| text.map(|text| hex(&text));
-    let Row { class, piece, palette, inner, flesh, slab, parts } = row;
+    let Row { class, piece, each, palette, inner, flesh, slab, parts } = row;
     Some(Look {
         class,
         piece,
+        each,
         palette: palette.iter().map(|text| hex(text)).collect::<Option<Vec<_>>>().filter(|all| !all.is_empty())?,
         inner: optional(inner).unwrap_or_default(),
         flesh: optional(flesh).unwrap_or_default(),

@@ -14,7 +14,7 @@ use draw::Brush;
 use raster::Raster;
 
 use super::camera::Camera;
-use super::view::{self, Frame};
+use super::view::{self, Frame, View};
 use crate::domain::world::{Instance, World};
 use crate::domain::{Point, Scene};
 
@@ -47,6 +47,21 @@ impl Renderer {
     /// Draws what the agent sees. What is shut in, sliced up or in the hand is not in the scene; the held object is shown
     /// small in the lower right corner, as no instance.
     pub fn draw(&mut self, scene: &Scene, world: &World) -> &Frame {
+        self.cover(scene, world);
+        resolve::resolve(&self.raster, &mut self.frame);
+        &self.frame
+    }
+
+    /// What would be seen in the drawn frame, without colouring it.
+    pub fn look(&mut self, scene: &Scene, world: &World) -> View {
+        self.cover(scene, world);
+        let (size, materials) = (self.raster.size(), self.raster.materials());
+        let row = |row: usize| self.raster.row(row).1[..size].iter().map(|&number| materials[usize::from(number)].id);
+        View::of_rows(size, (0..size).map(row))
+    }
+
+    /// Decides for every pixel what is in front.
+    fn cover(&mut self, scene: &Scene, world: &World) {
         let camera = Camera::of(scene, world.agent);
         let metres = |height: i32| Point::new(0, height, 0).metres().y;
         let ceiling = scene.walls.iter().map(|wall| wall.max.y).max().map(metres);
@@ -68,12 +83,11 @@ impl Renderer {
             }
         }
         if let Some(held) = world.held.and_then(|held| self.cast.things.get(usize::from(held))) {
+            brush.bring_forward(camera.eye(), 0.0);
             for (solid, (centre, axes)) in held.solids.iter().zip(objects::held(&held.solids, held.radius)) {
                 brush.local(solid, centre, axes, 0);
             }
         }
-        resolve::resolve(&self.raster, &mut self.frame);
-        &self.frame
     }
 }
 
@@ -84,6 +98,7 @@ impl Figure {
 
     fn draw(&self, brush: &mut Brush, id: u16) {
         if self.is_in_view(brush) {
+            brush.bring_forward(self.centre, self.forward());
             for solid in &self.solids {
                 brush.solid(solid, id);
             }

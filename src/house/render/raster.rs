@@ -152,9 +152,9 @@ impl Raster {
     }
 
     /// Fills an ellipsoid's outline. In the frame where it is the unit sphere, a ray through column x and row y is
-    /// `ray.0 + ray.1 x + ray.2 y` and its middle is `centre`; `bounds` are its left, top, right and bottom. The surface is
+    /// `ray[0] + ray[1] x + ray[2] y` and its middle is `centre`; `bounds` are its left, top, right and bottom. The surface is
     /// drawn in `tones.len()` tones from dark to light by its direction along `light`.
-    pub fn ellipsoid(&mut self, ray: (Vec3, Vec3, Vec3), centre: Vec3, bounds: [f32; 4], light: Vec3, tones: [u16; 2]) {
+    pub fn ellipsoid(&mut self, ray: [Vec3; 3], centre: Vec3, bounds: [f32; 4], light: Vec3, tones: [u16; 2]) {
         let outside = centre.length_squared() - 1.0;
         if outside <= 0.0 {
             return;
@@ -168,7 +168,7 @@ impl Raster {
         }
         let [darkest, count] = tones;
         for row in top..bottom {
-            let at_row = ray.0 + ray.2 * (row as f32 + 0.5) + ray.1 * 0.5;
+            let at_row = ray[0] + ray[2] * (row as f32 + 0.5) + ray[1] * 0.5;
             let blocks = row * self.stride / BLOCK + first / BLOCK..row * self.stride / BLOCK + (end - 1) / BLOCK + 1;
             let near = &mut self.near.as_chunks_mut::<BLOCK>().0[blocks.clone()];
             let shows = &mut self.shows.as_chunks_mut::<BLOCK>().0[blocks];
@@ -176,7 +176,7 @@ impl Raster {
             for (near, shows) in near.iter_mut().zip(shows) {
                 for lane in 0..BLOCK {
                     // |ray / w - centre| = 1 with w the inverse depth; the larger root is the nearer side.
-                    let through = at_row + ray.1 * (column + lane) as f32;
+                    let through = at_row + ray[1] * (column + lane) as f32;
                     let along = through.dot(centre);
                     let apart = along * along - outside * through.length_squared();
                     let w = (along + apart.max(0.0).sqrt()) / outside;

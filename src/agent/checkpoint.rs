@@ -1,0 +1,331 @@
+//! The checkpoint folder: `config.json`, `model.safetensors`, and a model card.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use tch::{Device, Tensor, nn};
+
+use crate::domain::{ActionType, Class};
+use crate::nets::policy::{PolicyNet, PolicySpec};
+use crate::nets::visual::{VisualEncoder, VisualSpec};
+use crate::nets::weights::{self, Form};
+
+/// The classes and actions that a policy's heads stand for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ontology {
+    /// The first 16 digits of the sha256 of the class names, a line each.
+    pub classes: String,
+    /// The actions by name, in the order of the action head.
+    pub actions: Vec<String>,
+}
+
+impl Ontology {
+    /// This program's own.
+    pub fn current() -> Ontology {
+        let names: Vec<&str> = (0..Class::VOCABULARY).filter_map(Class::from_index).map(Class::name).collect();
+        let digest = format!("{:x}", Sha256::digest(names.join("\n")));
+        Ontology {
+            classes: digest[..16].to_string(),
+            actions: ActionType::ALL.iter().map(|kind| kind.name().to_string()).collect(),
+        }
+    }
+}
+
+/// Which sentence encoder the policy was trained with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SentenceSpec {
+    /// The name of its folder.
+    pub name: String,
+    /// The digest of its weights.
+    pub digest: String,
+}
+
+/// Where a checkpoint comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The preset's name.
+    pub preset: String,
+    /// The digest of the trajectories it was trained on.
+    pub dataset: String,
+    /// How many trajectories those were.
+    pub trajectories: u64,
+    /// The seed of initialisation and data order.
+    pub seed: u64,
+    /// Steps of the visual encoder's training.
+    pub visual_steps: u64,
+    /// Steps of the policy's training.
+    pub policy_steps: u64,
+}
+
+/// A checkpoint's `config.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Version of this format.
+    pub format_version: u32,
+    /// What the heads stand for.
+    pub ontology: Ontology,
+    /// The visual encoder's size.
+    pub visual: VisualSpec,
+    /// The policy network's size.
+    pub policy: PolicySpec,
+    /// The sentence encoder.
+    pub sentence_encoder: SentenceSpec,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+impl Config {
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+
+    /// Reads a checkpoint's configuration.
+    ///
+    /// # Errors
+    /// When the file is missing or malformed, of another format version, or for other classes or actions.
+    pub fn read(folder: &Path) -> anyhow::Result<Config> {
+        let path = folder.join("config.json");
+        let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let value: serde_json::Value =
+            serde_json::from_str(&text).with_context(|| format!("{} is not JSON", path.display()))?;
+        let version = value.get("format_version").and_then(serde_json::Value::as_u64);
+        anyhow::ensure!(
+            version == Some(u64::from(Config::FORMAT)),
+            "{}: format_version is {}, this program reads {}",
+            path.display(),
+            version.map_or("missing".to_string(), |version| version.to_string()),
+            Config::FORMAT
+        );
+        let config: Config = serde_json::from_value(value)
+            .with_context(|| format!("{} is not a checkpoint's configuration", path.display()))?;
+        let own = Ontology::current();
+        anyhow::ensure!(
+            config.ontology.classes == own.classes,
+            "{}: ontology.classes is {}, this program's is {}",
+            path.display(),
+            config.ontology.classes,
+            own.classes
+        );
+        anyhow::ensure!(
+            config.ontology.actions == own.actions,
+            "{}: ontology.actions is {:?}, this program's is {:?}",
+            path.display(),
+            config.ontology.actions,
+            own.actions
+        );
+        config.check(&path)?;
+        Ok(config)
+    }
+
+    /// Sizes that no network can have are refused before anything is allocated for them.
+    fn check(&self, path: &Path) -> anyhow::Result<()> {
+        let sizes = [
+            ("visual.input", std::slice::from_ref(&self.visual.input), 1024),
+            ("visual.channels", &self.visual.channels[..], 4096),
+            ("policy.history", std::slice::from_ref(&self.policy.history), 64),
+            ("policy.embedding", std::slice::from_ref(&self.policy.embedding), 8192),
+            ("policy.channels", &self.policy.channels[..], 4096),
+            ("policy.hidden", &self.policy.hidden[..], 16384),
+        ];
+        for (field, values, most) in sizes {
+            for &value in values {
+                anyhow::ensure!(
+                    (1..=most).contains(&value),
+                    "{}: {field} is {value}, which is not between 1 and {most}",
+                    path.display()
+                );
+            }
+        }
+        anyhow::ensure!(
+            self.visual.input == 16 * crate::nets::visual::SIDE,
+            "{}: visual.input is {}, not {}",
+            path.display(),
+            self.visual.input,
+            16 * crate::nets::visual::SIDE
+        );
+        anyhow::ensure!(
+            (0.0..1.0).contains(&self.policy.dropout),
+            "{}: policy.dropout is {}, which is not a share",
+            path.display(),
+            self.policy.dropout
+        );
+        Ok(())
+    }
+}
+
+/// A policy's two networks with the stores that own their weights.
+#[derive(Debug)]
+pub struct Networks {
+    /// Sees.
+    pub visual: VisualEncoder,
+    /// The visual encoder's weights.
+    pub visual_store: nn::VarStore,
+    /// Decides.
+    pub policy: PolicyNet,
+    /// The policy's weights.
+    pub policy_store: nn::VarStore,
+}
+
+impl Networks {
+    /// Networks with fresh weights.
+    pub fn new(visual: &VisualSpec, policy: &PolicySpec, device: Device) -> Networks {
+        let (visual_store, policy_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
+        Networks {
+            visual: VisualEncoder::new(&visual_store.root(), visual),
+            policy: PolicyNet::new(&policy_store.root(), policy, visual.features()),
+            visual_store,
+            policy_store,
+        }
+    }
+
+    /// Every tensor by its name in `model.safetensors`.
+    pub fn tensors(&self) -> BTreeMap<String, Tensor> {
+        let named = |prefix: &'static str, store: &nn::VarStore| {
+            store.variables().into_iter().map(move |(name, tensor)| (format!("{prefix}.{name}"), tensor.detach()))
+        };
+        named("visual", &self.visual_store).chain(named("policy", &self.policy_store)).collect()
+    }
+
+    /// Loads a checkpoint's networks.
+    ///
+    /// # Errors
+    /// When `model.safetensors` cannot be read or differs from the configuration; every such tensor is named.
+    pub fn load(folder: &Path, config: &Config, device: Device) -> anyhow::Result<Networks> {
+        let path = folder.join("model.safetensors");
+        let tensors = weights::read(&path)?;
+        let networks = Networks::new(&config.visual, &config.policy, device);
+        let variables = networks.tensors();
+        let forms = variables.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
+        weights::check(&path, &tensors, &forms)?;
+        tch::no_grad(|| -> anyhow::Result<()> {
+            for (name, mut variable) in variables {
+                if let Some(tensor) = tensors.get(&name) {
+                    variable.f_copy_(tensor)?;
+                }
+            }
+            Ok(())
+        })?;
+        Ok(networks)
+    }
+
+    /// Writes a checkpoint: the weights first, the configuration last.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub fn save(&self, folder: &Path, config: &Config) -> anyhow::Result<()> {
+        std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+        weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
+        write_whole(&folder.join("config.json"), serde_json::to_string_pretty(config)?.as_bytes())
+    }
+}
+
+/// Writes a file whole or not at all.
+///
+/// # Errors
+/// When its folder cannot be written to.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let whole = || -> anyhow::Result<()> {
+        let mut temporary = tempfile::NamedTempFile::new_in(path.parent().unwrap_or(Path::new(".")))?;
+        std::io::Write::write_all(&mut temporary, bytes)?;
+        temporary.persist(path)?;
+        Ok(())
+    };
+    whole().with_context(|| format!("{} cannot be written", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn small() -> Config {
+        Config {
+            format_version: Config::FORMAT,
+            ontology: Ontology::current(),
+            visual: VisualSpec { input: 112, channels: [4, 4, 4, 4] },
+            policy: PolicySpec { history: 5, embedding: 8, channels: [4; 4], hidden: vec![8], dropout: 0.2 },
+            sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
+            provenance: Provenance {
+                preset: "test".into(),
+                dataset: "none".into(),
+                trajectories: 0,
+                seed: 1,
+                visual_steps: 0,
+                policy_steps: 0,
+            },
+        }
+    }
+
+    fn saved() -> (tempfile::TempDir, Config) {
+        let folder = tempfile::tempdir().unwrap();
+        let config = small();
+        let networks = Networks::new(&config.visual, &config.policy, Device::Cpu);
+        networks.save(folder.path(), &config).unwrap();
+        (folder, config)
+    }
+
+    fn edit(folder: &Path, change: impl Fn(&mut serde_json::Value)) -> String {
+        let path = folder.join("config.json");
+        let mut value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        change(&mut value);
+        std::fs::write(&path, value.to_string()).unwrap();
+        format!("{:#}", Config::read(folder).unwrap_err())
+    }
+
+    #[test]
+    fn a_saved_checkpoint_loads_with_equal_weights() {
+        let (folder, config) = saved();
+        let first = Networks::load(folder.path(), &Config::read(folder.path()).unwrap(), Device::Cpu).unwrap();
+        let again = tempfile::tempdir().unwrap();
+        first.save(again.path(), &config).unwrap();
+        let second = weights::read(&again.path().join("model.safetensors")).unwrap();
+        assert!(first.tensors().iter().all(|(name, tensor)| *tensor == second[name]));
+    }
+
+    #[test]
+    fn another_version_ontology_or_field_is_refused_by_name() {
+        let (folder, _) = saved();
+        let error = edit(folder.path(), |value| value["format_version"] = 7.into());
+        assert!(error.contains("format_version is 7") && error.contains("reads 1"), "{error}");
+        let error = edit(saved().0.path(), |value| value["ontology"]["classes"] = "abc".into());
+        assert!(error.contains("config.json") || error.contains("ontology"), "{error}");
+        let (folder, _) = saved();
+        let error = edit(folder.path(), |value| value["ontology"]["classes"] = "abc".into());
+        assert!(error.contains("ontology.classes is abc"), "{error}");
+        let (folder, _) = saved();
+        let error = edit(folder.path(), |value| value["colour"] = 7.into());
+        assert!(error.contains("colour"), "{error}");
+        let (folder, _) = saved();
+        let error = edit(folder.path(), |value| value["policy"]["hidden"] = vec![1u64 << 40].into());
+        assert!(error.contains("policy.hidden"), "{error}");
+    }
+
+    #[test]
+    fn missing_extra_and_misshapen_tensors_are_all_named() {
+        let (folder, config) = saved();
+        let path = folder.path().join("model.safetensors");
+        let mut tensors = weights::read(&path).unwrap();
+        tensors.remove("policy.actions.bias");
+        tensors.insert("surprise".into(), Tensor::from_slice(&[1.0f32]));
+        tensors.insert("policy.objects.bias".into(), Tensor::from_slice(&[1.0f32]));
+        weights::write(&path, &tensors, &BTreeMap::new()).unwrap();
+        let error = format!("{:#}", Networks::load(folder.path(), &config, Device::Cpu).unwrap_err());
+        for part in [
+            "model.safetensors",
+            "missing policy.actions.bias",
+            "unknown surprise",
+            "policy.objects.bias is Float[1]",
+            "Float[82]",
+        ] {
+            assert!(error.contains(part), "{error}");
+        }
+        std::fs::write(&path, b"nonsense").unwrap();
+        let error = format!("{:#}", Networks::load(folder.path(), &config, Device::Cpu).unwrap_err());
+        assert!(error.contains("model.safetensors"), "{error}");
+    }
+}

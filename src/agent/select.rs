@@ -1,0 +1,253 @@
+//! From the two heads to an action. The heads are two factors: an interaction is as likely as its action times its class.
+//! Pairs that are impossible now are masked and the rest renormalised, so an action whose only candidates are things that
+//! nobody asked for is as unlikely as they are. The instance is the nearest of its class.
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::policy::{Decision, Mind};
+use crate::domain::{Action, ActionType, Class};
+use crate::house::view::{Candidate, nearest};
+
+/// How an entry is taken from a distribution.
+pub enum Selection<'a> {
+    /// The likeliest.
+    Greedy,
+    /// By chance.
+    Sample(&'a mut ChaCha8Rng),
+}
+
+/// Decides from the logits of one situation: `actions` has 12 entries, `objects` 82. Of the navigation actions those in
+/// `blocked` are masked, unless that would leave none.
+pub fn decide(
+    actions: &[f32],
+    objects: &[f32],
+    candidates: &[Candidate],
+    blocked: &[ActionType],
+    selection: Selection<'_>,
+) -> Decision {
+    let all_blocked = ActionType::ALL.iter().all(|kind| kind.is_interaction() || blocked.contains(kind));
+    let possible = |kind: ActionType| match kind.is_interaction() {
+        true => candidates.iter().any(|c| c.kind == kind),
+        false => all_blocked || !blocked.contains(&kind),
+    };
+    let open: Vec<usize> = ActionType::ALL.into_iter().filter(|&kind| possible(kind)).map(ActionType::index).collect();
+    let shares = weigh(&softmax_over(actions, &open), &open, objects, candidates);
+    let likeliest = open[argmax(&shares)];
+    let greedy = complete(likeliest, objects, candidates, &mut Selection::Greedy);
+    let (action, shown) = match selection {
+        Selection::Greedy => (greedy, likeliest),
+        Selection::Sample(rng) => {
+            let drawn = open[draw(&shares, rng)];
+            (complete(drawn, objects, candidates, &mut Selection::Sample(rng)), drawn)
+        }
+    };
+    let mut probabilities = [None; ActionType::COUNT];
+    for (&index, &share) in open.iter().zip(&shares) {
+        probabilities[index] = Some(share);
+    }
+    let entropy = -shares.iter().filter(|&&p| p > 0.0).map(|p| p * p.ln()).sum::<f32>();
+    let mind =
+        Mind { actions: probabilities, objects: ranking(objects, candidates, shown, &open, &shares), entropy, greedy };
+    Decision { action, mind: Some(mind) }
+}
+
+/// Each possible action's share times that of its candidates among all classes, renormalised.
+fn weigh(shares: &[f32], open: &[usize], objects: &[f32], candidates: &[Candidate]) -> Vec<f32> {
+    let all: Vec<usize> = (1..objects.len().min(Class::VOCABULARY)).collect();
+    let classes = softmax_over(objects, &all);
+    let mass = |index: usize| {
+        let mut named = classes_of(ActionType::ALL[index], candidates);
+        named.retain(|class| (1..=classes.len()).contains(class));
+        named.into_iter().map(|class| classes[class - 1]).sum::<f32>()
+    };
+    let weight = |(&index, share): (&usize, &f32)| {
+        if ActionType::ALL[index].is_interaction() { share * mass(index) } else { *share }
+    };
+    let weights: Vec<f32> = open.iter().zip(shares).map(weight).collect();
+    let sum: f32 = weights.iter().sum();
+    match sum.is_finite() && sum > 0.0 {
+        true => weights.into_iter().map(|weight| weight / sum).collect(),
+        false => shares.to_vec(),
+    }
+}
+
+/// The classes that an action could name now, by index.
+fn classes_of(kind: ActionType, candidates: &[Candidate]) -> Vec<usize> {
+    let mut classes: Vec<usize> = candidates.iter().filter(|c| c.kind == kind).map(|c| c.class.index()).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    classes
+}
+
+/// How many object classes a mind lists.
+const LISTED: usize = 12;
+
+/// The likeliest classes before restriction, each with whether it is a candidate of the interaction at hand: the shown
+/// action, or the likeliest possible interaction when that is navigation.
+fn ranking(
+    objects: &[f32],
+    candidates: &[Candidate],
+    shown: usize,
+    open: &[usize],
+    shares: &[f32],
+) -> Vec<(Class, f32, bool)> {
+    let interaction = |index: usize| ActionType::from_index(index).filter(|kind| kind.is_interaction());
+    let likeliest = open.iter().zip(shares).filter(|(index, _)| interaction(**index).is_some());
+    let likeliest = likeliest.max_by(|a, b| a.1.total_cmp(b.1)).and_then(|(&index, _)| interaction(index));
+    let kind = interaction(shown).or(likeliest);
+    let classes: Vec<usize> = (1..objects.len().min(Class::VOCABULARY)).collect();
+    let shares = softmax_over(objects, &classes);
+    let mut ranked: Vec<(Class, f32, bool)> = classes
+        .iter()
+        .zip(shares)
+        .filter_map(|(&index, share)| {
+            let class = Class::from_index(index)?;
+            Some((class, share, kind.is_some_and(|kind| nearest(candidates, kind, class).is_some())))
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+    ranked.truncate(LISTED);
+    ranked
+}
+
+/// Adds the target to a kind of action.
+fn complete(index: usize, objects: &[f32], candidates: &[Candidate], selection: &mut Selection<'_>) -> Action {
+    let kind = ActionType::ALL[index];
+    let mut classes = classes_of(kind, candidates);
+    classes.retain(|&class| class < objects.len());
+    if !kind.is_interaction() || classes.is_empty() {
+        return Action::navigate(kind);
+    }
+    let shares = softmax_over(objects, &classes);
+    let chosen = match selection {
+        Selection::Greedy => argmax(&shares),
+        Selection::Sample(rng) => draw(&shares, rng),
+    };
+    let target = Class::from_index(classes[chosen]).and_then(|class| nearest(candidates, kind, class));
+    target.map_or_else(|| Action::navigate(kind), Candidate::action)
+}
+
+/// The softmax of some entries of `logits`; uniform when they underflow or are not numbers.
+fn softmax_over(logits: &[f32], entries: &[usize]) -> Vec<f32> {
+    let highest = entries.iter().map(|&i| logits[i]).fold(f32::NEG_INFINITY, f32::max);
+    let weights: Vec<f32> = entries.iter().map(|&i| (logits[i] - highest).exp()).collect();
+    let sum: f32 = weights.iter().sum();
+    if !sum.is_finite() || sum <= 0.0 {
+        return vec![1.0 / entries.len().max(1) as f32; entries.len()];
+    }
+    weights.into_iter().map(|weight| weight / sum).collect()
+}
+
+/// The first of the largest.
+fn argmax(shares: &[f32]) -> usize {
+    shares.iter().enumerate().fold(0, |best, (i, &share)| if share > shares[best] { i } else { best })
+}
+
+fn draw(shares: &[f32], rng: &mut ChaCha8Rng) -> usize {
+    let mut left: f32 = rng.random();
+    for (i, share) in shares.iter().enumerate() {
+        left -= share;
+        if left < 0.0 {
+            return i;
+        }
+    }
+    argmax(shares)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::domain::Instance;
+
+    fn candidate(kind: ActionType, class: &str, index: u16, distance: f32) -> Candidate {
+        Candidate { kind, instance: Instance::Object(index), class: Class::named(class).unwrap(), distance }
+    }
+
+    fn objects(favourite: &str) -> Vec<f32> {
+        let mut logits = vec![0.0; Class::VOCABULARY];
+        logits[Class::named(favourite).unwrap().index()] = 5.0;
+        logits
+    }
+
+    fn actions(favourite: ActionType) -> Vec<f32> {
+        let mut logits = vec![0.0; ActionType::COUNT];
+        logits[favourite.index()] = 12.0;
+        logits
+    }
+
+    #[test]
+    fn an_interaction_without_a_candidate_is_never_chosen() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let candidates = [candidate(ActionType::Pickup, "Mug", 0, 500.0)];
+        for favourite in ActionType::ALL {
+            for _ in 0..40 {
+                let decision =
+                    decide(&actions(favourite), &objects("Mug"), &candidates, &[], Selection::Sample(&mut rng));
+                let kind = decision.action.kind;
+                assert!(!kind.is_interaction() || kind == ActionType::Pickup);
+                let mind = decision.mind.unwrap();
+                assert!(mind.actions[ActionType::Slice.index()].is_none());
+                let sum: f32 = mind.actions.iter().flatten().sum();
+                assert!((sum - 1.0).abs() < 1e-5 && mind.entropy >= 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn the_class_is_restricted_to_the_candidates_and_the_nearest_instance_is_taken() {
+        let candidates = [
+            candidate(ActionType::Pickup, "Mug", 3, 400.0),
+            candidate(ActionType::Pickup, "Mug", 7, 900.0),
+            candidate(ActionType::Slice, "Apple", 1, 300.0),
+        ];
+        let decision = decide(&actions(ActionType::Pickup), &objects("Apple"), &candidates, &[], Selection::Greedy);
+        assert_eq!(decision.action, Action::interact(ActionType::Pickup, Instance::Object(3)));
+        let (likeliest, _, possible) = decision.mind.unwrap().objects[0];
+        assert_eq!((likeliest.name(), possible), ("Apple", false));
+    }
+
+    #[test]
+    fn an_action_is_unlikely_when_its_candidates_are() {
+        let candidates = [candidate(ActionType::Pickup, "Mug", 3, 400.0)];
+        let mut logits = vec![0.0; ActionType::COUNT];
+        logits[ActionType::Pickup.index()] = 2.0;
+        let choose = |wanted: &str| decide(&logits, &objects(wanted), &candidates, &[], Selection::Greedy).action.kind;
+        assert_eq!(choose("Mug"), ActionType::Pickup);
+        assert_eq!(choose("Apple"), ActionType::MoveAhead);
+    }
+
+    #[test]
+    fn what_led_nowhere_is_not_tried_again() {
+        let choose = |blocked: &[ActionType]| {
+            decide(&actions(ActionType::MoveAhead), &objects("Mug"), &[], blocked, Selection::Greedy).action.kind
+        };
+        assert_eq!(choose(&[]), ActionType::MoveAhead);
+        assert_eq!(choose(&[ActionType::MoveAhead]), ActionType::RotateLeft);
+        assert_eq!(choose(&ActionType::ALL), ActionType::MoveAhead);
+    }
+
+    #[test]
+    fn sampling_follows_the_probabilities_and_greedy_does_not_vary() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
+        (logits[0], logits[1]) = (0.0, 3f32.ln());
+        let mut turns = 0;
+        for _ in 0..2000 {
+            let decision = decide(&logits, &objects("Mug"), &[], &[], Selection::Sample(&mut rng));
+            turns += usize::from(decision.action.kind == ActionType::RotateLeft);
+            assert_eq!(decision.mind.unwrap().greedy.kind, ActionType::RotateLeft);
+        }
+        assert!((1400..1600).contains(&turns), "{turns}");
+    }
+
+    #[test]
+    fn all_probability_on_masked_actions_leaves_a_uniform_choice() {
+        let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
+        logits[ActionType::Slice.index()] = 0.0;
+        let mind = decide(&logits, &objects("Mug"), &[], &[], Selection::Greedy).mind.unwrap();
+        assert_eq!(mind.actions[0], Some(0.2));
+    }
+}

@@ -1,0 +1,165 @@
+//! AdamW (Loshchilov and Hutter, 2019) with moments that can be saved, so that a resumed training is the same training.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use tch::{Kind, Tensor, nn};
+
+/// The optimiser's settings besides the learning rate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdamWConfig {
+    /// Decay of the mean gradient.
+    pub beta1: f64,
+    /// Decay of the mean squared gradient.
+    pub beta2: f64,
+    /// Added to the root of the mean squared gradient.
+    pub epsilon: f64,
+    /// Decoupled weight decay; biases, norms and other vectors are spared.
+    pub weight_decay: f64,
+}
+
+struct Slot {
+    weight: Tensor,
+    mean: Tensor,
+    square: Tensor,
+}
+
+/// AdamW over every trainable tensor of a store.
+pub struct AdamW {
+    config: AdamWConfig,
+    slots: BTreeMap<String, Slot>,
+    steps: u64,
+}
+
+impl AdamW {
+    /// An optimiser at its start: no step taken, moments zero.
+    pub fn new(store: &nn::VarStore, config: AdamWConfig) -> AdamW {
+        let trainable = store.variables().into_iter().filter(|(_, tensor)| tensor.requires_grad());
+        let slot =
+            |weight: Tensor| Slot { mean: weight.zeros_like().detach(), square: weight.zeros_like().detach(), weight };
+        AdamW { config, slots: trainable.map(|(name, weight)| (name, slot(weight))).collect(), steps: 0 }
+    }
+
+    /// How many steps were taken.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Takes one step against the gradients of `loss`.
+    pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
+        for slot in self.slots.values_mut() {
+            slot.weight.zero_grad();
+        }
+        loss.backward();
+        self.steps += 1;
+        let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.config;
+        let steps = self.steps as f64;
+        let (rest1, rest2) = (1.0 - beta1.powf(steps), 1.0 - beta2.powf(steps));
+        tch::no_grad(|| {
+            for Slot { weight, mean, square } in self.slots.values_mut() {
+                let gradient = weight.grad();
+                if !gradient.defined() {
+                    continue;
+                }
+                if weight.dim() > 1 {
+                    *weight *= 1.0 - learning_rate * weight_decay;
+                }
+                *mean *= beta1;
+                *mean += &gradient * (1.0 - beta1);
+                *square *= beta2;
+                *square += gradient.square() * (1.0 - beta2);
+                *weight -= &*mean / ((&*square / rest2).sqrt() + epsilon) * (learning_rate / rest1);
+            }
+        });
+    }
+
+    /// Both moments of every tensor, as `mean.NAME` and `square.NAME`.
+    pub fn moments(&self) -> BTreeMap<String, Tensor> {
+        let both = |(name, slot): (&String, &Slot)| {
+            [
+                (format!("mean.{name}"), slot.mean.shallow_clone()),
+                (format!("square.{name}"), slot.square.shallow_clone()),
+            ]
+        };
+        self.slots.iter().flat_map(both).collect()
+    }
+
+    /// Puts back the moments and the count of steps of an earlier training.
+    ///
+    /// # Errors
+    /// When a moment is missing or has another shape; nothing is changed then.
+    pub fn restore(&mut self, steps: u64, moments: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
+        let find = |name: String, like: &Tensor| -> anyhow::Result<Tensor> {
+            let found = moments.get(&name).ok_or_else(|| anyhow::anyhow!("the moment {name} is missing"))?;
+            anyhow::ensure!(
+                found.size() == like.size(),
+                "the moment {name} has shape {:?}, not {:?}",
+                found.size(),
+                like.size()
+            );
+            Ok(found.to_device(like.device()).to_kind(Kind::Float).copy())
+        };
+        let mut found = BTreeMap::new();
+        for (name, slot) in &self.slots {
+            let pair = (find(format!("mean.{name}"), &slot.mean)?, find(format!("square.{name}"), &slot.square)?);
+            found.insert(name.clone(), pair);
+        }
+        for (name, (mean, square)) in found {
+            if let Some(slot) = self.slots.get_mut(&name) {
+                (slot.mean, slot.square) = (mean, square);
+            }
+        }
+        self.steps = steps;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::Device;
+
+    use super::*;
+
+    const CONFIG: AdamWConfig = AdamWConfig { beta1: 0.9, beta2: 0.99, epsilon: 1e-8, weight_decay: 0.5 };
+
+    #[test]
+    fn the_first_step_moves_by_the_learning_rate_and_decays_matrices_only() {
+        let store = nn::VarStore::new(Device::Cpu);
+        let matrix = store.root().ones("matrix", &[1, 1]);
+        let vector = store.root().ones("vector", &[1]);
+        let mut optimiser = AdamW::new(&store, CONFIG);
+        let loss = (&matrix * 3.0).sum(Kind::Float) + (&vector * 3.0).sum(Kind::Float);
+        optimiser.minimise(&loss, 0.1);
+        assert!((matrix.double_value(&[0, 0]) - (1.0 - 0.05 - 0.1)).abs() < 1e-6);
+        assert!((vector.double_value(&[0]) - 0.9).abs() < 1e-6);
+    }
+
+    #[test]
+    fn restored_moments_continue_to_the_bit() {
+        let run = |stop: Option<u64>| {
+            let store = nn::VarStore::new(Device::Cpu);
+            let w = store.root().ones("w", &[2, 2]);
+            let mut optimiser = AdamW::new(&store, CONFIG);
+            for step in 0..6u64 {
+                if stop == Some(step) {
+                    let moments = optimiser.moments();
+                    let mut other = AdamW::new(&store, CONFIG);
+                    other.restore(optimiser.steps(), &moments).unwrap();
+                    optimiser = other;
+                }
+                optimiser.minimise(&(w.square() * (step as f64 + 1.0)).sum(Kind::Float), 0.05);
+            }
+            Vec::<f32>::try_from(w.flatten(0, -1)).unwrap()
+        };
+        assert_eq!(run(None), run(Some(3)));
+    }
+
+    #[test]
+    fn a_missing_moment_is_named() {
+        let store = nn::VarStore::new(Device::Cpu);
+        let _ = store.root().ones("w", &[2]);
+        let error = AdamW::new(&store, CONFIG).restore(1, &BTreeMap::new()).unwrap_err();
+        assert!(error.to_string().contains("mean.w"));
+    }
+}

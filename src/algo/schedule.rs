@@ -1,0 +1,41 @@
+//! The learning rate over a training.
+
+use serde::{Deserialize, Serialize};
+
+/// A linear rise, then a straight fall.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Schedule {
+    /// The highest learning rate.
+    pub learning_rate: f64,
+    /// Steps over which it rises from zero.
+    pub warmup_steps: u64,
+    /// The share of it that is left at the last step.
+    pub final_share: f64,
+}
+
+impl Schedule {
+    /// The learning rate at `step` (from 0) of `steps`.
+    pub fn at(&self, step: u64, steps: u64) -> f64 {
+        if step < self.warmup_steps {
+            return self.learning_rate * (step + 1) as f64 / self.warmup_steps as f64;
+        }
+        let span = steps.saturating_sub(self.warmup_steps).max(1) as f64;
+        let done = ((step - self.warmup_steps) as f64 / span).min(1.0);
+        self.learning_rate * (1.0 + (self.final_share - 1.0) * done)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_rises_to_its_height_and_falls_to_its_share() {
+        let schedule = Schedule { learning_rate: 0.1, warmup_steps: 10, final_share: 0.2 };
+        assert!((schedule.at(0, 110) - 0.01).abs() < 1e-12);
+        assert!((schedule.at(9, 110) - 0.1).abs() < 1e-12);
+        assert!((schedule.at(60, 110) - 0.06).abs() < 1e-12);
+        assert!((schedule.at(110, 110) - 0.02).abs() < 1e-12);
+    }
+}

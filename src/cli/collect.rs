@@ -1,0 +1,88 @@
+//! `sprint collect`: demonstrations in generated houses.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use clap::{Args, ValueEnum};
+
+use super::Ending;
+use super::bar::Bars;
+use super::stop;
+use crate::nets::device::best_device;
+use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
+use crate::run::collect::Collection;
+
+/// Collects demonstrations.
+#[derive(Args)]
+pub struct Collect {
+    /// The dataset folder to write
+    out: PathBuf,
+    /// Where to collect
+    #[arg(long, default_value = "generated")]
+    scenes: Scenes,
+    /// How many demonstrations
+    #[arg(long, default_value_t = 1000)]
+    episodes: usize,
+    /// Drives houses, tasks, words and chance
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Task lengths, drawn uniformly; a length may be listed more than once
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 1, 1, 2])]
+    lengths: Vec<usize>,
+    /// The share of steps at which chance takes over for up to four steps
+    #[arg(long, default_value_t = 0.08)]
+    noise: f64,
+    /// Phrasings of each demonstration
+    #[arg(long, default_value_t = 4)]
+    annotations: usize,
+    /// A checkpoint that acts, while the demonstrator only says what it would do
+    #[arg(long, value_name = "DIR")]
+    learner: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Scenes {
+    /// Generated houses
+    Generated,
+}
+
+impl Collect {
+    /// Collects.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let Scenes::Generated = self.scenes;
+        anyhow::ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
+        let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
+        anyhow::ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
+        let learner = match self.learner {
+            Some(folder) => {
+                let embedder = Embedder::open(&default_folder(), best_device())?;
+                Some((folder, Arc::new(Mutex::new(embedder))))
+            }
+            None => None,
+        };
+        let collection = Collection {
+            out: self.out,
+            episodes: self.episodes,
+            seed: self.seed,
+            lengths: self.lengths,
+            noise: self.noise,
+            annotations: self.annotations,
+            learner,
+        };
+        let stop = stop::on_signals()?;
+        let mut bars = Bars::new();
+        let collected = collection.run(&mut bars, &stop)?;
+        bars.end();
+        let Some(count) = collected else {
+            eprintln!("stopped; nothing was kept");
+            return Ok(Ending::Interrupted);
+        };
+        eprintln!("{count} demonstrations in {}", collection.out.display());
+        Ok(Ending::Ok)
+    }
+}

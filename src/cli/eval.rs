@@ -1,0 +1,157 @@
+//! `sprint eval`: plays a task set and writes the run folder.
+
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::Context;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::Ending;
+use super::policies::PolicyChoice;
+use crate::data::taskset;
+use crate::house::grading::Grading;
+use crate::run::evaluate::{Evaluation, Options, Progress};
+use crate::run::folder::{self, RunFolder};
+use crate::run::scenes::Scenes;
+use crate::run::threshold::Threshold;
+
+/// Plays a task set and writes a run folder.
+#[derive(Args)]
+pub struct Eval {
+    /// The task file
+    #[arg(long, value_name = "FILE")]
+    tasks: PathBuf,
+    #[command(flatten)]
+    policy: PolicyChoice,
+    /// The run folder to write; one that the same run began is continued [default: runs/NAME-TIME]
+    #[arg(long, value_name = "RUN")]
+    out: Option<PathBuf>,
+    /// Threads; the result does not depend on their number [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// How often each task is played, with the seeds 0, 1, ...
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    seeds: u64,
+    /// Only the first N tasks
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
+    /// Print the summary as one JSON object, on the last line
+    #[arg(long)]
+    json: bool,
+    /// Tell the agent all steps instead of the task's instruction
+    #[arg(long)]
+    step_by_step: bool,
+    /// How subtasks are graded: class, or strict as the released code does
+    #[arg(long, value_name = "class|strict", default_value_t = Grading::Class)]
+    grader: Grading,
+    /// Exit with 2 when a figure falls short, for example success=0.8 or progress_by_length.3=0.5; may be repeated
+    #[arg(long, value_name = "METRIC=X")]
+    fail_below: Vec<Threshold>,
+}
+
+impl Eval {
+    /// Evaluates.
+    ///
+    /// # Errors
+    /// When the tasks, the policy or the folder cannot be used. An episode's own errors are counted instead.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let set = taskset::read(&self.tasks)?;
+        let scenes = Scenes::of(&self.tasks, &set.value);
+        let chosen = self.policy.open()?;
+        let options = Options {
+            grading: self.grader,
+            seeds: self.seeds,
+            limit: self.limit.map(|limit| limit as usize),
+            jobs: super::threads(self.jobs),
+            step_by_step: self.step_by_step,
+        };
+        let name = self.tasks.display();
+        let evaluation = Evaluation::prepare(&set, scenes, options, &chosen.name, chosen.checkpoint_hash)
+            .with_context(|| format!("{name}"))?;
+        let path = self.out.clone().unwrap_or_else(|| {
+            let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+            folder::default_path(&format!("{}-{}", set.value.name, chosen.name), now.as_secs())
+        });
+        let mut run = RunFolder::open(&path, evaluation.manifest())?;
+        let stop = super::stop::on_signals()?;
+        let mut meter = Meter::new();
+        let summary =
+            crate::run::evaluate(&evaluation, &*chosen.make, &mut run, &stop, &mut |progress| meter.show(progress))?;
+        meter.finish();
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        } else {
+            writeln!(out, "{}", summary.markdown())?;
+        }
+        out.flush()?;
+        say(&format!("wrote {}", path.display()));
+        if summary.partial {
+            say("interrupted: the summary is partial; the same command with this folder as --out continues it");
+            return Ok(Ending::Interrupted);
+        }
+        let mut ending = if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed };
+        for threshold in &self.fail_below {
+            if let Some(measured) = threshold.missed_by(&summary)? {
+                say(&format!("{threshold} was missed: {measured:.4}"));
+                ending = Ending::BelowThreshold;
+            }
+        }
+        Ok(ending)
+    }
+}
+
+/// Progress on standard error: a bar in a terminal, else a plain line now and then.
+struct Meter {
+    bar: Option<ProgressBar>,
+    started: Instant,
+    last: Option<Instant>,
+}
+
+impl Meter {
+    /// At most one plain line in this time.
+    const EVERY: Duration = Duration::from_secs(5);
+
+    fn new() -> Meter {
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {elapsed}, {eta} left");
+        let bar = std::io::stderr().is_terminal().then(|| {
+            ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
+                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        });
+        Meter { bar, started: Instant::now(), last: None }
+    }
+
+    fn show(&mut self, progress: Progress) {
+        let Progress { done, of, successes, errors } = progress;
+        let words = if errors == 0 {
+            format!("{successes} succeeded")
+        } else {
+            format!("{successes} succeeded, {errors} errored")
+        };
+        match &self.bar {
+            Some(bar) => {
+                bar.set_length(of as u64);
+                bar.set_position(done as u64);
+                bar.set_message(words);
+            }
+            None if done == of || self.last.is_none_or(|last| last.elapsed() >= Meter::EVERY) => {
+                say(&format!("{done}/{of} episodes, {words}, {:.0} s", self.started.elapsed().as_secs_f64()));
+                self.last = Some(Instant::now());
+            }
+            None => {}
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+#[allow(clippy::print_stderr)]
+fn say(text: &str) {
+    eprintln!("{text}");
+}

@@ -1,0 +1,183 @@
+//! `sprint explore`: opens what the explorer starts in, and starts it.
+
+use std::cell::OnceCell;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+
+use super::{Ending, logging, policies};
+use crate::data::{dataset::Dataset, taskset};
+use crate::domain::scene::Room;
+use crate::run::scenes::Scenes;
+use crate::tui::app::Farewell;
+use crate::tui::engine::Engine;
+use crate::tui::graphics::Protocol;
+use crate::tui::openings::{Openings, Start};
+use crate::tui::policies::{Policies, PolicyKind};
+use crate::tui::{plain, screen};
+
+/// Where the explorer starts, and who acts.
+#[derive(Args)]
+pub struct Explore {
+    /// The checkpoint folder of the agent [default: the shipped one]
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Start where a demonstration of this scene of the dataset began
+    #[arg(long, value_name = "NAME", conflicts_with = "task")]
+    scene: Option<String>,
+    /// Start at task N (from 1) of a task file
+    #[arg(long, value_name = "FILE#N")]
+    task: Option<String>,
+    /// The dataset folder that --scene looks in
+    #[arg(long, value_name = "DIR", default_value = "data")]
+    data: PathBuf,
+    /// The kind of room of a generated house
+    #[arg(long, value_enum, default_value = "kitchen", conflicts_with_all = ["scene", "task"])]
+    room: RoomName,
+    /// What to tell the agent, in place of the task's own words
+    #[arg(long, value_name = "TEXT")]
+    instruction: Option<String>,
+    /// The seed of the house and of chance
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// How to show pictures
+    #[arg(long, value_enum, default_value = "auto")]
+    graphics: GraphicsName,
+    /// No screen: a verb a line on standard input, a line a step on standard output
+    #[arg(long)]
+    plain: bool,
+    /// Wait for a key before the first step
+    #[arg(long)]
+    paused: bool,
+    /// Who acts at first
+    #[arg(long, value_enum, default_value = "agent")]
+    policy: PolicyName,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RoomName {
+    Kitchen,
+    LivingRoom,
+    Bedroom,
+    Bathroom,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum GraphicsName {
+    Auto,
+    Kitty,
+    Iterm2,
+    Sixel,
+    Halfblocks,
+    Ascii,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PolicyName {
+    Agent,
+    Expert,
+    Random,
+    Manual,
+}
+
+/// Demonstrations of one scene that are kept at hand.
+const DEMONSTRATIONS: usize = 20;
+
+impl Explore {
+    /// Explores until the person leaves.
+    ///
+    /// # Errors
+    /// When what it should start in cannot be opened, or there is no terminal.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let manual = matches!(self.policy, PolicyName::Manual);
+        let kind = match self.policy {
+            PolicyName::Agent | PolicyName::Manual => PolicyKind::Agent,
+            PolicyName::Expert => PolicyKind::Expert,
+            PolicyName::Random => PolicyKind::Random,
+        };
+        let protocol = match self.graphics {
+            GraphicsName::Auto => None,
+            GraphicsName::Kitty => Some(Protocol::Kitty),
+            GraphicsName::Iterm2 => Some(Protocol::Iterm2),
+            GraphicsName::Sixel => Some(Protocol::Sixel),
+            GraphicsName::Halfblocks => Some(Protocol::HalfBlocks),
+            GraphicsName::Ascii => Some(Protocol::Ascii),
+        };
+        if self.plain {
+            let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
+            plain::run(self.engine(kind)?, kind, input, out)?;
+            return Ok(Ending::Ok);
+        }
+        if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
+        }
+        let log = logging::open().ok();
+        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, log };
+        match screen::run(screen, move || self.engine(kind))? {
+            Farewell::Signal(_) => Ok(Ending::Interrupted),
+            Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
+        }
+    }
+
+    fn engine(&self, kind: PolicyKind) -> anyhow::Result<Engine> {
+        let (start, scenes) = self.start()?;
+        let openings = Openings::new(start, self.seed, scenes);
+        let checkpoint = self.checkpoint.clone();
+        let loaded = OnceCell::new();
+        let policies = Policies::new(Box::new(move || {
+            let agent = match loaded.get() {
+                Some(agent) => agent,
+                None => {
+                    let folder = checkpoint.clone().map_or_else(policies::shipped, Ok)?;
+                    let agent = policies::learned(folder)?;
+                    loaded.get_or_init(|| agent)
+                }
+            };
+            (agent.make)()
+        }));
+        Engine::new(openings, policies, kind, self.instruction.as_deref())
+    }
+
+    fn start(&self) -> anyhow::Result<(Start, Scenes)> {
+        if let Some(task) = &self.task {
+            let (file, number) = task.rsplit_once('#').unwrap_or((task, "1"));
+            let number: usize = number.parse().with_context(|| format!("--task {task}: {number:?} is not a number"))?;
+            let path = PathBuf::from(file);
+            let set = taskset::read(&path)?.value;
+            let scenes = Scenes::of(&path, &set);
+            let count = set.tasks.len();
+            if !(1..=count).contains(&number) {
+                bail!("{file}: there is no task {number}; the set has tasks 1 to {count}");
+            }
+            return Ok((Start::Tasks { tasks: set.tasks, index: number - 1 }, scenes));
+        }
+        let none = Scenes::in_folder(None);
+        if let Some(name) = &self.scene {
+            let dataset = Dataset::open(&self.data)?;
+            let scene = dataset.scene(name)?;
+            let mut trajectories = Vec::new();
+            for trajectory in dataset.trajectories()? {
+                let trajectory = trajectory?;
+                if matches!(&trajectory.scene, crate::domain::task::SceneRef::Named(other) if other == name) {
+                    trajectories.push(trajectory);
+                }
+                if trajectories.len() == DEMONSTRATIONS {
+                    break;
+                }
+            }
+            if trajectories.is_empty() {
+                bail!("{}: no demonstration was recorded in {name}", self.data.display());
+            }
+            return Ok((Start::Recorded { scene, trajectories }, none));
+        }
+        let room = match self.room {
+            RoomName::Kitchen => Room::Kitchen,
+            RoomName::LivingRoom => Room::LivingRoom,
+            RoomName::Bedroom => Room::Bedroom,
+            RoomName::Bathroom => Room::Bathroom,
+        };
+        Ok((Start::Generated(room), none))
+    }
+}

@@ -1,0 +1,97 @@
+//! `sprint import`: makes a dataset folder of data as others publish it.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Ending;
+use crate::data::alfred::{self, Progress};
+
+/// Makes a dataset folder.
+#[derive(Args)]
+pub struct Import {
+    #[command(subcommand)]
+    from: From,
+}
+
+#[derive(Subcommand)]
+enum From {
+    /// From an ALFRED checkout: floor plans, demonstrations and the three official task sets
+    Alfred(Alfred),
+}
+
+/// From an ALFRED checkout.
+#[derive(Args)]
+struct Alfred {
+    /// The checkout: the folder with data/ and gen/layouts/
+    source: PathBuf,
+    /// The dataset folder to write
+    out: PathBuf,
+    /// A folder with the authors' eval_{instruct,length,scene}_ann_human.json
+    #[arg(long, value_name = "DIR")]
+    eval_lists: Option<PathBuf>,
+}
+
+impl Import {
+    /// Imports, and tells what was skipped.
+    ///
+    /// # Errors
+    /// When nothing can be imported or the folder cannot be written.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let From::Alfred(alfred) = self.from;
+        alfred.run()
+    }
+}
+
+impl Alfred {
+    #[allow(clippy::print_stderr)]
+    fn run(self) -> anyhow::Result<Ending> {
+        let bar = ProgressBar::new(0).with_style(style());
+        let show = |progress: Progress| {
+            let (what, done, total) = match progress {
+                Progress::Reading(done, total) => ("reading", done, total),
+                Progress::Building(done, total) => ("building scenes", done, total),
+                Progress::Writing(done, total) => ("writing", done, total),
+            };
+            if done <= 1 || done == total {
+                bar.set_message(what);
+                bar.set_length(total);
+            }
+            bar.set_position(done);
+        };
+        let options = alfred::Options { eval_lists: self.eval_lists };
+        let summary = alfred::import(&self.source, &self.out, &options, &show);
+        bar.finish_and_clear();
+        let summary = summary?;
+        let manifest = &summary.manifest;
+        for skip in &manifest.skipped {
+            eprintln!("skipped: {}: {}", skip.file, skip.reason);
+        }
+        for (split, counts) in &manifest.counts {
+            eprintln!(
+                "{split}: {} trajectories, {} annotated skills ({} aligned), {} longer spans ({} to train on)",
+                counts.trajectories,
+                counts.annotated_primitives,
+                counts.aligned_primitives,
+                counts.spans,
+                counts.spans_after_holdout
+            );
+        }
+        for set in &summary.sets {
+            match &set.tasks {
+                Ok(tasks) => eprintln!("{}: {tasks} tasks", set.name),
+                Err(reason) => eprintln!("{}: left out: {reason}", set.name),
+            }
+        }
+        let skipped = manifest.skipped.len();
+        eprintln!("{} scenes in {}; {skipped} files skipped", manifest.scenes, self.out.display());
+        Ok(if skipped == 0 { Ending::Ok } else { Ending::SomeFailed })
+    }
+}
+
+/// How progress is drawn.
+pub(super) fn style() -> ProgressStyle {
+    let template = "{msg:15} {bar:40} {pos}/{len} {elapsed}";
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}

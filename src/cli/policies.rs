@@ -1,0 +1,114 @@
+//! Which policy acts, from the command line.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use sha2::{Digest, Sha256};
+
+use crate::agent::{ExpertPolicy, LearnedPolicy, Policy, RandomPolicy};
+use crate::data::json;
+use crate::nets::device::{self, Device};
+use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
+use crate::run::evaluate::MakePolicy;
+
+/// Which policy acts.
+#[derive(Args)]
+pub struct PolicyChoice {
+    /// The trained agent that acts [default: the shipped one]
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Who acts
+    #[arg(long, value_enum, default_value = "agent")]
+    policy: Kind,
+}
+
+/// Who acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// The trained agent
+    Agent,
+    /// Shortest paths and interactions, knowing everything
+    Expert,
+    /// A possible action by chance
+    Random,
+}
+
+/// A policy that can be made, and what identifies it in a run.
+pub struct Chosen {
+    /// What it is called in reports.
+    pub name: String,
+    /// SHA-256 over its checkpoint's configuration and weights.
+    pub checkpoint_hash: Option<String>,
+    /// Makes one.
+    pub make: Box<MakePolicy<'static>>,
+}
+
+impl PolicyChoice {
+    /// Opens what was chosen.
+    ///
+    /// # Errors
+    /// When the checkpoint or its sentence encoder cannot be used.
+    pub fn open(&self) -> anyhow::Result<Chosen> {
+        let plain = |name: &str, make: fn() -> Box<dyn Policy>| Chosen {
+            name: name.into(),
+            checkpoint_hash: None,
+            make: Box::new(move || Ok(make())),
+        };
+        if self.policy != Kind::Agent && self.checkpoint.is_some() {
+            anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
+        }
+        match self.policy {
+            Kind::Expert => Ok(plain("expert", || Box::new(ExpertPolicy::new()))),
+            Kind::Random => Ok(plain("random", || Box::new(RandomPolicy::new()))),
+            Kind::Agent => learned(self.checkpoint.clone().map_or_else(shipped, Ok)?),
+        }
+    }
+}
+
+/// A trained agent, several of which share one sentence encoder.
+pub fn learned(folder: PathBuf) -> anyhow::Result<Chosen> {
+    // More threads than one would make sums depend on how many there are, and workers get in each other's way.
+    device::set_threads(1);
+    let mut digest = Sha256::new();
+    for file in ["config.json", "model.safetensors"] {
+        let path = folder.join(file);
+        digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
+    }
+    let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), Device::Cpu)?));
+    let make = move || -> anyhow::Result<Box<dyn Policy>> {
+        Ok(Box::new(LearnedPolicy::load(&folder, sentences.clone(), Device::Cpu)?))
+    };
+    let name = make()?.name().to_owned();
+    Ok(Chosen { name, checkpoint_hash: Some(json::hex(&digest.finalize())), make: Box::new(make) })
+}
+
+/// The agent that acts when none is named: the first that is found.
+pub fn shipped() -> anyhow::Result<PathBuf> {
+    checkpoints().into_iter().next().context(
+        "there is no trained agent in checkpoints/: name one with --checkpoint, or let --policy expert or random act",
+    )
+}
+
+/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in; by name.
+pub fn checkpoints() -> Vec<PathBuf> {
+    let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
+    let near: Option<PathBuf> = program
+        .iter()
+        .flat_map(|path| path.ancestors().skip(1).take(3))
+        .map(|folder| folder.join("checkpoints"))
+        .find(|folder| folder.is_dir());
+    let here = Path::new("checkpoints").canonicalize().ok().filter(|folder| folder.is_dir());
+    let mut folders: Vec<PathBuf> = here.into_iter().chain(near).collect();
+    folders.dedup();
+    let in_folder = |folder: &PathBuf| -> Vec<PathBuf> {
+        let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path());
+        let whole = |path: &PathBuf| path.join("config.json").is_file() && path.join("model.safetensors").is_file();
+        let mut found: Vec<PathBuf> = entries.filter(whole).collect();
+        found.sort();
+        found
+    };
+    folders.iter().flat_map(in_folder).collect()
+}

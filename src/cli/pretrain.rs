@@ -1,0 +1,101 @@
+//! `sprint pretrain`: trains an agent on a dataset.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use clap::Args;
+
+use super::Ending;
+use super::bar::Bars;
+use super::stop;
+use crate::agent::LearnedPolicy;
+use crate::agent::checkpoint::{Config, write_whole};
+use crate::agent::learned::SharedEmbedder;
+use crate::nets::device::best_device;
+use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
+use crate::run::appraise::appraise;
+use crate::run::card::card;
+use crate::run::presets::Preset;
+use crate::run::pretrain::{Pretraining, Trained};
+
+/// Trains an agent.
+#[derive(Args)]
+pub struct Pretrain {
+    /// Dataset folders
+    #[arg(required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// A shipped preset (l-bc), or a preset's file
+    #[arg(long)]
+    preset: String,
+    /// The checkpoint folder to write
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Take up the training that was begun there
+    #[arg(long)]
+    resume: bool,
+    /// Use this checkpoint's visual encoder instead of training one
+    #[arg(long, value_name = "DIR")]
+    visual_from: Option<PathBuf>,
+    /// Start from this checkpoint's policy instead of a fresh one
+    #[arg(long, value_name = "DIR")]
+    policy_from: Option<PathBuf>,
+    /// Steps of the visual encoder's training, instead of the preset's
+    #[arg(long, value_name = "N")]
+    encoder_steps: Option<u64>,
+    /// Steps of the policy's training, instead of the preset's
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// A sentence encoder's folder [default: all-MiniLM-L6-v2, which `make setup` fetched]
+    #[arg(long, value_name = "DIR")]
+    encoder: Option<PathBuf>,
+}
+
+impl Pretrain {
+    /// Trains, measures the result, and writes its model card.
+    ///
+    /// # Errors
+    /// When data or an earlier state cannot be read, or the checkpoint not be written.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let mut preset = Preset::named(&self.preset)?;
+        if let Some(steps) = self.encoder_steps {
+            preset.visual_training.optimisation.steps = steps;
+        }
+        if let Some(steps) = self.steps {
+            preset.training.steps = steps;
+        }
+        let folder = self.encoder.unwrap_or_else(default_folder);
+        let device = best_device();
+        let sentences: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
+        let pretraining = Pretraining {
+            preset,
+            data: self.data,
+            out: self.out,
+            resume: self.resume,
+            visual_from: self.visual_from,
+            policy_from: self.policy_from,
+            sentences: sentences.clone(),
+            sentence_encoder: name(&folder),
+            device,
+        };
+        let stop = stop::on_signals()?;
+        let mut bars = Bars::new();
+        if pretraining.run(&mut bars, &stop)? == Trained::Stopped {
+            bars.end();
+            eprintln!("stopped; --resume goes on from here");
+            return Ok(Ending::Interrupted);
+        }
+        let mut policy = LearnedPolicy::load(&pretraining.out, sentences, device)?;
+        let findings = appraise(&mut policy, &pretraining.preset.appraisal, &mut bars)?;
+        bars.end();
+        let text = card(&name(&pretraining.out), &Config::read(&pretraining.out)?, &findings);
+        write_whole(&pretraining.out.join("README.md"), text.as_bytes())?;
+        eprint!("{text}");
+        Ok(Ending::Ok)
+    }
+}
+
+fn name(folder: &Path) -> String {
+    folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned())
+}

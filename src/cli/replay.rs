@@ -1,0 +1,98 @@
+//! `sprint replay`: re-runs recorded demonstrations in the simulator.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::ProgressBar;
+
+use super::{Ending, import};
+use crate::data::Dataset;
+use crate::run::replay::{Options, Report, replay};
+
+/// How many failures of each kind are listed.
+const LISTED: usize = 500;
+
+/// Re-runs recorded demonstrations.
+#[derive(Args)]
+pub struct Replay {
+    /// The dataset folder
+    data: PathBuf,
+    /// Only this split (train, valid_seen, ...)
+    #[arg(long)]
+    split: Option<String>,
+    /// Compare where targets are projected with where they were recorded
+    #[arg(long)]
+    boxes: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Replay {
+    /// Replays and prints what came of it.
+    ///
+    /// # Errors
+    /// When the dataset cannot be read, or holds nothing of the split.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let dataset = Dataset::open(&self.data)?;
+        let counts = &dataset.manifest().counts;
+        let of = |split: &String| counts.get(split).map_or(0, |counts| counts.trajectories);
+        let total = self.split.as_ref().map_or_else(|| counts.keys().map(of).sum(), of);
+        if let Some(split) = self.split.as_ref().filter(|split| of(split) == 0) {
+            let known: Vec<&str> = counts.keys().map(String::as_str).collect();
+            anyhow::bail!("{} holds no split {split:?}; it holds {}", self.data.display(), known.join(", "));
+        }
+        let bar = ProgressBar::new(total).with_style(import::style()).with_message("replaying");
+        let options = Options { split: self.split, boxes: self.boxes };
+        let report = replay(&dataset, &options, &|done| bar.inc(done));
+        bar.finish_and_clear();
+        let report = report?;
+        list_failures(&report);
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&report)?)?;
+        } else {
+            print(&report, &mut out)?;
+        }
+        Ok(Ending::Ok)
+    }
+}
+
+#[allow(clippy::print_stderr)]
+fn list_failures(report: &Report) {
+    for (what, count) in &report.failures {
+        for failure in report.failed.iter().filter(|failure| failure.what == *what).take(LISTED) {
+            eprintln!("{what}: {}: {}", failure.id, failure.reason);
+        }
+        if *count > LISTED {
+            eprintln!("{what}: ... and {} more", count - LISTED);
+        }
+    }
+}
+
+fn print(report: &Report, out: &mut impl Write) -> std::io::Result<()> {
+    writeln!(out, "trajectories        {}", report.trajectories)?;
+    for (what, share) in [
+        ("actions possible", report.legal),
+        ("goals met", report.goals),
+        ("skills, class", report.skills_class),
+        ("skills, strict", report.skills_strict),
+    ] {
+        writeln!(out, "{what:<20}{:.2} %", share * 100.0)?;
+    }
+    for (name, set) in &report.task_sets {
+        writeln!(out, "{name:<20}{} tasks, {} by class, {} strict", set.tasks, set.class, set.strict)?;
+    }
+    if let Some(boxes) = &report.boxes {
+        writeln!(
+            out,
+            "boxes               {} compared; median overlap {:.3} of pickups, {:.3} of puts",
+            boxes.n, boxes.pickup_median_iou, boxes.put_median_iou
+        )?;
+        for (class, boxes) in &boxes.per_class {
+            writeln!(out, "  {class:<28}{:>6} {:.3}", boxes.n, boxes.median_iou)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! `sprint tasks`: samples, checks and shows task sets.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, ensure};
+use clap::{Args, Subcommand, ValueEnum};
+use indicatif::ProgressBar;
+
+use super::Ending;
+use crate::agent::ExpertPolicy;
+use crate::data::{Dataset, taskset};
+use crate::domain::{Room, Task};
+use crate::house::grading::{Grading, describe};
+use crate::run::evaluate::{Evaluation, Options, told};
+use crate::run::scenes::Scenes;
+use crate::run::tasks::{self, Phrasing, Wish};
+
+/// Samples, checks and shows task sets.
+#[derive(Args)]
+pub struct Tasks {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Write a task set from generated houses or a dataset's demonstrations
+    Sample(Sample),
+    /// Check that a task set can be played: it parses, its scenes exist, and the expert solves every task
+    Check(Check),
+    /// Show a task in words, or list a set's tasks
+    Show(Show),
+}
+
+/// Writes a task set.
+#[derive(Args)]
+struct Sample {
+    /// The file to write
+    out: PathBuf,
+    /// Where the tasks play: `generated` houses, or the folder of a dataset
+    #[arg(long, value_name = "generated|DATA")]
+    scenes: PathBuf,
+    /// Subtasks of each task
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=50))]
+    length: u8,
+    /// Tasks
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    count: u32,
+    /// The same seed gives the same set
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// The kinds of rooms to take [default: all]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "ROOM,...")]
+    rooms: Vec<RoomName>,
+    /// Whose words tell the agent what to do, in tasks from a dataset
+    #[arg(long, value_enum, default_value = "own")]
+    phrasing: PhrasingName,
+    /// Only demonstrations of this split of a dataset
+    #[arg(long, value_name = "NAME")]
+    split: Option<String>,
+    /// Replace a file that is there
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RoomName {
+    Kitchen,
+    LivingRoom,
+    Bedroom,
+    Bathroom,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PhrasingName {
+    /// The program's own grammar
+    Own,
+    /// What people wrote of the demonstrations
+    Annotators,
+}
+
+/// Checks a task set.
+#[derive(Args)]
+struct Check {
+    /// The task file
+    file: PathBuf,
+    /// Threads [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+}
+
+/// Shows a task.
+#[derive(Args)]
+struct Show {
+    /// The task file, with the task's number from 0 or its id: FILE#N; all tasks in a line each without
+    #[arg(value_name = "FILE[#N]")]
+    task: String,
+}
+
+impl Tasks {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// When a file cannot be used; names it.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        match self.what {
+            What::Sample(sample) => sample.run(),
+            What::Check(check) => check.run(),
+            What::Show(show) => show.run(),
+        }
+    }
+}
+
+impl Sample {
+    fn run(self) -> anyhow::Result<Ending> {
+        ensure!(self.force || !self.out.exists(), "{} exists; --force replaces it", self.out.display());
+        let rooms = match self.rooms.is_empty() {
+            true => Room::ALL.to_vec(),
+            false => self.rooms.iter().map(|&room| room.into()).collect(),
+        };
+        let name = self.out.file_stem().map_or_else(|| "tasks".into(), |stem| stem.to_string_lossy().into_owned());
+        let wish = Wish { name, length: self.length.into(), count: self.count as usize, seed: self.seed, rooms };
+        let set = if self.scenes == Path::new("generated") {
+            let bar =
+                ProgressBar::new(u64::from(self.count)).with_style(super::import::style()).with_message("sampling");
+            let set = tasks::sample_generated(&wish, &|| bar.inc(1));
+            bar.finish_and_clear();
+            set?
+        } else {
+            let dataset = Dataset::open(&self.scenes)?;
+            let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            let phrasing = match self.phrasing {
+                PhrasingName::Own => Phrasing::Own,
+                PhrasingName::Annotators => Phrasing::Annotators,
+            };
+            tasks::sample_dataset(&wish, &dataset, self.split.as_deref(), phrasing, folder)?
+        };
+        taskset::write(&self.out, &set)?;
+        Ok(Ending::Ok)
+    }
+}
+
+impl From<RoomName> for Room {
+    fn from(name: RoomName) -> Room {
+        match name {
+            RoomName::Kitchen => Room::Kitchen,
+            RoomName::LivingRoom => Room::LivingRoom,
+            RoomName::Bedroom => Room::Bedroom,
+            RoomName::Bathroom => Room::Bathroom,
+        }
+    }
+}
+
+impl Check {
+    fn run(self) -> anyhow::Result<Ending> {
+        let set = taskset::read(&self.file)?;
+        let scenes = Scenes::of(&self.file, &set.value);
+        let options = Options {
+            grading: Grading::Class,
+            seeds: 1,
+            limit: None,
+            jobs: super::threads(self.jobs),
+            step_by_step: false,
+        };
+        let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
+            .with_context(|| self.file.display().to_string())?;
+        let mut out = std::io::stdout().lock();
+        let mut unsolved = 0;
+        evaluation.play(
+            &evaluation.all(),
+            &|| Ok(Box::new(ExpertPolicy::default())),
+            &AtomicBool::new(false),
+            &mut |episode| {
+                if !episode.success {
+                    unsolved += 1;
+                    let why = episode.error.unwrap_or_else(|| format!("not done after {} steps", episode.steps));
+                    let (done, of) = (episode.completed, episode.of);
+                    writeln!(out, "{}: the expert completes {done} of {of} subtasks: {why}", episode.task)?;
+                }
+                Ok(())
+            },
+        )?;
+        let count = set.value.tasks.len();
+        writeln!(out, "{}: {count} tasks, {} solved by the expert", self.file.display(), count - unsolved)?;
+        Ok(if unsolved == 0 { Ending::Ok } else { Ending::SomeFailed })
+    }
+}
+
+impl Show {
+    fn run(self) -> anyhow::Result<Ending> {
+        let (file, wanted) = taskset::split_reference(&self.task);
+        let set = taskset::read(&file)?.value;
+        let mut out = std::io::stdout().lock();
+        match wanted {
+            None => {
+                for (number, task) in set.tasks.iter().enumerate() {
+                    writeln!(out, "{number:>4}  {}  [{}]", told(task, false), task.id)?;
+                }
+            }
+            Some(wanted) => {
+                let task = taskset::pick(&set, wanted).with_context(|| file.display().to_string())?;
+                show(&mut out, task, &Scenes::of(&file, &set)).with_context(|| self.task.clone())?;
+            }
+        }
+        Ok(Ending::Ok)
+    }
+}
+
+/// Prints a task in words.
+fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()> {
+    let setting = scenes.setting(task)?;
+    let (scene, world) = (&setting.scene, &setting.world);
+    writeln!(out, "task         {}", task.id)?;
+    writeln!(out, "instruction  {}", told(task, false))?;
+    writeln!(out, "scene        {} ({})", scene.name, scene.room.spoken())?;
+    let pose = world.agent;
+    let (x, z) = (f64::from(pose.cell.x) / 4.0, f64::from(pose.cell.z) / 4.0);
+    let heading = format!("{:?}", pose.heading).to_lowercase();
+    writeln!(out, "start        x {x} m, z {z} m, facing {heading}, looking down {} degrees", pose.horizon)?;
+    let held = world.held.and_then(|held| world.object(held)).map_or("nothing", |object| object.class.spoken());
+    writeln!(out, "in the hand  {held}")?;
+    writeln!(out, "steps        the expert takes {}, the episode ends after {}", task.expert_steps, task.horizon)?;
+    if let Some((trajectory, first)) = &task.source {
+        writeln!(out, "cut from     {trajectory}, from skill {first}")?;
+    }
+    for (i, subtask) in task.subtasks.iter().enumerate() {
+        let sentence = task.sentences.get(i).map(|sentence| format!("   \"{sentence}\"")).unwrap_or_default();
+        writeln!(out, "subtask {i:<4} {}{sentence}", describe(&task.roles, subtask))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! The visual encoder: a small residual network from a frame to a 7 x 7 feature map. Trained on what the simulator knows of
+//! its own frames, frozen for every policy.
+
+use serde::{Deserialize, Serialize};
+use tch::nn::{self, ModuleT};
+use tch::{Device, Kind, Tensor};
+
+use super::shrink::shrink;
+use crate::house::view::Frame;
+
+/// The side of a feature map.
+pub const SIDE: i64 = 7;
+
+/// The size of a visual encoder.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VisualSpec {
+    /// The side of the image it reads, in pixels: 16 times [`SIDE`].
+    pub input: i64,
+    /// Channels at 1/2, 1/4, 1/8 and 1/16 of the image; the last are the features.
+    pub channels: [i64; 4],
+}
+
+impl VisualSpec {
+    /// Features in each of the 7 x 7 places.
+    pub fn features(&self) -> i64 {
+        self.channels[3]
+    }
+
+    /// Numbers in a feature map.
+    pub fn map(&self) -> i64 {
+        self.features() * SIDE * SIDE
+    }
+
+    /// What the encoder reads of a frame: planes of bytes.
+    pub fn image(&self, frame: &Frame) -> Vec<u8> {
+        shrink(&frame.rgb, frame.width, self.input as usize)
+    }
+}
+
+#[derive(Debug)]
+struct Layer {
+    conv: nn::Conv2D,
+    norm: nn::BatchNorm,
+}
+
+impl Layer {
+    fn new(path: &nn::Path<'_>, from: i64, to: i64, stride: i64) -> Layer {
+        let config = nn::ConvConfig { stride, padding: 1, bias: false, ..Default::default() };
+        Layer {
+            conv: nn::conv2d(path / "conv", from, to, 3, config),
+            norm: nn::batch_norm2d(path / "norm", to, Default::default()),
+        }
+    }
+
+    fn forward(&self, x: &Tensor, train: bool) -> Tensor {
+        self.norm.forward_t(&x.apply(&self.conv), train)
+    }
+}
+
+/// A step down in resolution, then a residual block.
+#[derive(Debug)]
+struct Stage {
+    down: Layer,
+    first: Layer,
+    second: Layer,
+}
+
+impl Stage {
+    fn new(path: &nn::Path<'_>, from: i64, to: i64) -> Stage {
+        Stage {
+            down: Layer::new(&(path / "down"), from, to, 2),
+            first: Layer::new(&(path / "first"), to, to, 1),
+            second: Layer::new(&(path / "second"), to, to, 1),
+        }
+    }
+
+    fn forward(&self, x: &Tensor, train: bool) -> Tensor {
+        let x = self.down.forward(x, train).relu();
+        let change = self.second.forward(&self.first.forward(&x, train).relu(), train);
+        (x + change).relu()
+    }
+}
+
+/// From a frame to its feature map.
+#[derive(Debug)]
+pub struct VisualEncoder {
+    spec: VisualSpec,
+    stem: Layer,
+    stages: Vec<Stage>,
+    device: Device,
+}
+
+impl VisualEncoder {
+    /// An encoder with fresh weights under `path`.
+    pub fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> VisualEncoder {
+        let stage = |(i, pair): (usize, &[i64])| Stage::new(&(path / format!("stage{}", i + 1)), pair[0], pair[1]);
+        VisualEncoder {
+            stem: Layer::new(&(path / "stem"), 3, spec.channels[0], 2),
+            stages: spec.channels.windows(2).enumerate().map(stage).collect(),
+            spec: spec.clone(),
+            device: path.device(),
+        }
+    }
+
+    /// Its size.
+    pub fn spec(&self) -> &VisualSpec {
+        &self.spec
+    }
+
+    /// Where it computes.
+    pub fn device(&self) -> Device {
+        self.device
+    }
+
+    /// `pixels` [n, 3, input, input] in 0..255, any kind, to [n, features, 7, 7].
+    pub fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
+        let x = (pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0;
+        let stem = self.stem.forward(&x, train).relu();
+        self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train))
+    }
+
+    /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualSpec::image`]), without gradients.
+    pub fn encode(&self, images: &[Vec<u8>]) -> Tensor {
+        let side = self.spec.input;
+        let pixels = Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]);
+        tch::no_grad(|| self.forward(&pixels, false))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_becomes_a_seven_by_seven_map_whatever_the_batch() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(3);
+        let store = nn::VarStore::new(Device::Cpu);
+        let spec = VisualSpec { input: 112, channels: [8, 8, 8, 16] };
+        let encoder = VisualEncoder::new(&store.root(), &spec);
+        let images: Vec<Vec<u8>> = (0..3u8).map(|i| vec![40 * i; 3 * 112 * 112]).collect();
+        let maps = encoder.encode(&images);
+        assert_eq!(maps.size(), [3, 16, SIDE, SIDE]);
+        let alone = encoder.encode(&images[1..2]);
+        assert!((maps.narrow(0, 1, 1) - alone).abs().max().double_value(&[]) < 1e-5);
+    }
+}

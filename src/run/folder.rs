@@ -1,0 +1,275 @@
+//! The folder that an evaluation writes: a manifest, then an episode a line as they come, then the summary.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use serde::{Deserialize, Serialize};
+
+use super::episode::Episode;
+use crate::data::json;
+use crate::house::grading::Grading;
+
+/// What a run was made from; two runs with equal manifests measure the same thing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of this format, for the whole folder.
+    pub format_version: u32,
+    /// The version of the program.
+    pub sprint: String,
+    /// The task set's name.
+    pub task_set: String,
+    /// SHA-256 of the task file.
+    pub task_set_hash: String,
+    /// SHA-256 over the scenes that its tasks play in.
+    pub scenes_hash: String,
+    /// The policy's name.
+    pub policy: String,
+    /// SHA-256 of the checkpoint, where the policy has one.
+    pub checkpoint_hash: Option<String>,
+    /// How many tasks of the set, from the first.
+    pub tasks: usize,
+    /// Each task is played with the seeds 0 to this, exclusive.
+    pub seeds: u64,
+    /// How subtasks are graded.
+    pub grader: Grading,
+    /// The agent is told all steps instead of the task's instruction.
+    pub step_by_step: bool,
+}
+
+impl Manifest {
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+
+    /// The fields in which `other` differs, each as `field: this, not that`.
+    fn differences(&self, other: &Manifest) -> Vec<String> {
+        let fields = |manifest| match serde_json::to_value(manifest) {
+            Ok(serde_json::Value::Object(fields)) => fields,
+            _ => serde_json::Map::new(),
+        };
+        let others = fields(other);
+        let differing = fields(self).into_iter().filter(|(field, value)| others.get(field) != Some(value));
+        differing
+            .map(|(field, value)| {
+                format!("{field}: {value}, not {}", others.get(&field).unwrap_or(&serde_json::Value::Null))
+            })
+            .collect()
+    }
+}
+
+/// An open run folder.
+pub struct RunFolder {
+    path: PathBuf,
+    episodes: File,
+    /// The episodes that were there when it was opened.
+    pub earlier: Vec<Episode>,
+}
+
+impl RunFolder {
+    const MANIFEST: &str = "manifest.json";
+    const EPISODES: &str = "episodes.jsonl";
+
+    /// Opens a folder for this run: a new or empty one, or one that the same run began, which is then continued.
+    ///
+    /// # Errors
+    /// When it holds something else (naming what differs), is being written to by another process, or cannot be written to.
+    pub fn open(path: &Path, manifest: &Manifest) -> anyhow::Result<RunFolder> {
+        let name = path.display();
+        std::fs::create_dir_all(path).with_context(|| format!("cannot make the run folder {name}"))?;
+        let manifest_path = path.join(Self::MANIFEST);
+        if manifest_path.exists() {
+            let found = json::read::<Manifest>(&manifest_path, Manifest::FORMAT)?.value;
+            let differences = found.differences(manifest);
+            if !differences.is_empty() {
+                bail!("{name} holds another run ({}); choose another folder with --out", differences.join("; "));
+            }
+        } else {
+            let mut entries = std::fs::read_dir(path).with_context(|| format!("cannot read {name}"))?;
+            if entries.next().is_some() {
+                bail!("{name} is not empty and holds no run; choose another folder with --out");
+            }
+            json::write_pretty(&manifest_path, manifest)?;
+        }
+        let episodes_path = path.join(Self::EPISODES);
+        let context = || format!("cannot write {}", episodes_path.display());
+        let mut options = OpenOptions::new();
+        let episodes = options.create(true).append(true).open(&episodes_path).with_context(context)?;
+        match episodes.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => bail!("{name}: another process is writing this run; wait for it to end"),
+            // A file system without locks: the user has to see to it.
+            Err(TryLockError::Error(_)) => {}
+        }
+        let (earlier, whole) = read_episodes(&episodes_path)?;
+        // What follows the last whole line is the rest of a write that was cut off.
+        episodes.set_len(whole).with_context(context)?;
+        Ok(RunFolder { path: path.to_owned(), episodes, earlier })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends an episode, as one write of one line.
+    ///
+    /// # Errors
+    /// When the disk is full or the folder went away.
+    pub fn append(&mut self, episode: &Episode) -> anyhow::Result<()> {
+        let context = || format!("cannot write {}", self.path.join(Self::EPISODES).display());
+        let mut line = serde_json::to_vec(episode).with_context(context)?;
+        line.push(b'\n');
+        self.episodes.write_all(&line).with_context(context)
+    }
+
+    /// Writes the summary in its three forms, each atomically.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub fn write_summary(&self, summary: &super::report::Summary) -> anyhow::Result<()> {
+        json::write_pretty(&self.path.join("summary.json"), summary)?;
+        json::write_bytes(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
+        json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)
+    }
+}
+
+/// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out.
+///
+/// # Errors
+/// When a line before the last is not an episode, or one is there twice; names file and line.
+pub fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
+    let name = path.display();
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
+    let mut episodes = Vec::new();
+    let mut lines = BTreeMap::new();
+    for (number, line) in (1..).zip(bytes[..whole].split_inclusive(|&byte| byte == b'\n')) {
+        let episode: Episode =
+            serde_json::from_slice(line).with_context(|| format!("{name}: line {number} is not an episode"))?;
+        if let Some(first) = lines.insert((episode.task.clone(), episode.seed), number) {
+            bail!("{name}: lines {first} and {number} are the same task {:?} and seed {}", episode.task, episode.seed);
+        }
+        episodes.push(episode);
+    }
+    Ok((episodes, whole as u64))
+}
+
+/// The folder of a run that was given none: `runs/NAME-YYYYMMDD-HHMMSS`, in universal time.
+pub fn default_path(name: &str, unix_seconds: u64) -> PathBuf {
+    let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    let name: String = name.trim().trim_start_matches('.').chars().take(60).map(plain).collect();
+    Path::new("runs").join(format!("{name}-{}", timestamp(unix_seconds)))
+}
+
+/// `YYYYMMDD-HHMMSS` in universal time.
+fn timestamp(unix_seconds: u64) -> String {
+    let (days, second) = (unix_seconds / 86_400, unix_seconds % 86_400);
+    // Howard Hinnant's calendar arithmetic, counting from 0000-03-01.
+    let from_march = days + 719_468;
+    let (era, day_of_era) = (from_march / 146_097, from_march % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = era * 400 + year_of_era + u64::from(month <= 2);
+    format!("{year:04}{month:02}{day:02}-{:02}{:02}{:02}", second / 3600, second / 60 % 60, second % 60)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn manifest() -> Manifest {
+        Manifest {
+            format_version: 1,
+            sprint: "0".into(),
+            task_set: "set".into(),
+            task_set_hash: "aa".into(),
+            scenes_hash: "bb".into(),
+            policy: "random".into(),
+            checkpoint_hash: None,
+            tasks: 2,
+            seeds: 1,
+            grader: Grading::Class,
+            step_by_step: false,
+        }
+    }
+
+    pub(crate) fn episode(task: &str) -> Episode {
+        Episode {
+            task: task.into(),
+            seed: 0,
+            start_hash: "00".into(),
+            instruction: "Go.".into(),
+            completed: 1,
+            of: 2,
+            success: false,
+            steps: 9,
+            error: None,
+            trace: vec![],
+        }
+    }
+
+    #[test]
+    fn the_same_run_is_continued_after_a_torn_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        RunFolder::open(&path, &manifest()).unwrap().append(&episode("a")).unwrap();
+        let mut file = OpenOptions::new().append(true).open(path.join("episodes.jsonl")).unwrap();
+        file.write_all(b"{\"task\":\"b\",\"se").unwrap();
+        let mut again = RunFolder::open(&path, &manifest()).unwrap();
+        assert_eq!(again.earlier, [episode("a")]);
+        again.append(&episode("b")).unwrap();
+        let (episodes, _) = read_episodes(&path.join("episodes.jsonl")).unwrap();
+        assert_eq!(episodes, [episode("a"), episode("b")]);
+    }
+
+    #[test]
+    fn a_folder_of_another_run_is_refused_and_the_difference_named() {
+        let folder = tempfile::tempdir().unwrap();
+        RunFolder::open(folder.path(), &manifest()).unwrap();
+        let other = Manifest { seeds: 3, policy: "expert".into(), ..manifest() };
+        let error = RunFolder::open(folder.path(), &other).err().unwrap().to_string();
+        assert!(error.contains("seeds: 1, not 3") && error.contains("policy: \"random\", not \"expert\""), "{error}");
+        assert!(!error.contains("grader"));
+    }
+
+    #[test]
+    fn a_folder_of_something_else_is_refused_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("thesis.tex"), "x").unwrap();
+        let error = RunFolder::open(folder.path(), &manifest()).err().unwrap().to_string();
+        assert!(error.contains("not empty"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn two_writers_of_one_run_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let _first = RunFolder::open(folder.path(), &manifest()).unwrap();
+        let error = RunFolder::open(folder.path(), &manifest()).err().unwrap().to_string();
+        assert!(error.contains("another process"), "{error}");
+    }
+
+    #[test]
+    fn a_broken_or_doubled_line_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("episodes.jsonl");
+        let line = serde_json::to_string(&episode("a")).unwrap();
+        std::fs::write(&path, format!("{line}\n{{}}\n")).unwrap();
+        assert!(read_episodes(&path).unwrap_err().to_string().contains("line 2"));
+        std::fs::write(&path, format!("{line}\n{line}\n")).unwrap();
+        assert!(read_episodes(&path).unwrap_err().to_string().contains("lines 1 and 2"));
+    }
+
+    #[test]
+    fn a_default_folder_is_named_by_set_and_time() {
+        assert_eq!(default_path("eval 100/x", 0), Path::new("runs/eval-100-x-19700101-000000"));
+        assert_eq!(timestamp(951_826_153), "20000229-120913");
+        assert_eq!(timestamp(1_767_225_599), "20251231-235959");
+    }
+}

@@ -1,0 +1,150 @@
+//! Footage: the trajectories of a dataset as states that can be drawn, any step at random.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use anyhow::Context;
+use rayon::prelude::*;
+
+use crate::data::dataset::Dataset;
+use crate::data::items::Label;
+use crate::domain::task::SceneRef;
+use crate::domain::{Scene, Trajectory, World};
+use crate::house::{generate, rules};
+
+/// The trajectories of datasets with the scenes they play in.
+pub struct Footage {
+    /// The trajectories, in the datasets' order.
+    pub trajectories: Vec<Trajectory>,
+    scenes: HashMap<SceneRef, Arc<Scene>>,
+    /// The trajectories of each dataset.
+    pub parts: Vec<Range<usize>>,
+    /// The number of each trajectory's first frame, and at the end the number of frames.
+    firsts: Vec<usize>,
+}
+
+impl Footage {
+    /// Reads the trajectories of datasets, one after the other, and makes their scenes.
+    ///
+    /// # Errors
+    /// When a trajectory or a scene cannot be read.
+    pub fn open(datasets: &[Dataset]) -> anyhow::Result<Footage> {
+        let mut trajectories: Vec<Trajectory> = Vec::new();
+        let mut parts = Vec::new();
+        for dataset in datasets {
+            let before = trajectories.len();
+            for trajectory in dataset.trajectories()? {
+                trajectories.push(trajectory?);
+            }
+            anyhow::ensure!(trajectories.len() > before, "{} holds no trajectories", dataset.folder().display());
+            parts.push(before..trajectories.len());
+        }
+        let mut wanted: Vec<SceneRef> = trajectories.iter().map(|trajectory| trajectory.scene.clone()).collect();
+        wanted.sort_by_key(|scene| format!("{scene:?}"));
+        wanted.dedup();
+        let made = wanted.into_par_iter().map(|reference| {
+            let scene = match &reference {
+                SceneRef::Generated { room, seed } => Arc::new(generate::house(*room, *seed).0),
+                SceneRef::Named(name) => named(datasets, name)?,
+            };
+            Ok((reference, scene))
+        });
+        let scenes = made.collect::<anyhow::Result<_>>()?;
+        let mut firsts = vec![0];
+        for trajectory in &trajectories {
+            firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
+        }
+        Ok(Footage { trajectories, scenes, parts, firsts })
+    }
+
+    /// How many frames there are: each trajectory has one more than it has actions.
+    pub fn frames(&self) -> usize {
+        self.firsts[self.firsts.len() - 1]
+    }
+
+    /// How many frames some trajectories have.
+    pub fn frames_of(&self, trajectories: &Range<usize>) -> usize {
+        self.firsts[trajectories.end] - self.firsts[trajectories.start]
+    }
+
+    /// Whether a frame belongs to a held-out trajectory: every `hold_out`th is.
+    pub fn is_held_out(&self, frame: usize, hold_out: usize) -> bool {
+        let trajectory = self.firsts.partition_point(|&first| first <= frame) - 1;
+        hold_out > 0 && trajectory % hold_out == hold_out - 1
+    }
+
+    /// The scene of a trajectory.
+    ///
+    /// # Errors
+    /// Never for a trajectory of this footage.
+    pub fn scene(&self, trajectory: usize) -> anyhow::Result<&Arc<Scene>> {
+        self.scenes.get(&self.trajectories[trajectory].scene).context("a trajectory's scene is missing")
+    }
+
+    /// Visits the states of a trajectory in order: the scene, the state, and the step that follows it.
+    ///
+    /// # Errors
+    /// Whatever `visit` reports.
+    pub fn replay(
+        &self,
+        trajectory: usize,
+        mut visit: impl FnMut(&Scene, &World, usize) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let scene = self.scene(trajectory)?;
+        let recorded = &self.trajectories[trajectory];
+        let mut world = recorded.start.clone();
+        for (step, &action) in recorded.actions.iter().enumerate() {
+            visit(scene, &world, step)?;
+            rules::apply(scene, &mut world, action);
+        }
+        visit(scene, &world, recorded.actions.len())
+    }
+
+    /// One frame's scene and state, by the frame's number.
+    ///
+    /// # Errors
+    /// When there is no such frame.
+    pub fn state(&self, frame: usize) -> anyhow::Result<(&Arc<Scene>, World)> {
+        anyhow::ensure!(frame < self.frames(), "there is no frame {frame}");
+        let trajectory = self.firsts.partition_point(|&first| first <= frame) - 1;
+        let (scene, recorded) = (self.scene(trajectory)?, &self.trajectories[trajectory]);
+        let mut world = recorded.start.clone();
+        for &action in &recorded.actions[..frame - self.firsts[trajectory]] {
+            rules::apply(scene, &mut world, action);
+        }
+        Ok((scene, world))
+    }
+
+    /// What a learner should do in every frame; nothing in the last of a trajectory.
+    ///
+    /// # Errors
+    /// Never for a footage that was opened.
+    pub fn labels(&self) -> anyhow::Result<Vec<Option<Label>>> {
+        let of = |trajectory: usize| -> anyhow::Result<Vec<Option<Label>>> {
+            let mut labels = Vec::new();
+            self.replay(trajectory, |scene, world, step| {
+                labels.push(self.trajectories[trajectory].choice(step).map(|choice| {
+                    let class = choice.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
+                    let object = if class.in_vocabulary() { class.index() as u8 } else { 0 };
+                    Label { action: choice.kind.index() as u8, object }
+                }));
+                if step == self.trajectories[trajectory].actions.len() {
+                    labels[step] = None;
+                }
+                Ok(())
+            })?;
+            Ok(labels)
+        };
+        let labels: Vec<Vec<Option<Label>>> =
+            (0..self.trajectories.len()).into_par_iter().map(of).collect::<anyhow::Result<_>>()?;
+        Ok(labels.concat())
+    }
+}
+
+/// The scene of that name in the first dataset that has it.
+fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
+    let mut found = datasets.iter().map(|dataset| dataset.scene(name));
+    let first = found.next().context("there is no dataset")?;
+    first.or_else(|error| found.find_map(Result::ok).ok_or(error))
+}

@@ -1,0 +1,332 @@
+//! Re-runs recorded demonstrations in the simulator: are their actions possible, their goals met, their skills complete, and
+//! do their targets appear where they were recorded?
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use anyhow::Context;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::data::Dataset;
+use crate::domain::task::SceneRef;
+use crate::domain::world::Instance;
+use crate::domain::{ActionType, Scene, Task, Trajectory, World};
+use crate::house::camera::projected_bounds;
+use crate::house::goals::goal_met;
+use crate::house::grading::{Grader, Grading};
+use crate::house::{Outcome, rules};
+
+/// What to replay.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Only this split.
+    pub split: Option<String>,
+    /// Compare projected with recorded boxes.
+    pub boxes: bool,
+}
+
+/// What a replay came to. Shares are of trajectories, from 0 to 1.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// How many trajectories.
+    pub trajectories: usize,
+    /// Share whose every action is possible.
+    pub legal: f64,
+    /// Share that meets ALFRED's goal at the end.
+    pub goals: f64,
+    /// Share that completes every skill, graded by class.
+    pub skills_class: f64,
+    /// Share that completes every skill, graded as the released code does.
+    pub skills_strict: f64,
+    /// How many trajectories failed at each of these.
+    pub failures: BTreeMap<&'static str, usize>,
+    /// The official task sets that the dataset holds, with the expert's recorded actions as the policy.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub task_sets: BTreeMap<String, SetReport>,
+    /// Projected beside recorded boxes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub boxes: Option<BoxReport>,
+    /// Every failure: which, the trajectory, and why.
+    #[serde(skip)]
+    pub failed: Vec<Failure>,
+}
+
+/// One failure.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Failure {
+    /// `legal`, `goals`, `skills_class` or `skills_strict`.
+    pub what: &'static str,
+    /// The trajectory.
+    pub id: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// How many tasks of a set the expert's recorded actions complete.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SetReport {
+    /// How many tasks.
+    pub tasks: usize,
+    /// Completed, graded by class.
+    pub class: usize,
+    /// Completed, graded as the released code does.
+    pub strict: usize,
+}
+
+/// Projected beside recorded boxes.
+#[derive(Clone, Debug, Serialize)]
+pub struct BoxReport {
+    /// How many boxes were compared.
+    pub n: usize,
+    /// Median intersection over union, first pickups of objects that nothing moved before.
+    pub pickup_median_iou: f64,
+    /// The same of receptacles that something is put into.
+    pub put_median_iou: f64,
+    /// By what was done and the target's class.
+    pub per_class: BTreeMap<String, ClassBoxes>,
+}
+
+/// Boxes of one class.
+#[derive(Clone, Debug, Serialize)]
+pub struct ClassBoxes {
+    /// How many.
+    pub n: usize,
+    /// Median intersection over union.
+    pub median_iou: f64,
+}
+
+/// What one trajectory came to.
+#[derive(Default)]
+struct Replayed {
+    failures: Vec<(&'static str, String)>,
+    ious: Vec<(ActionType, &'static str, f32)>,
+}
+
+/// Replays a dataset.
+///
+/// # Errors
+/// When a file of the dataset cannot be read or names a scene that is absent.
+pub fn replay(dataset: &Dataset, options: &Options, progress: &(dyn Fn(u64) + Sync)) -> anyhow::Result<Report> {
+    let scenes = dataset.scenes()?;
+    let wanted = |trajectory: &Trajectory| options.split.as_ref().is_none_or(|split| *split == trajectory.split);
+    let replayed = dataset
+        .trajectories()?
+        .par_bridge()
+        .map(|trajectory| {
+            let trajectory = trajectory?;
+            if !wanted(&trajectory) {
+                return Ok(None);
+            }
+            let scene = scene_of(&scenes, &trajectory.scene).with_context(|| trajectory.id.clone())?;
+            let done = replay_one(scene, &trajectory, options.boxes);
+            progress(1);
+            Ok(Some((trajectory.id, done)))
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let mut replayed: Vec<(String, Replayed)> = replayed.into_iter().flatten().collect();
+    replayed.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut report = summarise(&replayed, options.boxes);
+    for name in ["eval_100", "eval_chain", "eval_unseen"] {
+        if dataset.folder().join("tasks").join(format!("{name}.json")).is_file() && options.split.is_none() {
+            let set = dataset.tasks(name)?;
+            let sources: Vec<&str> = set.tasks.iter().filter_map(|task| Some(&*task.source.as_ref()?.0)).collect();
+            let recorded = recorded(dataset, &sources)?;
+            report.task_sets.insert(name.to_owned(), replay_set(&set.tasks, &recorded, &scenes)?);
+        }
+    }
+    Ok(report)
+}
+
+fn scene_of<'a>(scenes: &'a BTreeMap<String, Arc<Scene>>, reference: &SceneRef) -> anyhow::Result<&'a Scene> {
+    match reference {
+        SceneRef::Named(name) => scenes.get(name).map(|scene| &**scene).with_context(|| format!("no scene {name:?}")),
+        SceneRef::Generated { .. } => anyhow::bail!("generated scenes hold no recordings to replay"),
+    }
+}
+
+fn recorded(dataset: &Dataset, ids: &[&str]) -> anyhow::Result<BTreeMap<String, Trajectory>> {
+    let mut found = BTreeMap::new();
+    for trajectory in dataset.trajectories()? {
+        let trajectory = trajectory?;
+        if ids.contains(&&*trajectory.id) {
+            found.insert(trajectory.id.clone(), trajectory);
+        }
+    }
+    Ok(found)
+}
+
+fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
+    let mut replayed = Replayed::default();
+    let mut world = trajectory.start.clone();
+    let goal = trajectory.goal.as_ref();
+    let new = |grading| Grader::new(grading, &trajectory.roles, &trajectory.skills, goal);
+    let (mut class, mut strict) = (new(Grading::Class), new(Grading::Strict));
+    let mut interactions = 0;
+    let mut moved = vec![false; world.objects.len()];
+    let mut illegal = None;
+    for (number, &action) in trajectory.actions.iter().enumerate() {
+        if action.kind.is_interaction() {
+            let recorded = trajectory.boxes.get(interactions).copied().unwrap_or_default();
+            interactions += 1;
+            if boxes && let Some(target) = action.target {
+                replayed.ious.extend(compare(scene, &world, action.kind, target, recorded, &moved));
+            }
+            if let (ActionType::Pickup, Some(Instance::Object(index))) = (action.kind, action.target) {
+                note_moved(&world, index, &mut moved);
+            }
+        }
+        let outcome = rules::apply(scene, &mut world, action);
+        if let Outcome::Impossible(reason) = outcome
+            && illegal.is_none()
+        {
+            illegal = Some(format!("action {number}, {}: {reason}", action.kind));
+        }
+        class.observe(scene, &world, action, outcome);
+        strict.observe(scene, &world, action, outcome);
+    }
+    replayed.failures.extend(illegal.map(|reason| ("legal", reason)));
+    if let Some(goal) = goal
+        && !goal_met(goal, scene, &world)
+    {
+        replayed.failures.push(("goals", format!("{:?} is not met at the end", goal.kind)));
+    }
+    for (what, grader) in [("skills_class", class), ("skills_strict", strict)] {
+        if !grader.is_done() {
+            let (at, of) = (grader.completed(), grader.total());
+            replayed.failures.push((what, format!("{at} of {of}; waits for: {}", grader.waits_for(scene, &world))));
+        }
+    }
+    replayed
+}
+
+/// Marks an object and all it carries as moved.
+fn note_moved(world: &World, index: u16, moved: &mut [bool]) {
+    let carried: Vec<u16> = world.contents(Instance::Object(index)).collect();
+    for index in carried.into_iter().chain([index]) {
+        if let Some(moved) = moved.get_mut(usize::from(index)) {
+            *moved = true;
+        }
+    }
+}
+
+/// How well the projected target fits the recorded box, for the interactions that are compared.
+fn compare(
+    scene: &Scene,
+    world: &World,
+    kind: ActionType,
+    target: Instance,
+    recorded: [u16; 4],
+    moved: &[bool],
+) -> Option<(ActionType, &'static str, f32)> {
+    let counts = match (kind, target) {
+        (ActionType::Pickup, Instance::Object(index)) => moved.get(usize::from(index)) == Some(&false),
+        (ActionType::Put, _) => true,
+        _ => false,
+    };
+    if !counts || recorded == [0; 4] {
+        return None;
+    }
+    let class = world.class_of(scene, target)?.name();
+    let projected = projected_bounds(scene, world, world.agent, target);
+    Some((kind, class, projected.map_or(0.0, |projected| iou(projected, recorded.map(f32::from)))))
+}
+
+/// Intersection over union of two boxes, given by left, top, right and bottom edges.
+pub fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
+    let area = |[left, top, right, bottom]: [f32; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
+    let shared = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
+    let all = area(a) + area(b) - shared;
+    if all > 0.0 { shared / all } else { 0.0 }
+}
+
+fn summarise(replayed: &[(String, Replayed)], boxes: bool) -> Report {
+    let mut failures: BTreeMap<&'static str, usize> =
+        ["legal", "goals", "skills_class", "skills_strict"].map(|what| (what, 0)).into();
+    let mut failed = Vec::new();
+    for (id, one) in replayed {
+        for (what, reason) in &one.failures {
+            *failures.entry(what).or_default() += 1;
+            failed.push(Failure { what, id: id.clone(), reason: reason.clone() });
+        }
+    }
+    let share = |what: &str| {
+        let failed = failures.get(what).copied().unwrap_or_default();
+        if replayed.is_empty() { 0.0 } else { 1.0 - failed as f64 / replayed.len() as f64 }
+    };
+    Report {
+        trajectories: replayed.len(),
+        legal: share("legal"),
+        goals: share("goals"),
+        skills_class: share("skills_class"),
+        skills_strict: share("skills_strict"),
+        boxes: boxes.then(|| box_report(replayed)),
+        task_sets: BTreeMap::new(),
+        failures,
+        failed,
+    }
+}
+
+fn box_report(replayed: &[(String, Replayed)]) -> BoxReport {
+    let all: Vec<_> = replayed.iter().flat_map(|(_, one)| one.ious.iter().copied()).collect();
+    let median_of =
+        |kind: ActionType| median(all.iter().filter(|(k, _, _)| *k == kind).map(|(_, _, iou)| *iou).collect());
+    let mut classes: BTreeMap<String, Vec<f32>> = BTreeMap::new();
+    for (kind, class, iou) in &all {
+        classes.entry(format!("{kind} {class}")).or_default().push(*iou);
+    }
+    let class = |ious: Vec<f32>| ClassBoxes { n: ious.len(), median_iou: median(ious) };
+    BoxReport {
+        n: all.len(),
+        pickup_median_iou: median_of(ActionType::Pickup),
+        put_median_iou: median_of(ActionType::Put),
+        per_class: classes.into_iter().map(|(name, ious)| (name, class(ious))).collect(),
+    }
+}
+
+/// The middle value; 0 of nothing.
+fn median(mut values: Vec<f32>) -> f64 {
+    values.sort_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().map_or(0.0, f64::from)
+}
+
+/// Lets the expert's recorded actions do the tasks of a set.
+fn replay_set(
+    tasks: &[Task],
+    recorded: &BTreeMap<String, Trajectory>,
+    scenes: &BTreeMap<String, Arc<Scene>>,
+) -> anyhow::Result<SetReport> {
+    let mut report = SetReport { tasks: tasks.len(), ..SetReport::default() };
+    for task in tasks {
+        let scene = scene_of(scenes, &task.scene).with_context(|| task.id.clone())?;
+        let (Some((id, first)), Some(start)) = (&task.source, &task.start) else { continue };
+        let Some(trajectory) = recorded.get(id) else { continue };
+        let from = trajectory.skill_range(usize::from(*first)).start;
+        let actions = trajectory.actions.iter().skip(from).take(task.expert_steps as usize);
+        let mut world = start.clone();
+        let new = |grading| Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        let mut graders = [new(Grading::Class), new(Grading::Strict)];
+        for &action in actions {
+            let outcome = rules::apply(scene, &mut world, action);
+            for grader in &mut graders {
+                grader.observe(scene, &world, action, outcome);
+            }
+        }
+        report.class += usize::from(graders[0].is_done());
+        report.strict += usize::from(graders[1].is_done());
+    }
+    Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overlap_of_boxes_is_one_for_equal_and_zero_for_apart() {
+        let unit = [0.0, 0.0, 10.0, 10.0];
+        assert_eq!(iou(unit, unit), 1.0);
+        assert_eq!(iou(unit, [20.0, 0.0, 30.0, 10.0]), 0.0);
+        assert!((iou(unit, [5.0, 0.0, 15.0, 10.0]) - 1.0 / 3.0).abs() < 1e-6);
+    }
+}

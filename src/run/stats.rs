@@ -1,0 +1,120 @@
+//! Confidence intervals, as pure functions.
+
+use rand::Rng;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// The 0.975 quantile of the standard normal distribution: 95 % lie within.
+const Z: f64 = 1.959_963_984_540_054;
+/// How often [`bootstrap_mean`] resamples.
+pub const RESAMPLES: usize = 10_000;
+
+/// An interval, lower end first.
+pub type Interval = [f64; 2];
+
+/// Wilson's 95 % score interval of a rate; everything is possible when nothing was tried.
+pub fn wilson(successes: usize, trials: usize) -> Interval {
+    if trials == 0 {
+        return [0.0, 1.0];
+    }
+    let n = trials as f64;
+    let rate = successes as f64 / n;
+    let spread = Z * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let (middle, scale) = (rate + Z * Z / (2.0 * n), 1.0 + Z * Z / n);
+    // At the edges the formula gives 0 and 1 but for rounding.
+    let low = if successes == 0 { 0.0 } else { (middle - spread) / scale };
+    let high = if successes == trials { 1.0 } else { (middle + spread) / scale };
+    [low, high]
+}
+
+/// The mean of all values; 0 when there are none.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0usize), |(sum, count), value| (sum + value, count + 1));
+    if count == 0 { 0.0 } else { sum / count as f64 }
+}
+
+/// A 95 % percentile bootstrap interval of the mean of all values, resampling whole groups: episodes of one task (different
+/// seeds) are alike, so the tasks are what varies. Both ends are 0 when there is nothing.
+pub fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
+    let sums: Vec<(f64, usize)> =
+        groups.iter().filter(|group| !group.is_empty()).map(|group| (group.iter().sum(), group.len())).collect();
+    if sums.is_empty() {
+        return [0.0, 0.0];
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let drawn = (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())]);
+            let (sum, count) = drawn.fold((0.0, 0), |(sum, count), (s, c)| (sum + s, count + c));
+            sum / count as f64
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [quantile(&means, 0.025), quantile(&means, 0.975)]
+}
+
+/// A quantile of sorted values, interpolated between neighbours.
+fn quantile(sorted: &[f64], q: f64) -> f64 {
+    let at = q * (sorted.len() - 1) as f64;
+    let (below, above) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    below + (above - below) * at.fract()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: Interval, b: Interval, by: f64) -> bool {
+        (a[0] - b[0]).abs() <= by && (a[1] - b[1]).abs() <= by
+    }
+
+    #[test]
+    fn wilsons_interval_has_the_published_values() {
+        // Newcombe 1998, table I, method 3: 81/263, 15/148, 0/20, 1/29.
+        assert!(close(wilson(81, 263), [0.2553, 0.3662], 5e-5), "{:?}", wilson(81, 263));
+        assert!(close(wilson(15, 148), [0.0624, 0.1605], 5e-5), "{:?}", wilson(15, 148));
+        assert!(close(wilson(0, 20), [0.0, 0.1611], 5e-5), "{:?}", wilson(0, 20));
+        assert!(close(wilson(1, 29), [0.0061, 0.1718], 5e-5), "{:?}", wilson(1, 29));
+    }
+
+    #[test]
+    fn wilsons_interval_is_symmetric_and_holds_the_rate() {
+        for n in 1..60 {
+            for k in 0..=n {
+                let [low, high] = wilson(k, n);
+                let [other_low, other_high] = wilson(n - k, n);
+                assert!((low - (1.0 - other_high)).abs() < 1e-12 && (high - (1.0 - other_low)).abs() < 1e-12);
+                assert!(0.0 <= low && low <= k as f64 / n as f64 && k as f64 / n as f64 <= high && high <= 1.0);
+            }
+        }
+        assert_eq!(wilson(0, 0), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn the_bootstrap_of_equal_values_is_that_value() {
+        assert_eq!(bootstrap_mean(&[vec![2.5], vec![2.5], vec![2.5, 2.5]], 1), [2.5, 2.5]);
+        assert_eq!(bootstrap_mean(&[], 1), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn the_bootstrap_of_many_values_is_the_normal_interval() {
+        // 0 and 1 in equal parts: standard deviation 0.5, so the mean of 400 has 0.5 +- 1.96 * 0.025.
+        let groups: Vec<_> = (0..400).map(|i| vec![f64::from(i % 2)]).collect();
+        assert!(close(bootstrap_mean(&groups, 0), [0.451, 0.549], 0.004), "{:?}", bootstrap_mean(&groups, 0));
+    }
+
+    #[test]
+    fn the_bootstrap_resamples_tasks_not_episodes() {
+        // Three seeds that always agree say nothing more than one does.
+        let single: Vec<_> = (0..40).map(|i| vec![f64::from(i % 2)]).collect();
+        let triple: Vec<_> = (0..40).map(|i| vec![f64::from(i % 2); 3]).collect();
+        assert!(close(bootstrap_mean(&single, 7), bootstrap_mean(&triple, 7), 1e-12));
+    }
+
+    #[test]
+    fn the_bootstrap_depends_on_its_seed_alone() {
+        let groups: Vec<_> = (1..50).map(|i| vec![f64::from(i).sqrt()]).collect();
+        assert_eq!(bootstrap_mean(&groups, 3), bootstrap_mean(&groups, 3));
+        assert_ne!(bootstrap_mean(&groups, 3), bootstrap_mean(&groups, 4));
+    }
+}

@@ -1,0 +1,141 @@
+//! A guess at how the terminal can show pictures: from the environment, and from one question that every terminal answers.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+use super::Protocol;
+
+/// The likeliest protocol and why, given the environment's variables.
+pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
+    let get = |name: &str| variable(name).filter(|value| !value.is_empty());
+    let term = get("TERM").unwrap_or_default();
+    let program = get("TERM_PROGRAM").unwrap_or_default();
+    if term.is_empty() || term == "dumb" {
+        return (Protocol::Ascii, format!("TERM is {term:?}"));
+    }
+    if get("NO_COLOR").is_some() {
+        return (Protocol::Ascii, "NO_COLOR is set".into());
+    }
+    if !shows_unicode(&variable) {
+        return (Protocol::Ascii, "the locale is not UTF-8".into());
+    }
+    for (inside, name) in [("TMUX", "tmux"), ("STY", "screen"), ("ZELLIJ", "zellij"), ("MOSH_CONNECTION", "mosh")] {
+        if get(inside).is_some() || term.starts_with(name) {
+            return (Protocol::HalfBlocks, format!("inside {name}"));
+        }
+    }
+    // WezTerm and Konsole answer to kitty's name but draw its placeholders wrongly: they are asked for what they do well.
+    if program == "WezTerm" || get("WEZTERM_EXECUTABLE").is_some() || term == "wezterm" {
+        return (Protocol::Iterm2, "the terminal is WezTerm".into());
+    }
+    if get("KONSOLE_VERSION").is_some() {
+        return (Protocol::HalfBlocks, "Konsole draws pictures unreliably".into());
+    }
+    if get("KITTY_WINDOW_ID").is_some() || term.contains("kitty") {
+        return (Protocol::Kitty, "the terminal is kitty".into());
+    }
+    if term.contains("ghostty") || program == "ghostty" {
+        return (Protocol::Kitty, "the terminal is Ghostty".into());
+    }
+    if program == "iTerm.app" || get("LC_TERMINAL").as_deref() == Some("iTerm2") {
+        return (Protocol::Iterm2, "the terminal is iTerm2".into());
+    }
+    if program == "vscode" {
+        return (Protocol::HalfBlocks, "VS Code shows pictures only where it is told to".into());
+    }
+    if get("WT_SESSION").is_some() {
+        return (Protocol::Sixel, "the terminal is Windows Terminal".into());
+    }
+    if ["foot", "mlterm", "contour", "sixel"].iter().any(|name| term.contains(name)) {
+        return (Protocol::Sixel, format!("TERM is {term}"));
+    }
+    (Protocol::HalfBlocks, UNKNOWN.into())
+}
+
+/// Whether characters beyond ASCII may be sent: the locale does not say otherwise.
+pub fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let get = |name: &str| variable(name).filter(|value| !value.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(get).unwrap_or_default();
+    let dumb = get("TERM").is_none_or(|term| term == "dumb");
+    !dumb && (locale.is_empty() || locale.to_lowercase().replace('-', "").contains("utf8"))
+}
+
+/// The reason for half-blocks where nothing tells the terminal apart.
+pub const UNKNOWN: &str = "no sign of picture support";
+
+/// Asks the terminal what it is ("primary device attributes") and reads its answer until `patience` is over. Attribute 4
+/// means sixel. A later answer does no harm: crossterm knows this one and drops it.
+///
+/// # Errors
+/// When the terminal cannot be written or read.
+pub fn has_sixel(patience: Duration) -> std::io::Result<bool> {
+    let mut out = std::io::stdout();
+    out.write_all(b"\x1b[c")?;
+    out.flush()?;
+    let stdin = std::io::stdin();
+    let deadline = Instant::now() + patience;
+    let mut answer = Vec::new();
+    while !answer.ends_with(b"c") && answer.len() < 256 {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let timeout = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: i64::from(left.subsec_nanos()) };
+        let mut waiting = [PollFd::new(&stdin, PollFlags::IN)];
+        if left.is_zero() || poll(&mut waiting, Some(&timeout))? == 0 {
+            break;
+        }
+        let mut byte = [0];
+        if rustix::io::read(&stdin, &mut byte)? == 0 {
+            break;
+        }
+        answer.push(byte[0]);
+    }
+    Ok(attributes(&answer).contains(&4))
+}
+
+/// The numbers in a "primary device attributes" answer.
+fn attributes(answer: &[u8]) -> Vec<u32> {
+    let text = String::from_utf8_lossy(answer);
+    let Some((_, rest)) = text.split_once("\x1b[?") else { return Vec::new() };
+    rest.trim_end_matches('c').split(';').filter_map(|number| number.parse().ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(variables: &[(&str, &str)], expected: Protocol) {
+        let variable =
+            |name: &str| variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_string());
+        let (protocol, reason) = guess(variable);
+        assert_eq!(protocol, expected, "{variables:?}: {reason}");
+        assert!(!reason.is_empty());
+    }
+
+    #[test]
+    fn the_environment_decides_and_doubt_means_plainer_pictures() {
+        let utf8 = ("LANG", "en_US.UTF-8");
+        check(&[], Protocol::Ascii);
+        check(&[("TERM", "dumb"), utf8], Protocol::Ascii);
+        check(&[("TERM", "xterm-256color"), ("LANG", "C")], Protocol::Ascii);
+        check(&[("TERM", "xterm-kitty"), utf8], Protocol::Kitty);
+        check(&[("TERM", "xterm-kitty"), ("NO_COLOR", "1"), utf8], Protocol::Ascii);
+        check(
+            &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux-0"), ("KITTY_WINDOW_ID", "1"), utf8],
+            Protocol::HalfBlocks,
+        );
+        check(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "iTerm.app"), utf8], Protocol::Iterm2);
+        check(&[("TERM", "foot"), utf8], Protocol::Sixel);
+        check(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor"), utf8], Protocol::HalfBlocks);
+        check(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "WezTerm"), utf8], Protocol::Iterm2);
+        check(&[("TERM", "xterm-256color"), ("WT_SESSION", "1"), utf8], Protocol::Sixel);
+        check(&[("TERM", "xterm-256color")], Protocol::HalfBlocks);
+    }
+
+    #[test]
+    fn the_attributes_of_a_terminal_are_read_from_its_answer() {
+        assert_eq!(attributes(b"\x1b[?62;4;22c"), [62, 4, 22]);
+        assert_eq!(attributes(b"\x1b[?1;2c"), [1, 2]);
+        assert!(attributes(b"q\x1b[1;1R").is_empty());
+    }
+}

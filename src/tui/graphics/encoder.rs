@@ -1,0 +1,66 @@
+//! The thread that encodes frames. It always takes the newest; older ones that it did not get to are dropped.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+
+use super::{Job, Picture};
+
+/// A place for one job: a newer one replaces it.
+#[derive(Default)]
+struct Slot {
+    job: Option<Job>,
+    closed: bool,
+}
+
+/// Hands frames to the encoding thread; the thread ends when this is dropped.
+pub struct Encoder {
+    slot: Arc<(Mutex<Slot>, Condvar)>,
+}
+
+impl Encoder {
+    /// Starts the thread; finished pictures go to `deliver`, which says whether anybody still wants them.
+    ///
+    /// # Errors
+    /// When the system has no thread left.
+    pub fn start(deliver: impl Fn(Picture) -> bool + Send + 'static) -> std::io::Result<Encoder> {
+        let slot = Arc::new((Mutex::new(Slot::default()), Condvar::new()));
+        let shared = slot.clone();
+        std::thread::Builder::new().name("encoder".into()).spawn(move || {
+            while let Some(job) = take(&shared) {
+                if !deliver(Picture::encode(&job)) {
+                    break;
+                }
+            }
+        })?;
+        Ok(Encoder { slot })
+    }
+
+    /// Leaves a frame to be encoded, in place of one that still waits.
+    pub fn submit(&self, job: Job) {
+        let (slot, filled) = &*self.slot;
+        slot.lock().unwrap_or_else(PoisonError::into_inner).job = Some(job);
+        filled.notify_one();
+    }
+}
+
+impl Drop for Encoder {
+    fn drop(&mut self) {
+        let (slot, filled) = &*self.slot;
+        slot.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
+        filled.notify_one();
+    }
+}
+
+/// Waits for a job; `None` when no more will come.
+fn take(shared: &(Mutex<Slot>, Condvar)) -> Option<Job> {
+    let (slot, filled) = shared;
+    let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+    loop {
+        if slot.closed {
+            return None;
+        }
+        if let Some(job) = slot.job.take() {
+            return Some(job);
+        }
+        slot = filled.wait(slot).unwrap_or_else(PoisonError::into_inner);
+    }
+}

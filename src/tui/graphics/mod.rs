@@ -1,0 +1,157 @@
+//! Pictures in a terminal: which way, and the frame encoded that way. Encoding happens on a thread of its own.
+
+pub mod blocks;
+pub mod classes;
+pub mod detect;
+pub mod encoder;
+pub mod inline;
+pub mod labels;
+
+use std::num::NonZeroU16;
+use std::sync::Arc;
+
+use ratatui::buffer::{Buffer, CellDiffOption};
+use ratatui::layout::{Rect, Size};
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::widgets::Widget;
+
+use crate::house::view::Frame;
+use classes::Letters;
+use labels::Label;
+
+/// How a picture can be shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Protocol {
+    /// The kitty graphics protocol, with Unicode placeholders; the terminal scales.
+    Kitty,
+    /// iTerm2's inline images; the terminal scales.
+    Iterm2,
+    /// Sixel graphics.
+    Sixel,
+    /// Coloured block characters.
+    HalfBlocks,
+    /// A letter for each object class.
+    Ascii,
+}
+
+impl Protocol {
+    /// Every protocol, in the order in which the key goes round.
+    pub const ALL: [Protocol; 5] =
+        [Protocol::HalfBlocks, Protocol::Ascii, Protocol::Kitty, Protocol::Iterm2, Protocol::Sixel];
+
+    /// The name that `--graphics` takes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Protocol::Kitty => "kitty",
+            Protocol::Iterm2 => "iterm2",
+            Protocol::Sixel => "sixel",
+            Protocol::HalfBlocks => "halfblocks",
+            Protocol::Ascii => "ascii",
+        }
+    }
+
+    /// The next one, around.
+    pub fn next(self) -> Protocol {
+        let at = Protocol::ALL.iter().position(|&protocol| protocol == self).unwrap_or(0);
+        Protocol::ALL[(at + 1) % Protocol::ALL.len()]
+    }
+
+    /// Whether the picture is drawn by an escape sequence that the screen's own cells do not know of, so that covering and
+    /// uncovering it needs a full repaint.
+    pub fn floats(self) -> bool {
+        matches!(self, Protocol::Iterm2 | Protocol::Sixel)
+    }
+}
+
+/// A frame to be encoded.
+#[derive(Clone)]
+pub struct Job {
+    /// The frame.
+    pub frame: Arc<Frame>,
+    /// The letters of the scene's classes.
+    pub letters: Arc<Letters>,
+    /// For each instance code in the frame, its class letter's key; see [`classes::draw`].
+    pub classes: Arc<classes::Names>,
+    /// What is numbered in it.
+    pub labels: Vec<Label>,
+    /// How.
+    pub protocol: Protocol,
+    /// The character cells that it fills.
+    pub cells: Size,
+    /// The pixels of a character cell, width and height.
+    pub cell_pixels: (u16, u16),
+}
+
+/// An encoded frame.
+#[derive(Clone)]
+pub struct Picture {
+    /// How it is encoded.
+    pub protocol: Protocol,
+    /// The character cells that it fills.
+    pub cells: Size,
+    /// Its content.
+    pub content: Content,
+}
+
+/// What an encoded frame consists of.
+#[derive(Clone)]
+pub enum Content {
+    /// Characters with colours, row by row.
+    Cells(Vec<(char, Style)>),
+    /// A sequence that transmits the picture; placeholders then show it.
+    Placed(String),
+    /// A sequence that draws the picture where the cursor is.
+    Drawn(String),
+}
+
+impl Picture {
+    /// Encodes a frame.
+    pub fn encode(job: &Job) -> Picture {
+        let content = match job.protocol {
+            Protocol::HalfBlocks => Content::Cells(blocks::draw(job)),
+            Protocol::Ascii => Content::Cells(classes::draw(job)),
+            Protocol::Kitty => Content::Placed(inline::kitty(job)),
+            Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),
+            Protocol::Sixel => Content::Drawn(inline::sixel(job)),
+        };
+        Picture { protocol: job.protocol, cells: job.cells, content }
+    }
+}
+
+/// Escape sequences are wider as text than on the screen.
+const ONE: CellDiffOption = CellDiffOption::ForcedWidth(NonZeroU16::MIN);
+
+impl Widget for &Picture {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        if area.width < self.cells.width || area.height < self.cells.height || area.is_empty() {
+            return;
+        }
+        let area = Rect { width: self.cells.width, height: self.cells.height, ..area };
+        match &self.content {
+            Content::Cells(cells) => {
+                for (position, (symbol, style)) in area.positions().zip(cells) {
+                    buf[position].set_char(*symbol).set_style(*style);
+                }
+            }
+            Content::Placed(transmit) => {
+                for (row, line) in area.rows().enumerate() {
+                    for (column, position) in line.positions().enumerate() {
+                        let placeholder = inline::placeholder(row, column);
+                        let first = (row, column) == (0, 0);
+                        let symbol = if first { format!("{transmit}{placeholder}") } else { placeholder };
+                        buf[position].set_symbol(&symbol).set_diff_option(ONE);
+                        buf[position].fg = Color::Indexed(inline::KITTY_ID);
+                        buf[position].bg = Color::Reset;
+                        buf[position].modifier = Modifier::empty();
+                    }
+                }
+            }
+            Content::Drawn(sequence) => {
+                for position in area.positions().skip(1) {
+                    buf[position].set_diff_option(CellDiffOption::Skip);
+                }
+                buf[area.as_position()].set_symbol(sequence).set_diff_option(ONE);
+            }
+        }
+    }
+}

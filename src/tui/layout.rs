@@ -1,0 +1,142 @@
+//! Where everything is on the screen. Nothing moves unless the terminal's size does.
+
+use ratatui::layout::Rect;
+
+use super::graphics::Protocol;
+
+/// The smallest screen that is drawn.
+pub const SMALLEST: (u16, u16) = (80, 24);
+/// Rows under the picture for the letters' meaning, where letters are the picture.
+pub const LEGEND: u16 = 3;
+
+/// The panels of the screen; each has its title in its first row.
+///
+/// ```text
+/// header: scene, step, seed, who acts
+/// +- Sees -----------------+- Mind -------------------+
+/// |                        |                          |
+/// |        picture         +- Task ------+- Map ------+
+/// |                        |             |            |
+/// +- In reach -------------+- Log -------+            |
+/// |                        |             |            |
+/// instruction
+/// status: keys, graphics
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// The first row.
+    pub header: Rect,
+    /// What the agent sees.
+    pub sees: Rect,
+    /// Hand and interactions.
+    pub reach: Rect,
+    /// What the policy thinks.
+    pub mind: Rect,
+    /// The subtasks.
+    pub task: Rect,
+    /// The events.
+    pub log: Rect,
+    /// The floor plan.
+    pub map: Rect,
+    /// The instruction.
+    pub instruction: Rect,
+    /// The last row.
+    pub status: Rect,
+}
+
+/// What the panels on the right need: the map, a gap, and words.
+const NARROWEST_RIGHT: u16 = 46;
+
+impl Layout {
+    /// The layout of a screen; `None` when it is too small.
+    pub fn of(screen: Rect) -> Option<Layout> {
+        if screen.width < SMALLEST.0 || screen.height < SMALLEST.1 {
+            return None;
+        }
+        let rect = |x: u16, y: u16, width: u16, height: u16| Rect { x: screen.x + x, y: screen.y + y, width, height };
+        let (width, height) = (screen.width, screen.height);
+        let body = height - 3;
+        // The picture is square, two columns to a row; what remains of its column lists the interactions.
+        let listed = if body < 30 { 5 } else { 8 };
+        let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
+        let sees = 1 + left / 2;
+        let right = width - left - 2;
+        let mind = if body >= 30 { 13 } else { 9 };
+        let below = body - mind;
+        let map = (right * 45 / 100).max(22).min(2 * below + 2).min(80);
+        let words = right - map - 2;
+        let task = (below / 2).clamp(6, 12);
+        let x = left + 2;
+        Some(Layout {
+            header: rect(0, 0, width, 1),
+            sees: rect(0, 1, left, sees),
+            reach: rect(0, 1 + sees, left, body - sees),
+            mind: rect(x, 1, right, mind),
+            task: rect(x, 1 + mind, words, task),
+            log: rect(x, 1 + mind + task, words, below - task),
+            map: rect(x + words + 2, 1 + mind, map, below),
+            instruction: rect(0, height - 2, width, 1),
+            status: rect(0, height - 1, width, 1),
+        })
+    }
+
+    /// The cells that a square picture fills, in the middle of its panel.
+    pub fn picture(&self, protocol: Protocol, cell_pixels: (u16, u16)) -> Rect {
+        let legend = if protocol == Protocol::Ascii { LEGEND } else { 0 };
+        let inner = Rect { y: self.sees.y + 1, height: self.sees.height.saturating_sub(1 + legend), ..self.sees };
+        let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
+        let widest = u32::from(inner.height) * down / across;
+        let width = widest.min(u32::from(inner.width));
+        let height = (width * across).div_ceil(down).min(u32::from(inner.height));
+        let (width, height) = (width as u16, height as u16);
+        Rect { x: inner.x + (inner.width - width) / 2, y: inner.y, width, height }
+    }
+
+    /// How many interactions the list shows at a time.
+    pub fn interactions(&self) -> usize {
+        let rows = usize::from(self.reach.height.saturating_sub(1));
+        let columns = if self.reach.width >= 60 { 2 } else { 1 };
+        (rows * columns).min(9)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_fill_the_screen_without_overlap_at_every_size() {
+        for (width, height) in [(80, 24), (81, 25), (100, 30), (120, 36), (200, 60), (250, 24), (80, 100), (400, 120)] {
+            let layout = Layout::of(Rect::new(0, 0, width, height)).unwrap();
+            let panels = [
+                layout.header,
+                layout.sees,
+                layout.reach,
+                layout.mind,
+                layout.task,
+                layout.log,
+                layout.map,
+                layout.instruction,
+                layout.status,
+            ];
+            for (at, panel) in panels.iter().enumerate() {
+                assert!(panel.right() <= width && panel.bottom() <= height, "{width}x{height}: {panel:?}");
+                assert!(panel.width >= 22 && panel.height >= 1, "{width}x{height}: {panel:?}");
+                for other in &panels[at + 1..] {
+                    assert!(!panel.intersects(*other), "{width}x{height}: {panel:?} {other:?}");
+                }
+            }
+            assert!(layout.interactions() >= 4);
+            for protocol in Protocol::ALL {
+                let picture = layout.picture(protocol, (8, 16));
+                assert!(layout.sees.union(picture) == layout.sees && picture.width >= 18, "{picture:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_smaller_screen_is_not_drawn() {
+        assert!(Layout::of(Rect::new(0, 0, 79, 24)).is_none());
+        assert!(Layout::of(Rect::new(0, 0, 80, 23)).is_none());
+    }
+}

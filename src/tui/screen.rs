@@ -1,0 +1,247 @@
+//! The loop of the explorer's screen: messages in, one `update`, effects out, one drawing for all that came.
+
+use std::io::{self, BufWriter, Write};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use crossterm::event::Event;
+use crossterm::queue;
+use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
+use ratatui::Terminal;
+use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::layout::Size;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use super::app::{App, Effect, Farewell, Graphics, Msg, update};
+use super::engine::Engine;
+use super::graphics::encoder::Encoder;
+use super::graphics::{Protocol, detect};
+use super::policies::PolicyKind;
+use super::terminal::{self, Counted};
+use super::theme::Ability;
+use super::worker::{self, Command};
+
+/// What the screen is started with.
+pub struct Screen {
+    /// How to show pictures; `None` to find out.
+    pub protocol: Option<Protocol>,
+    /// Who decides at first.
+    pub policy: PolicyKind,
+    /// A person acts at first.
+    pub manual: bool,
+    /// The policy runs as soon as it is there.
+    pub runs: bool,
+    /// Where libtorch's messages go.
+    pub log: Option<std::fs::File>,
+}
+
+/// Messages that may wait for the screen; beyond that their senders wait.
+const QUEUE: usize = 64;
+/// How long a screen that does not react to a signal is waited for.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Shows the explorer until it ends.
+///
+/// # Errors
+/// When there is no terminal, or the worker stopped.
+pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send + 'static) -> anyhow::Result<Farewell> {
+    // The screen strips colours itself where there are none: kitty's placeholders carry a number in theirs.
+    crossterm::style::force_color_output(true);
+    let ability = ability();
+    terminal::catch_panics();
+    let (tell, messages) = sync_channel(QUEUE);
+    watch_signals(tell.clone())?;
+    let guard =
+        terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
+    let graphics = graphics(screen.protocol, ability);
+    let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
+    let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
+
+    let reports = tell.clone();
+    let gone = Gone(tell.clone());
+    let commands = worker::start(open, move |report| {
+        let _ = &gone;
+        reports.send(Msg::Report(report)).is_ok()
+    })?;
+    let pictures = tell.clone();
+    if screen.runs && !screen.manual {
+        commands.send(Command::Run(true))?;
+    }
+    let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
+    read_keys(tell)?;
+    let farewell = converse(Conversation::new(app, display, commands, encoder), &messages);
+    drop(guard);
+    match farewell? {
+        Farewell::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
+        farewell => Ok(farewell),
+    }
+}
+
+/// Says that the worker ended, however it did.
+struct Gone(SyncSender<Msg>);
+
+impl Drop for Gone {
+    fn drop(&mut self) {
+        let _ = self.0.send(Msg::WorkerGone);
+    }
+}
+
+/// The screen's side of it all: the state, the display that shows it, and those who work for it.
+pub struct Conversation<W: Write> {
+    app: App,
+    display: Terminal<CrosstermBackend<W>>,
+    commands: Sender<Command>,
+    encoder: Encoder,
+    /// The step that the meter of bytes counted last, and the bytes written until then.
+    metered: (u32, u64),
+}
+
+impl<W: Write> Conversation<W> {
+    /// Begins.
+    pub fn new(
+        app: App,
+        display: Terminal<CrosstermBackend<W>>,
+        commands: Sender<Command>,
+        encoder: Encoder,
+    ) -> Conversation<W> {
+        Conversation { app, display, commands, encoder, metered: (0, 0) }
+    }
+
+    /// Draws the state and sends it out whole.
+    ///
+    /// # Errors
+    /// When the terminal cannot be written.
+    pub fn show(&mut self) -> io::Result<()> {
+        queue!(self.display.backend_mut(), BeginSynchronizedUpdate)?;
+        draw(&mut self.display, &self.app)?;
+        queue!(self.display.backend_mut(), EndSynchronizedUpdate)?;
+        Write::flush(self.display.backend_mut())
+    }
+
+    /// Takes in messages; says when one of them ends it.
+    ///
+    /// # Errors
+    /// When the terminal cannot be written.
+    pub fn hear(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<Farewell>> {
+        let mut encode = false;
+        for msg in messages {
+            for effect in update(&mut self.app, msg) {
+                match effect {
+                    // A worker that is gone says so itself.
+                    Effect::Send(command) => drop(self.commands.send(command)),
+                    Effect::Encode => encode = true,
+                    Effect::Repaint => self.display.clear()?,
+                    Effect::Quit(farewell) => return Ok(Some(farewell)),
+                }
+            }
+        }
+        if encode && let Some(job) = self.app.job() {
+            if job.protocol == Protocol::Kitty {
+                terminal::holds_pictures();
+            }
+            self.encoder.submit(job);
+        }
+        self.meter();
+        Ok(None)
+    }
+
+    /// Notes what the newest steps cost on the wire.
+    fn meter(&mut self) {
+        let step = self.app.now.as_ref().map_or(0, |now| now.step);
+        let (before, bytes_before) = self.metered;
+        if step != before {
+            let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
+            self.app.bytes = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
+            self.metered = (step, bytes);
+        }
+    }
+}
+
+/// Takes in messages until one of them ends it.
+fn converse(mut conversation: Conversation<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<Farewell> {
+    loop {
+        conversation.show()?;
+        let first = messages.recv().context("all threads are gone")?;
+        // What came meanwhile is taken in before the next drawing: only the newest state is drawn.
+        let all = std::iter::once(first).chain(messages.try_iter().take(4 * QUEUE));
+        if let Some(farewell) = conversation.hear(all)? {
+            return Ok(farewell);
+        }
+    }
+}
+
+/// Draws the state.
+///
+/// # Errors
+/// When the terminal cannot be written.
+pub fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::Error> {
+    display.draw(|frame| frame.render_widget(app, frame.area())).map(drop)
+}
+
+/// What the terminal can show, from the environment.
+fn ability() -> Ability {
+    let colours = termprofile::TermProfile::detect(&io::stdout(), termprofile::DetectorSettings::new());
+    let variable = |name: &str| std::env::var(name).ok();
+    Ability { colours, unicode: detect::shows_unicode(variable) }
+}
+
+/// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
+fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
+    let cell_pixels = match crossterm::terminal::window_size() {
+        Ok(window) if window.width > 0 && window.height > 0 => {
+            ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
+        }
+        _ => (10, 20),
+    };
+    let (protocol, reason) = match asked {
+        Some(protocol) => (protocol, "asked for".to_string()),
+        None => {
+            let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
+            let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
+            if reason == detect::UNKNOWN && detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false) {
+                (Protocol::Sixel, "the terminal says that it has sixels".into())
+            } else if protocol == Protocol::HalfBlocks && !ability.shades() {
+                (Protocol::Ascii, "the terminal has few colours".into())
+            } else {
+                (protocol, reason)
+            }
+        }
+    };
+    Graphics { protocol, reason, cell_pixels }
+}
+
+fn read_keys(tell: SyncSender<Msg>) -> io::Result<()> {
+    let read = move || {
+        while let Ok(event) = crossterm::event::read() {
+            let msg = match event {
+                Event::Key(key) => Msg::Key(key),
+                Event::Paste(text) => Msg::Paste(text),
+                Event::Resize(width, height) => Msg::Resize(Size { width, height }),
+                _ => continue,
+            };
+            if tell.send(msg).is_err() {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().name("keys".into()).spawn(read).map(drop)
+}
+
+/// A signal asks the screen to end; when it does not in time, the terminal is given back here and the program ends.
+fn watch_signals(tell: SyncSender<Msg>) -> io::Result<()> {
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    let watch = move || {
+        if let Some(number) = signals.forever().next() {
+            let asked = Instant::now();
+            while tell.try_send(Msg::Signal(number)).is_err() && asked.elapsed() < PATIENCE {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            std::thread::sleep(PATIENCE.saturating_sub(asked.elapsed()));
+            terminal::give_back();
+            std::process::exit(128 + number);
+        }
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
+}

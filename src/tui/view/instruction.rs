@@ -1,0 +1,41 @@
+//! The instruction, or the line in which it is typed.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
+
+use super::fit;
+use crate::tui::app::App;
+use crate::tui::keys::Mode;
+use crate::tui::theme::THEME;
+
+/// The line with the instruction.
+pub struct Instruction<'a>(pub &'a App);
+
+impl Widget for Instruction<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let now = app.now.as_ref().map_or("", |now| now.instruction.as_str());
+        let prompt = "Instruction > ";
+        buf.set_string(area.x, area.y, prompt, THEME.title);
+        let rest = Rect { x: area.x + prompt.width() as u16, width: area.width - prompt.width() as u16, ..area };
+        if app.mode == Mode::Typing {
+            let hint = format!("  now: {}", fit(now, usize::from(area.width) / 3));
+            let typed = rest.width.saturating_sub(hint.width() as u16);
+            app.editor.area().render(Rect { width: typed, ..rest }, buf);
+            buf.set_string(rest.x + typed, rest.y, hint, THEME.quiet);
+            return;
+        }
+        let mut spans = vec![Span::styled(fit(now, usize::from(rest.width)), THEME.instruction)];
+        let left = usize::from(rest.width).saturating_sub(now.width());
+        match &app.replaced {
+            Some(old) if left > 12 => {
+                spans.push(Span::styled(format!("  (was: {})", fit(old, left - 10)), THEME.quiet));
+            }
+            _ => {}
+        }
+        Line::from(spans).render(rest, buf);
+    }
+}

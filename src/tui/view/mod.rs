@@ -1,0 +1,226 @@
+//! The screen: one widget a panel, drawn from the state alone.
+
+mod frame;
+mod help;
+mod instruction;
+mod log;
+mod map;
+mod mind;
+mod reach;
+mod status;
+mod task;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Widget, Wrap};
+use unicode_width::UnicodeWidthStr;
+
+use super::app::App;
+use super::keys::Mode;
+use super::layout::SMALLEST;
+use super::theme::THEME;
+
+impl Widget for &App {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let Some(layout) = self.layout() else {
+            too_small(area, buf);
+            return;
+        };
+        status::Header(self).render(layout.header, buf);
+        frame::Sees(self).render(layout.sees, buf);
+        reach::Reach(self).render(layout.reach, buf);
+        mind::MindPanel(self).render(layout.mind, buf);
+        task::TaskPanel(self).render(layout.task, buf);
+        log::Log(self).render(layout.log, buf);
+        map::Map(self).render(layout.map, buf);
+        instruction::Instruction(self).render(layout.instruction, buf);
+        status::Status(self).render(layout.status, buf);
+        if self.mode == Mode::Help {
+            help::Help(self).render(area, buf);
+        }
+        self.ability.adapt(buf);
+    }
+}
+
+fn too_small(area: Rect, buf: &mut Buffer) {
+    let (width, height) = SMALLEST;
+    let text = format!(
+        "This terminal is too small: {} x {}. The explorer needs {width} x {height}. Make it larger, or press q to quit.",
+        area.width, area.height
+    );
+    Paragraph::new(text).wrap(Wrap { trim: true }).render(area, buf);
+}
+
+/// Draws a panel's title over a rule, with something quiet at its right; returns the rest of the panel.
+fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
+    let width = usize::from(area.width);
+    let right = fit(right, width.saturating_sub(title.width() + 4));
+    let rule = width.saturating_sub(title.width() + 1 + if right.is_empty() { 0 } else { right.width() + 1 });
+    let mut spans =
+        vec![Span::styled(title.to_string(), THEME.title), Span::raw(" "), Span::styled("─".repeat(rule), THEME.quiet)];
+    if !right.is_empty() {
+        spans.extend([Span::raw(" "), Span::raw(right)]);
+    }
+    Line::from(spans).render(Rect { height: 1.min(area.height), ..area }, buf);
+    Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area }
+}
+
+/// Text cut to `width` columns, the cut marked.
+fn fit(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_string();
+    }
+    let mut short = String::new();
+    for c in text.chars() {
+        if short.width() + unicode_width::UnicodeWidthChar::width(c).unwrap_or(0) + 1 > width {
+            break;
+        }
+        short.push(c);
+    }
+    if width > 0 {
+        short.push('…');
+    }
+    short
+}
+
+/// Lines of at most `width` columns, broken at spaces; later lines start with `indent`.
+fn wrap(text: &str, width: usize, indent: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let fresh = lines.len() > 1;
+        let line = lines.last_mut().map_or("", |line| line.as_str());
+        let start = if fresh { indent.width() } else { 0 };
+        if line.width() > start && line.width() + 1 + word.width() > width {
+            lines.push(format!("{indent}{word}"));
+        } else if let Some(line) = lines.last_mut() {
+            if line.width() > start {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines.iter().map(|line| fit(line, width)).collect()
+}
+
+/// A bar of `share` (0 to 1) of `width` columns, in eighths of a column.
+fn bar(share: f32, width: usize) -> String {
+    const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
+    let eighths = (share.clamp(0.0, 1.0) * 8.0 * width as f32).round() as usize;
+    let mut bar = "█".repeat(eighths / 8);
+    if !eighths.is_multiple_of(8) {
+        bar.push(EIGHTHS[eighths % 8]);
+    }
+    format!("{bar:<width$}")
+}
+
+/// A probability in three columns: `.07`, `1.0`.
+fn share(p: f32) -> String {
+    if p >= 0.995 { "1.0".into() } else { format!("{p:.2}").trim_start_matches('0').to_string() }
+}
+
+/// A line of text at a row of an area.
+fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String>, style: Style) {
+    if row < area.height {
+        let line = Rect { y: area.y + row, height: 1, ..area };
+        Line::styled(fit(&text.into(), usize::from(area.width)), style).render(line, buf);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_grow_by_eighths() {
+        assert_eq!(bar(0.0, 4), "    ");
+        assert_eq!(bar(1.0, 4), "████");
+        assert_eq!(bar(0.5, 4), "██  ");
+        assert_eq!(bar(0.28, 4), "█▏  ");
+        assert_eq!((share(0.071), share(1.0), share(0.0)), (".07".into(), "1.0".into(), ".00".into()));
+    }
+
+    #[test]
+    fn long_text_is_broken_at_spaces_and_cut_visibly() {
+        assert_eq!(wrap("put the apple in the fridge", 12, "  "), ["put the", "  apple in", "  the fridge"]);
+        assert_eq!(fit("refrigerator", 6), "refri…");
+        assert_eq!(fit("cup", 6), "cup");
+    }
+}
+
+#[cfg(test)]
+mod screens {
+    use termprofile::TermProfile;
+
+    use crate::house::Outcome;
+    use crate::tui::app::{Msg, perform, update};
+    use crate::tui::engine::Event;
+    use crate::tui::graphics::Protocol;
+    use crate::tui::testing::{app, engine, screen, snapshot};
+    use crate::tui::theme::Ability;
+    use crate::tui::verb::Verb;
+    use crate::tui::worker::Report;
+
+    fn check(name: &str, text: &str) {
+        insta::with_settings!({ snapshot_path => "../snapshots", prepend_module_to_snapshot => false }, {
+            insta::assert_snapshot!(name, text);
+        });
+    }
+
+    #[test]
+    fn watching_at_80_by_24_and_120_by_36() {
+        for (name, width, height) in [("watch-80x24", 80, 24), ("watch-120x36", 120, 36)] {
+            let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+            for (step, action) in [(1, "RotateLeft"), (2, "MoveAhead")] {
+                let event =
+                    Event { step, action: action.into(), outcome: Outcome::Done, by_hand: step == 2, completed: None };
+                update(&mut app, Msg::Report(Report::Stepped(event)));
+            }
+            check(name, &screen(&mut app));
+        }
+    }
+
+    #[test]
+    fn typing_shows_what_the_agent_is_told_now() {
+        let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        perform(&mut app, Verb::Edit);
+        update(&mut app, Msg::Paste("open the fridge".into()));
+        check("typing-80x24", &screen(&mut app));
+    }
+
+    #[test]
+    fn another_instruction_ends_the_task_and_the_expert_says_so() {
+        let mut app = app(120, 36, Protocol::HalfBlocks, Ability::FULL);
+        let mut engine = engine();
+        let note = engine.instruct("open the fridge").unwrap();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Report(Report::Instructed { old, new, note }));
+        update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
+        update(&mut app, Msg::Report(Report::Failed("the expert needs a task".into())));
+        check("no-task-120x36", &screen(&mut app));
+    }
+
+    #[test]
+    fn help_names_every_key() {
+        let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        perform(&mut app, Verb::ToggleManual);
+        perform(&mut app, Verb::Help);
+        check("help-80x24", &screen(&mut app));
+    }
+
+    #[test]
+    fn without_colour_and_unicode_letters_say_it_all() {
+        let ability = Ability { colours: TermProfile::NoColor, unicode: false };
+        let mut app = app(80, 24, Protocol::Ascii, ability);
+        let text = screen(&mut app);
+        assert!(text.is_ascii(), "{text}");
+        check("ascii-80x24", &text);
+    }
+
+    #[test]
+    fn a_small_terminal_is_told_what_is_needed() {
+        let mut app = app(40, 10, Protocol::HalfBlocks, Ability::FULL);
+        check("too-small-40x10", &screen(&mut app));
+    }
+}

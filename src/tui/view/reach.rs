@@ -1,0 +1,54 @@
+//! What is in the hand, and the interactions that are possible now, by number.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+use super::{fit, panel, put};
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+
+/// The panel with hand and interactions.
+pub struct Reach<'a>(pub &'a App);
+
+impl Widget for Reach<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let Some(now) = &app.now else {
+            panel(buf, area, "In reach", "");
+            return;
+        };
+        let held = now.world.held.and_then(|held| now.world.object(held));
+        let hand = held.map_or("hand empty".into(), |object| {
+            let slice = if object.slice_of.is_some() { "a slice of " } else { "" };
+            format!("hand: {slice}{}", object.class)
+        });
+        let inner = panel(buf, area, "In reach", &hand);
+        let page = app.page_of_candidates();
+        if page.is_empty() {
+            put(buf, inner, 0, "nothing: move closer, or turn", THEME.quiet);
+            return;
+        }
+        let columns: u16 = if area.width >= 60 { 2 } else { 1 };
+        let rows = inner.height;
+        let width = (inner.width - 2 * (columns - 1)) / columns;
+        let chosen = app.thought.as_ref().map(|(decision, _)| decision.action);
+        let more = app.pages() > 1;
+        for (at, candidate) in (0u16..).zip(page) {
+            let place = Rect { x: inner.x + at / rows * (width + 2), y: inner.y + at % rows, width, height: 1 };
+            let style = if chosen == Some(candidate.action()) { THEME.chosen } else { THEME.key };
+            let name = fit(&format!("{} {}", candidate.kind, candidate.class.name()), usize::from(width) - 3 - 6);
+            let mut spans = vec![
+                Span::styled(format!("{} ", at + 1), style),
+                Span::styled(name, if chosen == Some(candidate.action()) { THEME.chosen } else { Default::default() }),
+            ];
+            if usize::from(at) + 1 == page.len() && more {
+                spans.push(Span::styled(format!("  tab {}/{}", app.page + 1, app.pages()), THEME.quiet));
+            } else {
+                spans.push(Span::styled(format!("  {:.1} m", candidate.distance / 1000.0), THEME.quiet));
+            }
+            Line::from(spans).render(place, buf);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! The first row (where, when, who) and the last (keys, and how pictures are shown).
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
+
+use super::fit;
+use crate::tui::app::App;
+use crate::tui::keys::Mode;
+use crate::tui::theme::THEME;
+
+/// The first row.
+pub struct Header<'a>(pub &'a App);
+
+impl Widget for Header<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let mut words = vec![];
+        if let Some(now) = &app.now {
+            let room = now.scene.room.spoken();
+            words.push(now.scene.name.clone());
+            if !now.scene.name.starts_with(room) {
+                words.push(room.to_string());
+            }
+            words.push(match (now.horizon, now.expert_steps) {
+                (Some(horizon), _) => format!("step {}/{horizon}", now.step),
+                (None, Some(expert)) => format!("step {} (expert: {expert})", now.step),
+                (None, None) => format!("step {}", now.step),
+            });
+            words.push(format!("seed {}", now.seed));
+        }
+        words.push(if app.by_hand() {
+            format!("you act ({} advises)", app.policy.name())
+        } else {
+            format!("{} acts", app.policy.name())
+        });
+        let (state, style) = match (&app.busy, app.running) {
+            (Some(busy), _) => (format!("{busy} ..."), THEME.note),
+            (None, true) => (format!("running {}", app.pace.name()), THEME.good),
+            (None, false) => (format!("paused ({})", app.pace.name()), THEME.quiet),
+        };
+        let left = format!("SPRINT  {}", words.join(" · "));
+        let room = usize::from(area.width).saturating_sub(state.width() + 2);
+        let left = fit(&left, room);
+        let gap = usize::from(area.width).saturating_sub(left.width() + state.width());
+        let (name, rest) = left.split_at(6.min(left.len()));
+        Line::from(vec![
+            Span::styled(name.to_string(), THEME.title),
+            Span::raw(rest.to_string()),
+            Span::raw(" ".repeat(gap)),
+            Span::styled(state, style),
+        ])
+        .render(area, buf);
+    }
+}
+
+/// The last row.
+pub struct Status<'a>(pub &'a App);
+
+impl Widget for Status<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let hints: &[(&str, &str)] = match app.mode {
+            Mode::Watch => {
+                &[("space", "run"), ("n", "step"), ("i", "instruct"), ("m", "take over"), ("?", "keys"), ("q", "quit")]
+            }
+            Mode::Manual => &[
+                ("arrows", "move"),
+                ("1-9", "act"),
+                ("enter", "policy's choice"),
+                ("i", "instruct"),
+                ("m", "give back"),
+                ("?", "keys"),
+            ],
+            Mode::Typing => &[("enter", "tell the agent"), ("esc", "leave"), ("up", "earlier instructions")],
+            Mode::Help => &[("esc", "close the help")],
+        };
+        let mut spans = Vec::new();
+        let mut used = 0;
+        for (key, word) in hints {
+            let word = if *key == "space" && app.running { "pause" } else { word };
+            used += key.width() + word.width() + 3;
+            spans.extend([Span::styled(*key, THEME.key), Span::styled(format!(" {word}  "), THEME.quiet)]);
+        }
+        let bytes = app.bytes.map_or(String::new(), |bytes| format!(" · {:.1} kB/step", bytes as f64 / 1000.0));
+        let graphics = format!("{}: {}{bytes}", app.graphics.protocol.name(), app.graphics.reason);
+        let graphics = fit(&graphics, usize::from(area.width).saturating_sub(used));
+        let gap = usize::from(area.width).saturating_sub(used + graphics.width());
+        spans.extend([Span::raw(" ".repeat(gap)), Span::styled(graphics, THEME.quiet)]);
+        Line::from(spans).render(area, buf);
+    }
+}

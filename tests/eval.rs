@@ -1,0 +1,241 @@
+//! `sprint tasks` and `sprint eval` from the command line: what they write, and how they end.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// The program, in an empty folder of its own.
+struct Sprint {
+    folder: TempDir,
+}
+
+/// How a command ended.
+struct Ended {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+impl Sprint {
+    fn new() -> Sprint {
+        Sprint { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self, line: &str) -> Ended {
+        let mut command = Command::cargo_bin("sprint").unwrap();
+        let command = command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
+        let output = command.args(line.split_whitespace()).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Samples a set of tasks in generated houses.
+    fn sample(&self, name: &str, length: usize, count: usize) {
+        let ended =
+            self.run(&format!("tasks sample {name} --scenes generated --length {length} --count {count} --seed 7"));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    }
+
+    /// Changes a file, and gives what `sprint eval` says of it.
+    fn complaint(&self, name: &str, change: impl FnOnce(&mut Value)) -> String {
+        let mut value: Value = serde_json::from_str(&self.read(name)).unwrap();
+        change(&mut value);
+        std::fs::write(self.path("changed.json"), value.to_string()).unwrap();
+        self.refused("changed.json")
+    }
+
+    /// What `sprint eval` says of a file that it must refuse without writing anything.
+    fn refused(&self, name: &str) -> String {
+        let ended = self.run(&format!("eval --tasks {name} --policy random --out refused"));
+        assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+        assert!(ended.stderr.contains(name), "the file is named: {}", ended.stderr);
+        assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
+        assert!(!self.path("refused").exists(), "nothing is half-written");
+        ended.stderr
+    }
+}
+
+#[test]
+fn the_expert_completes_every_sampled_task() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 2, 20);
+    let ended = sprint.run("eval --tasks tasks.json --policy expert --out run --json --fail-below success=1 --jobs 2");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let summary: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!(summary["episodes"], 20);
+    assert_eq!(summary["success"], 1.0);
+    assert_eq!(summary["errors"], 0);
+    assert_eq!(summary["completed_subtasks"]["mean"], 2.0);
+    assert_eq!(summary["progress_by_length"]["2"], 1.0);
+    let on_disk: Value = serde_json::from_str(&sprint.read("run/summary.json")).unwrap();
+    assert_eq!(on_disk, summary);
+    let manifest: Value = serde_json::from_str(&sprint.read("run/manifest.json")).unwrap();
+    assert_eq!(manifest["format_version"], 1);
+    assert!(sprint.read("run/summary.md").contains("| success "));
+    assert!(sprint.read("run/summary.csv").starts_with("group,measure,"));
+    for line in sprint.read("run/episodes.jsonl").lines() {
+        let episode: Value = serde_json::from_str(line).unwrap();
+        let trace = episode["trace"].as_array().unwrap();
+        assert_eq!(episode["steps"], trace.len());
+        assert_eq!(trace.last().unwrap()["subtask"], 1, "the last action completes the last subtask");
+        assert!(episode["start_hash"].as_str().unwrap().len() == 16 && episode["error"].is_null());
+    }
+    let check = sprint.run("tasks check tasks.json");
+    assert_eq!((check.code, check.stdout.contains("20 solved")), (Some(0), true), "{}", check.stdout);
+}
+
+#[test]
+fn the_result_is_the_same_for_any_number_of_jobs() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 6);
+    for jobs in [1, 2] {
+        let ended =
+            sprint.run(&format!("eval --tasks tasks.json --policy random --seeds 2 --out run{jobs} --jobs {jobs}"));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    }
+    for file in ["manifest.json", "episodes.jsonl", "summary.json", "summary.md", "summary.csv"] {
+        assert_eq!(sprint.read(&format!("run1/{file}")), sprint.read(&format!("run2/{file}")), "{file}");
+    }
+    assert_eq!(sprint.read("run1/episodes.jsonl").lines().count(), 12);
+}
+
+#[test]
+fn sampling_is_the_same_for_the_same_seed() {
+    let sprint = Sprint::new();
+    sprint.sample("a.json", 1, 5);
+    sprint.sample("b.json", 1, 5);
+    assert_eq!(sprint.read("a.json").replace("\"a\"", "\"b\""), sprint.read("b.json"));
+    let ended = sprint.run("tasks sample a.json --scenes generated");
+    assert_eq!(ended.code, Some(1), "a file that is there is not replaced");
+    assert!(ended.stderr.contains("a.json") && ended.stderr.contains("--force"), "{}", ended.stderr);
+    let shown = sprint.run("tasks show a.json#2");
+    assert!(shown.stdout.contains("instruction") && shown.stdout.contains("subtask 0"), "{}", shown.stdout);
+    assert_eq!(sprint.run("tasks show a.json").stdout.lines().count(), 5);
+    assert_eq!(sprint.run("tasks show a.json#99").code, Some(1));
+}
+
+#[test]
+fn a_missed_threshold_ends_with_2() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 3, 2);
+    let ended = sprint.run("eval --tasks tasks.json --policy random --out run --fail-below success=0.99");
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("success=0.99 was missed"), "{}", ended.stderr);
+    let ended = sprint.run("eval --tasks tasks.json --policy random --fail-below succes=1");
+    assert_eq!(ended.code, Some(2), "bad usage");
+    assert!(ended.stderr.contains("succes"), "{}", ended.stderr);
+}
+
+#[test]
+fn an_interrupted_run_ends_with_130_and_a_partial_summary() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 3);
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("sprint"));
+    command.current_dir(sprint.folder.path()).env("SPRINT_HOME", sprint.path("home"));
+    command.args("eval --tasks tasks.json --policy random --seeds 100000 --out run".split_whitespace());
+    let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let begun = || std::fs::metadata(sprint.path("run/episodes.jsonl")).is_ok_and(|file| file.len() > 0);
+    let patience = std::time::Instant::now();
+    while !begun() && patience.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let told = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(told.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let summary: Value = serde_json::from_str(&sprint.read("run/summary.json")).unwrap();
+    let lines = sprint.read("run/episodes.jsonl").lines().count();
+    assert_eq!((&summary["partial"], &summary["episodes"]), (&Value::Bool(true), &Value::from(lines)));
+    assert!(lines > 0);
+}
+
+#[test]
+fn a_run_is_continued_and_another_is_refused() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 4);
+    let line = "eval --tasks tasks.json --policy random --out run --seeds 2";
+    assert_eq!(sprint.run(line).code, Some(0));
+    let whole = sprint.read("run/episodes.jsonl");
+    let (summary, lines) = (sprint.read("run/summary.json"), whole.split_inclusive('\n').collect::<Vec<_>>());
+    std::fs::write(sprint.path("run/episodes.jsonl"), lines[..3].concat() + &lines[3][..20]).unwrap();
+    assert_eq!(sprint.run(line).code, Some(0));
+    assert_eq!(sprint.read("run/episodes.jsonl"), whole);
+    assert_eq!(sprint.read("run/summary.json"), summary);
+    let other = sprint.run("eval --tasks tasks.json --policy random --out run --seeds 3");
+    assert_eq!(other.code, Some(1));
+    assert!(other.stderr.contains("seeds: 2, not 3"), "{}", other.stderr);
+}
+
+#[test]
+fn without_a_folder_one_is_made_under_runs() {
+    let sprint = Sprint::new();
+    sprint.sample("my-tasks.json", 1, 1);
+    assert_eq!(sprint.run("eval --tasks my-tasks.json --policy random").code, Some(0));
+    let mut runs = std::fs::read_dir(sprint.path("runs")).unwrap();
+    let name = runs.next().unwrap().unwrap().file_name().into_string().unwrap();
+    assert!(name.starts_with("my-tasks-random-2"), "{name}");
+}
+
+#[test]
+fn a_bad_task_file_is_one_clear_error() {
+    let sprint = Sprint::new();
+    sprint.sample("good.json", 1, 2);
+    let good = sprint.read("good.json");
+    std::fs::write(sprint.path("torn.json"), &good[..good.len() / 2]).unwrap();
+    assert!(sprint.refused("torn.json").contains("cut off"));
+    std::fs::write(sprint.path("binary.json"), b"\x7fELF\0\0").unwrap();
+    assert!(sprint.refused("binary.json").contains("not JSON"));
+    std::fs::write(sprint.path("other.json"), r#"{"name": "package", "version": "1.0"}"#).unwrap();
+    assert!(sprint.refused("other.json").contains("format_version"));
+    assert!(sprint.refused("absent.json").contains("cannot read"));
+    let task = |value: &mut Value, field: &str, new: Value| value["tasks"][1][field] = new;
+    let said = sprint.complaint("good.json", |set| set["tasks"][1]["roles"][0]["class"] = "Dragon".into());
+    assert!(said.contains("tasks[1].roles[0].class") && said.contains("Dragon"), "{said}");
+    let said = sprint.complaint("good.json", |set| task(set, "scene", serde_json::json!({"named": "FloorPlan999"})));
+    assert!(said.contains("scenes"), "{said}");
+    let said = sprint.complaint("good.json", |set| {
+        set["scenes"] = "plans".into();
+        task(set, "scene", serde_json::json!({"named": "FloorPlan999"}));
+    });
+    assert!(said.contains("tasks[1].scene") && said.contains("FloorPlan999"), "{said}");
+    let said = sprint.complaint("good.json", |set| set["format_version"] = 9.into());
+    assert!(said.contains("format_version: 9"), "{said}");
+    let said = sprint.complaint("good.json", |set| task(set, "instruction", "a".repeat(10_000).into()));
+    assert!(said.contains("tasks[1].instruction") && said.len() < 500, "{said}");
+    let said = sprint.complaint("good.json", |set| task(set, "instruction", "take\u{7} it".into()));
+    assert!(said.contains("tasks[1].instruction") && said.contains("control"), "{said}");
+    let said = sprint.complaint("good.json", |set| set["tasks"] = serde_json::json!([]));
+    assert!(said.contains("empty"), "{said}");
+    let said = sprint.complaint("good.json", |set| set["tasks"][1]["subtasks"][0]["object"] = 200.into());
+    assert!(said.contains("tasks[1].subtasks[0].object"), "{said}");
+    let world =
+        serde_json::json!({"agent": {"cell": [0, 0], "heading": "north", "horizon": 0}, "objects": [], "fixtures": []});
+    let said = sprint.complaint("good.json", |set| task(set, "start", world));
+    assert!(said.contains("tasks[1].start.fixtures"), "{said}");
+}
+
+#[test]
+fn the_expert_completes_alfreds_official_sets() {
+    // Importing takes a minute; whoever has a dataset names it.
+    let Ok(data) = std::env::var("SPRINT_DATA") else {
+        eprintln!("skipped: the official task sets need an imported dataset, named by SPRINT_DATA");
+        return;
+    };
+    let sprint = Sprint::new();
+    for set in ["eval_100", "eval_chain"] {
+        let tasks = Path::new(&data).join(format!("tasks/{set}.json"));
+        let line = format!("eval --tasks {} --policy expert --out {set} --json", tasks.display());
+        let ended = sprint.run(&line);
+        let summary: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+        assert!(summary["success"].as_f64().unwrap() >= 0.95, "{set}: {summary}");
+    }
+}
