@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Reason};
 use super::render::Renderer;
 use super::rules;
 use super::view::{self, Candidate, Frame, View};
+use crate::domain::world::Instance;
 use crate::domain::{Action, Scene, World};
 
 /// A scene with a world in it. Frames are drawn on demand: stepping without looking costs no drawing.
@@ -14,7 +15,8 @@ pub struct House {
     world: World,
     renderer: Renderer,
     view: Option<View>,
-    frame: Option<Frame>,
+    /// The renderer's frame shows the present state.
+    drawn: bool,
 }
 
 impl House {
@@ -23,7 +25,7 @@ impl House {
 
     /// A house in the given state.
     pub fn new(scene: Arc<Scene>, world: World) -> House {
-        House { scene, world, renderer: Renderer::new(House::FRAME), view: None, frame: None }
+        House { scene, world, renderer: Renderer::new(House::FRAME), view: None, drawn: false }
     }
 
     /// The floor plan.
@@ -46,8 +48,7 @@ impl House {
     pub fn step(&mut self, action: Action) -> Outcome {
         if let Some(target) = action.target
             && action.kind.is_interaction()
-            && let Err(reason) = rules::check(&self.scene, &self.world, action)
-                .and_then(|()| view::reachable(&self.scene.clone(), &self.world.clone(), self.view(), target))
+            && let Err(reason) = rules::check(&self.scene, &self.world, action).and_then(|()| self.reach(target))
         {
             return Outcome::Impossible(reason);
         }
@@ -60,8 +61,11 @@ impl House {
 
     /// What the agent sees, 300 x 300.
     pub fn frame(&mut self) -> &Frame {
-        let (renderer, scene, world) = (&mut self.renderer, &self.scene, &self.world);
-        self.frame.get_or_insert_with(|| renderer.draw(scene, world).clone())
+        if !self.drawn {
+            self.renderer.draw(&self.scene, &self.world);
+            self.drawn = true;
+        }
+        self.renderer.frame()
     }
 
     /// Which instances the frame shows.
@@ -79,8 +83,15 @@ impl House {
         view::candidates(&self.scene, &self.world, self.view.as_ref().unwrap_or(&empty))
     }
 
+    /// Whether the agent sees and reaches an instance.
+    fn reach(&mut self, target: Instance) -> Result<(), Reason> {
+        self.view();
+        let nothing = View::default();
+        view::reachable(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing), target)
+    }
+
     fn forget(&mut self) {
         self.view = None;
-        self.frame = None;
+        self.drawn = false;
     }
 }
