@@ -14,6 +14,7 @@ use super::tasks::{self, OFFICIAL};
 use super::{parents, scenes, trajectories};
 use crate::data::dataset::{Counts, Manifest, Skipped, Writer};
 use crate::domain::{Scene, Trajectory};
+use crate::house::validate;
 
 /// What can be chosen about an import.
 #[derive(Clone, Debug, Default)]
@@ -271,7 +272,11 @@ fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&
         reason,
     };
     let Some(room) = settings.first().map(|setting| setting.room) else { return (None, vec![], skipped) };
-    let built = match scenes::build(name, room, &layout, recordings, settings) {
+    let checked = scenes::build(name, room, &layout, recordings, settings).and_then(|built| {
+        let fits = validate::scene(&built.scene).map_err(|misfit| format!("{name} cannot be built of it: {misfit}"));
+        fits.map(|()| built)
+    });
+    let built = match checked {
         Ok(built) => built,
         Err(reason) => {
             skipped.extend(recordings.iter().map(|recording| skip(recording, reason.clone())));
@@ -281,7 +286,12 @@ fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&
     let mut resolved = Vec::new();
     for recording in recordings {
         let parents = parents::parents(recording, &built.inventory, &built.recorded, &built.scene.fixtures);
-        match trajectories::resolve(recording, &built.scene, &built.inventory, &parents) {
+        let trajectory = trajectories::resolve(recording, &built.scene, &built.inventory, &parents);
+        let checked = trajectory.and_then(|trajectory| {
+            let fits = validate::world(&built.scene, &trajectory.start).map_err(|misfit| format!("scene.{misfit}"));
+            fits.map(|()| trajectory)
+        });
+        match checked {
             Ok(trajectory) => resolved.push(trajectory),
             Err(reason) => skipped.push(skip(recording, reason)),
         }
@@ -505,10 +515,12 @@ mod tests {
             if let Ok(recording) = parse_recording(&text, "task/trial", "train") {
                 let (scene, resolved, _) = build_one(Path::new(""), "FloorPlan1", &[&recording], &[&recording.setting]);
                 for trajectory in resolved {
+                    let scene = scene.as_ref().unwrap();
                     let mut world = trajectory.start.clone();
                     for &action in &trajectory.actions {
-                        crate::house::rules::apply(scene.as_ref().unwrap(), &mut world, action);
+                        crate::house::rules::apply(scene, &mut world, action);
                     }
+                    prop_assert_eq!(validate::world(scene, &world), Ok(()));
                     prop_assert_eq!(trajectory.boxes.len(), trajectory.actions.iter()
                         .filter(|action| action.kind >= ActionType::Pickup).count());
                 }

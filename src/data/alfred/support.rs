@@ -12,6 +12,8 @@ use crate::domain::{ActionType, Cell, Class, Heading, Point, SkillKind};
 const HEIGHT_WEIGHT: f32 = 4.0;
 /// A neighbour farther than this says nothing, in millimetres.
 const LIMIT: f32 = 500.0;
+/// No fixture holds anything farther from its pivot than this, in millimetres.
+const WIDEST: f32 = 7000.0;
 /// Around the outermost contents.
 pub const MARGIN: i32 = 50;
 /// Half the side of the square around a cell's middle that no furniture fills.
@@ -109,6 +111,9 @@ pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standin
         for (object, holder) in recording.recorded_holders(inventory) {
             if let Holder::Fixture(fixture) = holder {
                 let placed = &recording.setting.objects[usize::from(object)];
+                if inventory.found[usize::from(fixture)].pivot.floor_distance(placed.at) > WIDEST {
+                    continue;
+                }
                 // Small things on a counter would otherwise claim what stands beside them.
                 let limit = match inventory.found[usize::from(fixture)].name.class.name() {
                     "CoffeeMachine" | "ToiletPaperHanger" | "HandTowelHolder" | "TowelHolder" => 100.0,

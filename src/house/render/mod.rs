@@ -56,7 +56,8 @@ impl Renderer {
     pub fn look(&mut self, scene: &Scene, world: &World) -> View {
         self.cover(scene, world);
         let (size, materials) = (self.raster.size(), self.raster.materials());
-        let row = |row: usize| self.raster.row(row).1[..size].iter().map(|&number| materials[usize::from(number)].id);
+        let id = |shows: f32| materials[raster::unmark(shows)].id;
+        let row = |row: usize| self.raster.row(row).1.iter().flat_map(|group| group.to_array()).take(size).map(id);
         View::of_rows(size, (0..size).map(row))
     }
 
