@@ -1,5 +1,6 @@
 //! Where a Put leaves an object: the free point of the receptacle that is nearest to the agent.
 
+use super::occlusion::in_sight;
 use crate::domain::place::Rect;
 use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Fixture, Point, Scene};
@@ -32,7 +33,7 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 ///
 /// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. First a point where the whole
 /// outline is free and on the surface, then one where only the pivot is; where walls stand around, before both a free point
-/// away from them, where it can be seen. In a movable receptacle: at its pivot, moved aside for each thing that already lies
+/// away from them, and before all a point that no shelf and no rim hides from the agent. In a movable receptacle: at its pivot, moved aside for each thing that already lies
 /// there.
 pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
@@ -68,7 +69,10 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 }
             }
             points.sort_by_key(|&(level, distance, at)| (level, distance, at));
-            let fits = |level: usize, at: Point, pass: Pass| {
+            let eye = world.agent.cell.centre(scene.camera_y());
+            let middle = object_height(scene, object) / 2 - object.class.info().rest;
+            let seen = |at: Point| in_sight(fixture, eye, Point::new(at.x - shift.x, at.y + middle, at.z - shift.z));
+            let fits = |level: usize, at: Point, pass: Pass, wants_sight: bool| {
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
                 let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
@@ -82,13 +86,22 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                     Pass::Pivot => !other.contains(at.x, at.z),
                     Pass::Inside | Pass::Whole => !overlap(&ground, other),
                 };
-                taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
-                    && surface.areas.iter().any(on)
+                surface.areas.iter().any(on)
+                    && taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
+                    && (!wants_sight || seen(at))
             };
-            let passes = [Pass::Inside, Pass::Whole, Pass::Pivot].into_iter();
-            passes
-                .filter(|&pass| pass != Pass::Inside || has_walls(fixture))
-                .find_map(|pass| points.iter().find(|&&(level, _, at)| fits(level, at, pass)).map(|&(_, _, at)| at))
+            let passes = [
+                (Pass::Inside, true),
+                (Pass::Whole, true),
+                (Pass::Inside, false),
+                (Pass::Whole, false),
+                (Pass::Pivot, false),
+            ];
+            let walled = has_walls(fixture);
+            // Without walls nothing hides a place, and no place is away from them.
+            let passes = passes.into_iter().filter(|&(pass, sight)| walled || !sight && pass != Pass::Inside);
+            let first = |(pass, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, pass, sight));
+            passes.filter_map(first).map(|&(_, _, at)| at).next()
         }
     }
 }
@@ -109,8 +122,9 @@ fn has_walls(fixture: &Fixture) -> bool {
     fixture.class.info().openable || is_tub(fixture)
 }
 
-fn is_tub(fixture: &Fixture) -> bool {
-    matches!(fixture.class.name(), "Sink" | "Bathtub")
+/// Whether it is open above and its contents lie inside.
+pub fn is_tub(fixture: &Fixture) -> bool {
+    matches!(fixture.class.name(), "Sink" | "Bathtub" | "GarbageCan")
 }
 
 /// The middle third of a surface; behind a door all of its depth.
