@@ -202,6 +202,7 @@ mod tests {
 
     #[test]
     fn it_computes_what_torchvision_computes() {
+        let _chance = crate::nets::testing::chance();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("resnet18.safetensors");
         let mut all = tensors();
