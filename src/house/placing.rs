@@ -33,7 +33,8 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 ///
 /// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. First a point where the whole
 /// outline is free and on the surface, then one where only the pivot is; where walls stand around, before both a free point
-/// away from them, and before all a point that no shelf and no rim hides from the agent. In a movable receptacle: at its pivot, moved aside for each thing that already lies
+/// away from them, and before all a point that no shelf and no rim hides from the agent; in a garbage can at last on top of the
+/// rest. In a movable receptacle: at its pivot, moved aside for each thing that already lies
 /// there.
 pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
@@ -80,9 +81,10 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 let on = |area: &Rect| match pass {
                     Pass::Inside => away_from_walls(fixture, area).contains(x, z),
                     Pass::Whole => area.grown(RASTER).contains(x, z),
-                    Pass::Pivot => true,
+                    Pass::Pivot | Pass::Heap => true,
                 };
                 let free = |other: &Rect| match pass {
+                    Pass::Heap => true,
                     Pass::Pivot => !other.contains(at.x, at.z),
                     Pass::Inside | Pass::Whole => !overlap(&ground, other),
                 };
@@ -96,10 +98,13 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 (Pass::Inside, false),
                 (Pass::Whole, false),
                 (Pass::Pivot, false),
+                (Pass::Heap, false),
             ];
             let walled = has_walls(fixture);
             // Without walls nothing hides a place, and no place is away from them.
             let passes = passes.into_iter().filter(|&(pass, sight)| walled || !sight && pass != Pass::Inside);
+            let heaps = fixture.class.name() == "GarbageCan";
+            let passes = passes.filter(|&(pass, _)| heaps || pass != Pass::Heap);
             let first = |(pass, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, pass, sight));
             passes.filter_map(first).map(|&(_, _, at)| at).next()
         }
@@ -115,6 +120,8 @@ enum Pass {
     Whole,
     /// Its pivot free.
     Pivot,
+    /// On top of what lies there: how things lie in a garbage can.
+    Heap,
 }
 
 /// Whether walls stand around what lies in it.
@@ -173,5 +180,41 @@ pub fn carry_contents(world: &mut World, carrier: Instance, by: Point) {
     for index in moved {
         let at = &mut world.objects[usize::from(index)].at;
         *at = Point::new(at.x + by.x, at.y + by.y, at.z + by.z);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::place::Cuboid;
+    use crate::domain::scene::Surface;
+    use crate::domain::{Class, Heading, Pose, Room};
+
+    /// How many soap bars go into a receptacle of 16 cm a side, of ten.
+    fn held_by(class: &str) -> usize {
+        let body = Cuboid::between(Point::new(-100, 0, 500), Point::new(100, 300, 700));
+        let surface = Surface { height: 20, areas: vec![body.footprint().grown(-20)] };
+        let class = Class::named(class).unwrap();
+        let (id, pivot, facing) = (class.name().to_string(), body.centre(), Heading::South);
+        let fixture = Fixture { id, class, pivot, facing, body: vec![body], surfaces: vec![surface], stand: None };
+        let (name, format_version) = ("test".to_string(), Scene::FORMAT);
+        let fixtures = vec![fixture];
+        let (walls, cells, meshes) = (Vec::new(), Vec::new(), Vec::new());
+        let scene = Scene { format_version, name, room: Room::Bathroom, agent_y: 900, cells, fixtures, walls, meshes };
+        let soap = Object { class: Class::named("SoapBar").unwrap(), ..Object::default() };
+        let mut world = World::new(&scene, Pose::default(), Vec::new());
+        let receptacle = Instance::Fixture(0);
+        while world.objects.len() < 10
+            && let Some(at) = spot(&scene, &world, &soap, receptacle)
+        {
+            world.objects.push(Object { at, parent: Parent::In(receptacle), ..soap.clone() });
+        }
+        world.objects.len()
+    }
+
+    #[test]
+    fn things_heap_up_in_a_garbage_can_but_not_in_a_sink() {
+        assert_eq!(held_by("GarbageCan"), 10);
+        assert!((1..10).contains(&held_by("Sink")));
     }
 }
