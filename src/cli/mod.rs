@@ -12,6 +12,7 @@ mod explore;
 mod eval;
 mod import;
 mod logging;
+mod plot;
 mod policies;
 mod pretrain;
 mod replay;
@@ -44,6 +45,8 @@ enum Command {
     Collect(collect::Collect),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
+    /// Draw the curves of trainings to SVG and PNG
+    Plot(plot::PlotCurves),
     /// Re-run recorded demonstrations in the simulator
     Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
@@ -102,6 +105,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
+        Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::domain::Trajectory;
 use crate::language::instruction::normalise;
@@ -43,6 +44,28 @@ pub struct Items {
     pub held_out: Vec<Span>,
 }
 
+/// Which spans and texts a method learns from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Selection {
+    /// Spans of several skills.
+    pub composites: Composites,
+}
+
+/// Spans of several skills, and what describes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Composites {
+    /// Single skills only.
+    None,
+    /// Every span, with the dataset's labels.
+    Labels,
+    /// Every span, with its skills' sentences one after the other.
+    Concat,
+    /// Whole trajectories, with what their annotators said of them.
+    Whole,
+}
+
 /// A drawn item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
@@ -50,6 +73,8 @@ pub struct Item {
     pub first: u32,
     /// The present frame.
     pub frame: u32,
+    /// The frame after the span's last action: the transition into it is rewarded and ends the span.
+    pub end: u32,
     /// The text.
     pub text: u32,
 }
@@ -57,12 +82,12 @@ pub struct Item {
 impl Items {
     /// The primitives and the whole of every trajectory; every `hold_out`th trajectory is held out. `labels` are those of
     /// all frames.
-    pub fn of(trajectories: &[Trajectory], labels: Vec<Option<Label>>, hold_out: usize) -> Items {
+    pub fn of(trajectories: &[Trajectory], labels: Vec<Option<Label>>, hold_out: usize, selection: Selection) -> Items {
         let mut items = Items { labels, ..Items::default() };
         let mut numbers = HashMap::new();
         let mut first = 0;
         for (position, trajectory) in trajectories.iter().enumerate() {
-            let mut spans = spans(trajectory, first, &mut |text| {
+            let mut spans = spans(trajectory, first, selection, &mut |text| {
                 let text = normalise(text);
                 *numbers.entry(text.clone()).or_insert_with(|| {
                     items.texts.push(text);
@@ -87,6 +112,7 @@ impl Items {
             Item {
                 first: span.first,
                 frame: rng.random_range(span.start..span.end),
+                end: span.end,
                 text: span.texts[rng.random_range(0..span.texts.len())],
             }
         };
@@ -94,7 +120,7 @@ impl Items {
     }
 }
 
-fn spans(trajectory: &Trajectory, first: u32, number: &mut impl FnMut(&str) -> u32) -> Vec<Span> {
+fn spans(trajectory: &Trajectory, first: u32, selection: Selection, number: &mut impl FnMut(&str) -> u32) -> Vec<Span> {
     let count = trajectory.skills.len();
     let mut spans = Vec::new();
     for skill in 0..count {
@@ -102,6 +128,9 @@ fn spans(trajectory: &Trajectory, first: u32, number: &mut impl FnMut(&str) -> u
         let aligned = trajectory.annotations.iter().filter(|annotation| annotation.steps.len() == count);
         let texts = aligned.map(|annotation| number(&annotation.steps[skill])).collect();
         spans.push(Span { first, start: first + range.start as u32, end: first + range.end as u32, texts });
+    }
+    if selection.composites == Composites::None {
+        return spans;
     }
     let goals: Vec<u32> = trajectory.annotations.iter().map(|annotation| number(&annotation.goal)).collect();
     match &mut spans[..] {
@@ -114,7 +143,7 @@ fn spans(trajectory: &Trajectory, first: u32, number: &mut impl FnMut(&str) -> u
 
 impl Item {
     /// The frames of the observation, oldest first; before the trajectory's first frame there was the first one.
-    pub fn stack(&self, history: u32) -> impl Iterator<Item = usize> {
+    pub fn stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
         let (first, frame) = (self.first, self.frame);
         (0..history).map(move |i| frame.saturating_sub(history - 1 - i).max(first) as usize)
     }
@@ -126,6 +155,8 @@ mod tests {
     use crate::domain::task::SceneRef;
     use crate::domain::trajectory::Annotation;
     use crate::domain::{Action, ActionType, SkillKind, Subtask, World};
+
+    const WHOLE: Selection = Selection { composites: Composites::Whole };
 
     fn trajectory(skill_starts: Vec<u32>, steps: usize) -> Trajectory {
         let skill = Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None };
@@ -150,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_trajectory_gives_its_primitives_and_its_whole() {
-        let items = Items::of(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Vec::new(), 0);
+        let items = Items::of(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Vec::new(), 0, WHOLE);
         let edges: Vec<(u32, u32, u32)> =
             items.training.iter().map(|span| (span.first, span.start, span.end)).collect();
         assert_eq!(edges, [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9)]);
@@ -160,7 +191,7 @@ mod tests {
 
     #[test]
     fn held_out_trajectories_are_whole_and_draws_depend_on_the_step_alone() {
-        let items = Items::of(&[trajectory(vec![0], 4), trajectory(vec![0], 4)], Vec::new(), 2);
+        let items = Items::of(&[trajectory(vec![0], 4), trajectory(vec![0], 4)], Vec::new(), 2, WHOLE);
         assert_eq!((items.training.len(), items.held_out.len()), (1, 1));
         let draw = |step| Items::draw(&items.training, 7, step, 20);
         assert_eq!(draw(3), draw(3));
@@ -169,7 +200,7 @@ mod tests {
 
     #[test]
     fn history_repeats_the_first_frame() {
-        let stack = |frame| Item { first: 10, frame, text: 0 }.stack(5).collect::<Vec<_>>();
+        let stack = |frame| Item { first: 10, frame, end: 20, text: 0 }.stack(5).collect::<Vec<_>>();
         assert_eq!(stack(11), [10, 10, 10, 10, 11]);
         assert_eq!(stack(16), [12, 13, 14, 15, 16]);
     }

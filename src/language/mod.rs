@@ -4,3 +4,4 @@ pub mod grammar;
 pub mod instruction;
 pub mod phrases;
 pub mod summary;
+pub mod vocabulary;
