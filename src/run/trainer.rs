@@ -258,7 +258,7 @@ mod tests {
 
     fn items() -> Items {
         let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
-        let span = |first: u32| Span { first, start: first, end: first + 6, texts: vec![0, 1] };
+        let span = |first: u32| Span { first, start: first, end: first + 5, texts: vec![0, 1] };
         Items {
             labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
             texts: vec!["one".into(), "two".into()],
