@@ -11,12 +11,13 @@ use super::iql::{self, Iql, Tracking};
 use super::learner::{Learner, Optimisation};
 use crate::nets::critic::{Critic, Judgement};
 use crate::nets::policy::{Logits, PolicyNet};
+use crate::nets::visual::SIDE;
 use crate::nets::weights::{self, Tensors};
 
 /// Transitions (s, a, s′) with what the agent was told, n of each.
 #[derive(Debug)]
 pub struct Transitions {
-    /// s: [n, channels, 7, 7], floats of any width.
+    /// s: [n, channels, 7, 7] or [n, frames, channels, 7, 7], floats of any width.
     pub observation: Tensor,
     /// s′; absent where nothing judges it.
     pub next: Option<Tensor>,
@@ -223,8 +224,8 @@ impl<'a> Update<'a> {
         };
         let next = |row: &Row<'_>| row.2.next.as_ref().unwrap_or(&row.2.observation).shallow_clone();
         let all = Transitions {
-            observation: cat(&|row| row.2.observation.shallow_clone()).to_kind(Kind::Float),
-            next: base.next.is_some().then(|| cat(&next).to_kind(Kind::Float)),
+            observation: seen(&cat(&|row| row.2.observation.shallow_clone())),
+            next: base.next.is_some().then(|| seen(&cat(&next))),
             told: cat(&|row| row.3.shallow_clone()),
             actions: cat(&|row| row.2.actions.shallow_clone()),
             objects: cat(&|row| row.2.objects.shallow_clone()),
@@ -355,6 +356,11 @@ fn policy_loss(
     parts.iter().map(part_loss).sum()
 }
 
+/// Observations as the networks take them: [n, channels, 7, 7] in 32 bits.
+pub fn seen(observation: &Tensor) -> Tensor {
+    observation.to_kind(Kind::Float).reshape([observation.size()[0], -1, SIDE, SIDE])
+}
+
 fn prefixed(prefix: &str, tensors: Tensors) -> Tensors {
     tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)).collect()
 }
@@ -374,7 +380,6 @@ mod tests {
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{CriticSpec, Senses};
     use crate::nets::policy::PolicySpec;
-    use crate::nets::visual::SIDE;
 
     const STATES: i64 = 3;
     const TEXTS: i64 = 3;

@@ -160,7 +160,7 @@ impl<'a> Batches<'a> {
         let stack = |item: &Item| Item { frame: item.frame + last, ..*item }.stack(self.history + last);
         let maps = self.material.maps.gather(items.iter().flat_map(stack), self.device)?;
         let maps = maps.view([n, i64::from(self.history + last), -1, SIDE, SIDE]);
-        let seen = |from: i64| maps.narrow(1, from, i64::from(self.history)).flatten(1, 2);
+        let seen = |from: i64| maps.narrow(1, from, i64::from(self.history));
         Ok(Transitions {
             observation: seen(0),
             next: self.judged.then(|| seen(1)),

@@ -14,7 +14,7 @@ use super::presets::Preset;
 use super::progress::{Report, Scalars};
 use crate::agent::checkpoint::Networks;
 use crate::algo::bc;
-use crate::algo::update::{Batch, CriticLearner, Transitions, Update};
+use crate::algo::update::{Batch, CriticLearner, Transitions, Update, seen};
 use crate::data::items::Span;
 use crate::nets::weights;
 
@@ -149,7 +149,7 @@ impl Trainer<'_> {
     fn measure(&self, measured: &[Transitions], scalars: &mut Scalars) {
         let mut sums = [0.0; 6];
         for items in measured {
-            let observation = items.observation.to_kind(Kind::Float);
+            let observation = seen(&items.observation);
             let (logits, surprise) = tch::no_grad(|| {
                 let logits = self.networks.policy.forward(&observation, &items.told, false);
                 let surprise = bc::surprise(&logits, &items.actions, &items.objects);
