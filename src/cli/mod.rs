@@ -8,6 +8,7 @@ mod bar;
 mod collect;
 mod doctor;
 mod embed;
+mod encode;
 mod explore;
 mod eval;
 mod import;
@@ -15,6 +16,7 @@ mod logging;
 mod plot;
 mod policies;
 mod pretrain;
+mod relabel;
 mod replay;
 mod shell;
 mod stop;
@@ -43,6 +45,10 @@ enum Command {
     Import(import::Import),
     /// Collect demonstrations in generated houses
     Collect(collect::Collect),
+    /// Label a dataset's runs of skills, to learn from them
+    Relabel(relabel::Relabel),
+    /// Draw and encode every frame of a dataset, ahead of a training
+    Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
     /// Draw the curves of trainings to SVG and PNG
@@ -104,6 +110,8 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
+        Command::Relabel(relabel) => relabel.run(),
+        Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),

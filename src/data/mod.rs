@@ -5,6 +5,7 @@ pub mod dataset;
 pub mod features;
 pub mod items;
 pub mod json;
+pub mod summaries;
 pub mod taskset;
 
 pub use dataset::Dataset;

@@ -2,6 +2,11 @@
 
 pub mod grammar;
 pub mod instruction;
+pub mod nouns;
+pub mod passage;
 pub mod phrases;
+pub mod rules;
 pub mod summary;
 pub mod vocabulary;
+
+mod outcome;

@@ -55,12 +55,11 @@ impl<'a> Batches<'a> {
     /// Items of some spans, each told its own text or goal.
     fn draw(&self, spans: &[Span], step: u64, size: usize) -> Vec<Item> {
         let mut items = Items::draw(spans, self.seed, step, size);
-        if let Told::Goals { ends } = &self.material.told {
+        if let Told::Goals = self.material.told {
             let mut rng = self.chance(GOALS, step);
             for item in &mut items {
                 // A state to reach anywhere in what is left of the trajectory.
-                let last = ends.get(&item.first).copied().unwrap_or(item.end).max(item.frame + 1);
-                item.end = rng.random_range(item.frame + 1..=last);
+                item.end = rng.random_range(item.frame + 1..self.material.items.trajectory_of(item).end);
             }
         }
         items
@@ -135,7 +134,7 @@ impl<'a> Batches<'a> {
                 let numbers: Vec<i64> = texts.iter().flat_map(padded).collect();
                 Ok(Tensor::from_slice(&numbers).view([items.len() as i64, longest as i64]).to_device(self.device))
             }
-            Told::Goals { .. } => {
+            Told::Goals => {
                 let at_goal = |item: &Item| Item { frame: item.end, ..*item };
                 let goals: Vec<Item> = items.iter().map(at_goal).collect();
                 let maps =

@@ -22,6 +22,8 @@ pub struct Footage {
     pub parts: Vec<Range<usize>>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     firsts: Vec<usize>,
+    /// Trajectories of which the whole must not be trained on as one span.
+    pub held_out: Vec<String>,
 }
 
 impl Footage {
@@ -55,7 +57,8 @@ impl Footage {
         for trajectory in &trajectories {
             firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
         }
-        Ok(Footage { trajectories, scenes, parts, firsts })
+        let held_out = datasets.iter().flat_map(|dataset| dataset.manifest().held_out.clone()).collect();
+        Ok(Footage { trajectories, scenes, parts, firsts, held_out })
     }
 
     /// How many frames there are: each trajectory has one more than it has actions.

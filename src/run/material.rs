@@ -52,17 +52,15 @@ impl<'a> Maps<'a> {
     /// The maps of frames [frames, numbers] on `device`, 16-bit floats.
     ///
     /// # Errors
-    /// When the device's memory is full.
+    /// When a map cannot be read, or the device's memory is full.
     pub fn gather(&self, frames: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
         match self {
             Maps::Memory(features) => {
-                let (mut bytes, mut rows) = (Vec::new(), 0);
-                for frame in frames {
-                    features.gather(frame, &mut bytes);
-                    rows += 1;
-                }
-                let width = bytes.len() as i64 / 2 / rows.max(1);
-                Ok(Tensor::f_from_data_size(&bytes, &[rows, width], Kind::Half)?.to_device(device))
+                let mut bytes = Vec::new();
+                features.gather_all(frames, &mut bytes)?;
+                let width = features.width();
+                let rows = (bytes.len() / width.max(1)) as i64;
+                Ok(Tensor::f_from_data_size(&bytes, &[rows, width as i64 / 2], Kind::Half)?.to_device(device))
             }
             Maps::Device(maps) => {
                 let rows: Vec<i64> = frames.map(|frame| frame as i64).collect();
@@ -77,13 +75,12 @@ const COPIED: usize = 4096;
 
 fn copied(features: &Features, device: Device) -> anyhow::Result<Tensor> {
     let mut bytes = Vec::new();
-    features.gather(0, &mut bytes);
-    let width = bytes.len() as i64 / 2;
+    let width = features.width() as i64 / 2;
     let maps = Tensor::f_empty([features.len() as i64, width], (Kind::Half, device))?;
     for first in (0..features.len()).step_by(COPIED) {
         bytes.clear();
         let last = (first + COPIED).min(features.len());
-        (first..last).for_each(|map| features.gather(map, &mut bytes));
+        features.gather_run(first..last, &mut bytes)?;
         let rows = (last - first) as i64;
         let chunk = Tensor::f_from_data_size(&bytes, &[rows, width], Kind::Half)?;
         maps.narrow(0, first as i64, rows).f_copy_(&chunk)?;
@@ -136,23 +133,8 @@ pub enum Told {
     Sentences(Rows),
     /// The words of a text, by their numbers.
     Words(Vec<Vec<i64>>),
-    /// The frames of a state to reach.
-    Goals {
-        /// The last frame of each trajectory, by its first.
-        ends: HashMap<u32, u32>,
-    },
-}
-
-impl Told {
-    /// States to reach anywhere in a trajectory.
-    pub fn goals(items: &Items) -> Told {
-        let mut ends: HashMap<u32, u32> = HashMap::new();
-        for span in items.training.iter().chain(&items.held_out) {
-            let end = ends.entry(span.first).or_default();
-            *end = span.end.max(*end);
-        }
-        Told::Goals { ends }
-    }
+    /// The frames of a state to reach anywhere in the trajectory.
+    Goals,
 }
 
 /// Pairs of texts whose joint sentences are embedded beforehand.
@@ -180,9 +162,7 @@ impl Pool {
         anyhow::ensure!(!pairs.is_empty(), "there are no pairs of texts to chain");
         let mut bearers: HashMap<u32, Vec<u32>> = HashMap::new();
         for (number, span) in items.training.iter().enumerate() {
-            for &text in &span.texts {
-                bearers.entry(text).or_default().push(number as u32);
-            }
+            bearers.entry(span.text).or_default().push(number as u32);
         }
         Ok(Pool { pairs, joint: Rows::new(joint, device)?, bearers })
     }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
-use sha2::{Digest, Sha256};
 use tch::{Device, Tensor};
 
 use super::batches::Batches;
+use super::encoding;
 use super::events::Events;
 use super::footage::Footage;
 use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
@@ -20,9 +20,11 @@ use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceS
 use crate::agent::learned::SharedEmbedder;
 use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
-use crate::data::features::{Features, Header};
-use crate::data::items::Items;
+use crate::data::features::Features;
+use crate::data::items::{Composites, Items, Source};
+use crate::data::summaries::Summaries;
 use crate::language::vocabulary::Vocabulary;
+use crate::nets::frozen::FrameEncoder;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -88,15 +90,17 @@ impl Pretraining {
         if let Some(folder) = &self.policy_from {
             self.start_from(folder, &networks)?;
         }
-        let Some(features) = self.features(&networks, &footage, &digests, &mut report, stop)? else {
+        let encoder = networks.visual.frozen(&networks.visual_store)?;
+        let Some(features) = encoding::features(&encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
-        let labels = footage.labels()?;
-        let items = Items::of(&footage.trajectories, labels, self.preset.hold_out, self.preset.data);
+        let summaries = self.summaries()?;
+        let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
+        let items = Items::of(&source, footage.labels()?, &self.preset.data, self.preset.hold_out)?;
         anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
         let words = self.preset.policy.attention.as_ref().map(|attention| {
-            let texts = items.training.iter().flat_map(|span| &span.texts);
-            Vocabulary::of(texts.map(|&text| items.texts[text as usize].as_str()), attention.words as usize)
+            let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
+            Vocabulary::of(texts, attention.words as usize)
         });
         let embed = |texts: &[&str]| -> anyhow::Result<Tensor> {
             let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -113,7 +117,7 @@ impl Pretraining {
             networks: &networks,
             preset: &self.preset,
             state: &training.join("state.safetensors"),
-            identity: &self.identity(&networks, &digest, &config(0)?)?,
+            identity: &self.identity(encoder.digest(), &digest, &config(0)?),
         };
         let batches = Batches::new(
             material,
@@ -139,7 +143,7 @@ impl Pretraining {
         stop: &AtomicBool,
     ) -> anyhow::Result<Option<Material<'a>>> {
         let told = if self.preset.policy.goal.is_some() {
-            Told::goals(items)
+            Told::Goals
         } else if let Some(words) = words {
             Told::Words(items.texts.iter().map(|text| words.numbers(text)).collect())
         } else {
@@ -158,19 +162,28 @@ impl Pretraining {
         Ok(Some(Material { items, maps: Maps::on(features, self.device), told, pool, embed }))
     }
 
+    /// The labels of the datasets, where the preset asks for labels.
+    fn summaries(&self) -> anyhow::Result<Summaries> {
+        if self.preset.data.composites != Composites::Labels {
+            return Ok(Summaries::default());
+        }
+        let folders: Vec<&Path> = self.data.iter().map(PathBuf::as_path).collect();
+        Summaries::read(&folders, self.preset.data.labels_of.as_deref())
+    }
+
     /// What a saved state belongs to.
-    fn identity(&self, networks: &Networks, data: &str, config: &Config) -> anyhow::Result<BTreeMap<String, String>> {
-        Ok([
+    fn identity(&self, encoder: &str, data: &str, config: &Config) -> BTreeMap<String, String> {
+        [
             ("format_version", "1".to_string()),
             ("dataset", data.to_string()),
             ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
-            ("visual_encoder", digest(&networks.visual_store)?),
+            ("visual_encoder", encoder.to_string()),
             ("sentence_encoder", config.sentence_encoder.digest.clone()),
             ("embedding", config.policy.embedding.to_string()),
             ("seed", self.preset.seed.to_string()),
         ]
         .map(|(name, value)| (name.to_string(), value))
-        .into())
+        .into()
     }
 
     /// Begins with a checkpoint's policy, and with its critic where both have one of the same size.
@@ -241,43 +254,6 @@ impl Pretraining {
         Ok((config, networks))
     }
 
-    /// Every dataset's maps, one after the other; each is computed once and kept in that dataset's cache.
-    fn features(
-        &self,
-        networks: &Networks,
-        footage: &Footage,
-        digests: &[String],
-        report: &mut dyn Report,
-        stop: &AtomicBool,
-    ) -> anyhow::Result<Option<Features>> {
-        let mut all: Option<Features> = None;
-        let encoder = digest(&networks.visual_store)?;
-        for ((folder, trajectories), dataset) in self.data.iter().zip(&footage.parts).zip(digests) {
-            let header = Header {
-                format_version: Header::FORMAT,
-                encoder: encoder.clone(),
-                dataset: dataset.clone(),
-                maps: footage.frames_of(trajectories) as u64,
-                numbers: self.preset.visual.map() as u64,
-            };
-            let cache = folder.join("cache");
-            let mut features = Features::read(&cache, &header)?;
-            if features.is_none() {
-                let visual = &networks.visual;
-                if !visual_training::encode(visual, footage, trajectories.clone(), &cache, &header, report, stop)? {
-                    return Ok(None);
-                }
-                features = Features::read(&cache, &header)?;
-            }
-            let features = features.with_context(|| format!("{} changed meanwhile", cache.display()))?;
-            match &mut all {
-                Some(all) => all.append(features),
-                None => all = Some(features),
-            }
-        }
-        Ok(all)
-    }
-
     fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
         let mut rows = Vec::new();
         let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -335,17 +311,4 @@ fn copy(from: &tch::nn::VarStore, prefix: &str, to: &tch::nn::VarStore) -> anyho
         }
         Ok(())
     })
-}
-
-/// Identifies a store's weights: the first 16 digits of their sha256.
-fn digest(store: &tch::nn::VarStore) -> anyhow::Result<String> {
-    let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
-    variables.sort_by(|a, b| a.0.cmp(&b.0));
-    let mut hash = Sha256::new();
-    for (name, tensor) in variables {
-        hash.update(name.as_bytes());
-        let numbers: Vec<f32> = tensor.detach().to_device(Device::Cpu).flatten(0, -1).try_into()?;
-        numbers.iter().for_each(|number| hash.update(number.to_le_bytes()));
-    }
-    Ok(format!("{:x}", hash.finalize())[..16].to_string())
 }

@@ -250,7 +250,7 @@ mod tests {
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];
         maps.copy_data_u8(&mut bytes, maps.numel());
-        let mut writer = Writer::create(folder.path(), header.clone()).unwrap();
+        let mut writer = Writer::open(folder.path(), header.clone()).unwrap();
         writer.add(&bytes).unwrap();
         writer.finish().unwrap();
         Features::read(folder.path(), &header).unwrap().unwrap()
@@ -258,12 +258,13 @@ mod tests {
 
     fn items() -> Items {
         let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
-        let span = |first: u32| Span { first, start: first, end: first + 5, texts: vec![0, 1] };
+        let span = |text, first: u32| Span { trajectory: 0, skills: 0..1, first, start: first, end: first + 5, text };
         Items {
             labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
             texts: vec!["one".into(), "two".into()],
-            training: (0..4).map(|i| span(6 * i)).collect(),
-            held_out: vec![span(0)],
+            training: (0..8).map(|i| span(i % 2, i / 2 * 6)).collect(),
+            held_out: vec![span(0, 0), span(1, 0)],
+            firsts: vec![0, 6, 12, 18, FRAMES as u32],
         }
     }
 
@@ -300,7 +301,7 @@ mod tests {
             tch::manual_seed(1);
             let networks = Networks::new(&preset.visual, &preset.policy, preset.critic.as_ref(), Device::Cpu);
             let told = match preset.policy.goal {
-                Some(_) => Told::goals(&items),
+                Some(_) => Told::Goals,
                 None if preset.policy.attention.is_some() => Told::Words(vec![vec![2, 3], vec![4]]),
                 None => Told::Sentences(Rows::new(&sentences, Device::Cpu).unwrap()),
             };

@@ -46,7 +46,7 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
     };
     let texts: Vec<&str> = items.texts.iter().map(String::as_str).collect();
     let told = match (&preset.policy.goal, &preset.policy.attention) {
-        (Some(_), _) => Told::goals(&items),
+        (Some(_), _) => Told::Goals,
         (None, Some(_)) => Told::Words((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect()),
         (None, None) => Told::Sentences(Rows::new(&embed(&texts)?, device)?),
     };
@@ -93,7 +93,7 @@ fn features(preset: &Preset) -> anyhow::Result<Features> {
     let numbers = preset.visual.map() as u64;
     let header =
         Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: u64::from(FRAMES), numbers };
-    let mut writer = Writer::create(folder.path(), header.clone())?;
+    let mut writer = Writer::open(folder.path(), header.clone())?;
     let map = Tensor::rand([numbers as i64], (Kind::Half, Device::Cpu));
     let mut bytes = vec![0; map.numel() * 2];
     map.copy_data_u8(&mut bytes, map.numel());
@@ -108,13 +108,15 @@ fn features(preset: &Preset) -> anyhow::Result<Features> {
 fn items() -> Items {
     let label = |frame: u32| Label { action: (frame % 12) as u8, object: if frame % 4 == 0 { 7 } else { 0 } };
     let span = |number: u32| {
-        let start = number * SPAN;
-        Span { first: start / (3 * SPAN) * 3 * SPAN, start, end: start + SPAN, texts: vec![number % TEXTS] }
+        let (start, trajectory) = (number * SPAN, number / 3);
+        let first = trajectory * 3 * SPAN;
+        Span { trajectory, skills: 0..1, first, start, end: start + SPAN, text: number % TEXTS }
     };
     Items {
         labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
         texts: (0..TEXTS).map(|text| format!("Text {text}.")).collect(),
         training: (0..FRAMES / SPAN - 1).map(span).collect(),
         held_out: Vec::new(),
+        firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
     }
 }
