@@ -152,7 +152,7 @@ impl Noun {
         words.chain(std::iter::once(head)).collect::<Vec<_>>().join(" ")
     }
 
-    /// "a rinsed bar of soap", "the keys", "some soap": one that was not spoken of before.
+    /// "a rinsed mug", "the keys", "some soap": one that was not spoken of before.
     pub fn one(&self, states: &[String]) -> String {
         let text = self.with(states, &self.head);
         match self.number() {
@@ -162,7 +162,7 @@ impl Noun {
         }
     }
 
-    /// "the rinsed bar of soap".
+    /// "the rinsed mug".
     pub fn the(&self, states: &[String]) -> String {
         format!("the {}", self.with(states, &self.head))
     }

@@ -11,28 +11,33 @@ pub fn shrink_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
     weighted(rgb, from, to, &triangles(from, to))
 }
 
-fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[Vec<(usize, f32)>]) -> Vec<u8> {
-    let mut rows = vec![0f32; to * from * 3];
+/// The source pixels of a line that a target pixel is made of.
+struct Span {
+    first: usize,
+    /// From the first one on; they add up to 1.
+    weights: Vec<f32>,
+}
+
+fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[Span]) -> Vec<u8> {
+    let mut planes = vec![0u8; to * to * 3];
     if rgb.len() < from * from * 3 {
-        return vec![0; to * to * 3];
+        return planes;
     }
-    // Down the columns first: whole rows are added up, which the compiler turns into vector code.
-    for (target, span) in rows.chunks_exact_mut(from * 3).zip(spans) {
-        for &(source, weight) in span {
-            let row = &rgb[source * from * 3..(source + 1) * from * 3];
-            for (sum, &byte) in target.iter_mut().zip(row) {
+    let mut line = vec![0f32; from * 3];
+    for (y, span) in spans.iter().enumerate() {
+        // Down the columns first: whole rows are added up, which the compiler turns into vector code.
+        line.fill(0.0);
+        for (row, &weight) in rgb.chunks_exact(from * 3).skip(span.first).zip(&span.weights) {
+            for (sum, &byte) in line.iter_mut().zip(row) {
                 *sum += weight * f32::from(byte);
             }
         }
-    }
-    let mut planes = vec![0u8; to * to * 3];
-    for (y, row) in rows.chunks_exact(from * 3).enumerate() {
         for (x, span) in spans.iter().enumerate() {
             let mut sum = [0f32; 3];
-            for &(source, weight) in span {
-                for (sum, value) in sum.iter_mut().zip(&row[source * 3..source * 3 + 3]) {
-                    *sum += weight * value;
-                }
+            for (pixel, &weight) in line[span.first * 3..].chunks_exact(3).zip(&span.weights) {
+                sum[0] += weight * pixel[0];
+                sum[1] += weight * pixel[1];
+                sum[2] += weight * pixel[2];
             }
             for (channel, sum) in sum.into_iter().enumerate() {
                 planes[(channel * to + y) * to + x] = (sum + 0.5) as u8;
@@ -42,20 +47,21 @@ fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[Vec<(usize, f32)>]) -> 
     planes
 }
 
-/// For each target pixel of a line, the source pixels under it with their shares, which add up to 1.
-fn areas(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+/// For each target pixel of a line, the source pixels under it with the shares of it that they cover.
+fn areas(from: usize, to: usize) -> Vec<Span> {
     let scale = from as f32 / to as f32;
     let span = |target: usize| {
         let (start, end) = (target as f32 * scale, (target + 1) as f32 * scale);
         let last = (end.ceil() as usize).min(from);
         let share = |source: usize| (end.min((source + 1) as f32) - start.max(source as f32)).max(0.0) / scale;
-        (start.floor() as usize..last).map(|source| (source, share(source))).collect()
+        let first = start.floor() as usize;
+        Span { first, weights: (first..last).map(share).collect() }
     };
     (0..to).map(span).collect()
 }
 
 /// The same with weights that fall off linearly over the width of a target pixel on either side.
-fn triangles(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+fn triangles(from: usize, to: usize) -> Vec<Span> {
     let scale = from as f32 / to as f32;
     let reach = scale.max(1.0);
     let span = |target: usize| {
@@ -64,7 +70,7 @@ fn triangles(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
         let last = ((centre + reach + 0.5) as usize).min(from);
         let weight = |source: usize| (1.0 - ((source as f32 + 0.5 - centre) / reach).abs()).max(0.0);
         let total: f32 = (first..last).map(weight).sum();
-        (first..last).map(|source| (source, weight(source) / total)).collect()
+        Span { first, weights: (first..last).map(|source| weight(source) / total).collect() }
     };
     (0..to).map(span).collect()
 }
@@ -87,7 +93,7 @@ mod tests {
     #[test]
     fn the_shares_of_a_pixel_add_up_to_one() {
         for span in areas(300, 112).into_iter().chain(triangles(300, 224)) {
-            assert!((span.iter().map(|(_, share)| share).sum::<f32>() - 1.0).abs() < 1e-4);
+            assert!((span.weights.iter().sum::<f32>() - 1.0).abs() < 1e-4);
         }
     }
 
