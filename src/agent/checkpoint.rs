@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use tch::{Device, Tensor, nn};
 
 use crate::domain::{ActionType, Class};
+use crate::nets::critic::{Critic, CriticSpec, Senses};
 use crate::nets::policy::{PolicyNet, PolicySpec};
 use crate::nets::visual::{VisualEncoder, VisualSpec};
 use crate::nets::weights::{self, Form};
@@ -73,8 +74,17 @@ pub struct Config {
     pub ontology: Ontology,
     /// The visual encoder's size.
     pub visual: VisualSpec,
+    /// The method it was trained by: `bc`, `iql`, `sprint`, `am`, `et`; absent in older checkpoints, which are cloned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
     /// The policy network's size.
     pub policy: PolicySpec,
+    /// The critic's size, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub critic: Option<CriticSpec>,
+    /// The words that the agent knows, where it reads words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<Vec<String>>,
     /// The sentence encoder.
     pub sentence_encoder: SentenceSpec,
     /// Where it comes from.
@@ -133,7 +143,24 @@ impl Config {
             ("policy.channels", &self.policy.channels[..], 4096),
             ("policy.hidden", &self.policy.hidden[..], 16384),
         ];
-        for (field, values, most) in sizes {
+        let critic = self.critic.iter().flat_map(|critic| {
+            [
+                ("critic.channels", &critic.channels[..], 4096),
+                ("critic.hidden", &critic.hidden[..], 16384),
+                ("critic.action_embedding", std::slice::from_ref(&critic.action_embedding), 8192),
+                ("critic.object_embedding", std::slice::from_ref(&critic.object_embedding), 8192),
+            ]
+        });
+        let goal = self.policy.goal.iter().map(|goal| ("policy.goal", &goal[..], 4096));
+        let attention = self.policy.attention.iter().flat_map(|attention| {
+            [
+                ("policy.attention.words", std::slice::from_ref(&attention.words), 1 << 20),
+                ("policy.attention.layers", std::slice::from_ref(&attention.layers), 64),
+                ("policy.attention.heads", std::slice::from_ref(&attention.heads), 64),
+                ("policy.attention.inner", std::slice::from_ref(&attention.inner), 16384),
+            ]
+        });
+        for (field, values, most) in sizes.into_iter().chain(critic).chain(goal).chain(attention) {
             for &value in values {
                 anyhow::ensure!(
                     (1..=most).contains(&value),
@@ -149,17 +176,22 @@ impl Config {
             self.visual.input,
             16 * crate::nets::visual::SIDE
         );
-        anyhow::ensure!(
-            (0.0..1.0).contains(&self.policy.dropout),
-            "{}: policy.dropout is {}, which is not a share",
-            path.display(),
-            self.policy.dropout
-        );
+        if let Some(attention) = &self.policy.attention {
+            attention.check(self.policy.embedding).with_context(|| format!("{}: policy", path.display()))?;
+        }
+        let critic = self.critic.as_ref().map(|critic| ("critic.dropout", critic.dropout));
+        for (field, share) in std::iter::once(("policy.dropout", self.policy.dropout)).chain(critic) {
+            anyhow::ensure!(
+                (0.0..1.0).contains(&share),
+                "{}: {field} is {share}, which is not a share",
+                path.display()
+            );
+        }
         Ok(())
     }
 }
 
-/// A policy's two networks with the stores that own their weights.
+/// A policy's networks with the stores that own their weights.
 #[derive(Debug)]
 pub struct Networks {
     /// Sees.
@@ -170,26 +202,55 @@ pub struct Networks {
     pub policy: PolicyNet,
     /// The policy's weights.
     pub policy_store: nn::VarStore,
+    /// Judges.
+    pub critic: Option<Critics>,
+}
+
+/// A critic and the target that follows it.
+#[derive(Debug)]
+pub struct Critics {
+    /// The critic that learns.
+    pub online: Critic,
+    /// Its weights.
+    pub online_store: nn::VarStore,
+    /// The critic whose Q is the other's target; its V is not used.
+    pub target: Critic,
+    /// Its weights.
+    pub target_store: nn::VarStore,
 }
 
 impl Networks {
     /// Networks with fresh weights.
-    pub fn new(visual: &VisualSpec, policy: &PolicySpec, device: Device) -> Networks {
+    pub fn new(visual: &VisualSpec, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
         let (visual_store, policy_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
+        let senses = Senses { channels: policy.history * visual.features(), told: policy.embedding, goal: policy.goal };
         Networks {
             visual: VisualEncoder::new(&visual_store.root(), visual),
             policy: PolicyNet::new(&policy_store.root(), policy, visual.features()),
             visual_store,
             policy_store,
+            critic: critic.map(|spec| {
+                let (online_store, target_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
+                Critics {
+                    online: Critic::new(&online_store.root(), spec, senses),
+                    target: Critic::new(&target_store.root(), spec, senses),
+                    online_store,
+                    target_store,
+                }
+            }),
         }
     }
 
     /// Every tensor by its name in `model.safetensors`.
     pub fn tensors(&self) -> BTreeMap<String, Tensor> {
-        let named = |prefix: &'static str, store: &nn::VarStore| {
+        let mut stores = vec![("visual", &self.visual_store), ("policy", &self.policy_store)];
+        if let Some(critic) = &self.critic {
+            stores.extend([("critic", &critic.online_store), ("target", &critic.target_store)]);
+        }
+        let named = |(prefix, store): (&'static str, &nn::VarStore)| {
             store.variables().into_iter().map(move |(name, tensor)| (format!("{prefix}.{name}"), tensor.detach()))
         };
-        named("visual", &self.visual_store).chain(named("policy", &self.policy_store)).collect()
+        stores.into_iter().flat_map(named).collect()
     }
 
     /// Loads a checkpoint's networks.
@@ -199,7 +260,7 @@ impl Networks {
     pub fn load(folder: &Path, config: &Config, device: Device) -> anyhow::Result<Networks> {
         let path = folder.join("model.safetensors");
         let tensors = weights::read(&path)?;
-        let networks = Networks::new(&config.visual, &config.policy, device);
+        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), device);
         let variables = networks.tensors();
         let forms = variables.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
         weights::check(&path, &tensors, &forms)?;
@@ -248,7 +309,18 @@ mod tests {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
             visual: VisualSpec { input: 112, channels: [4, 4, 4, 4] },
-            policy: PolicySpec { history: 5, embedding: 8, channels: [4; 4], hidden: vec![8], dropout: 0.2 },
+            policy: PolicySpec {
+                history: 5,
+                embedding: 8,
+                channels: [4; 4],
+                hidden: vec![8],
+                dropout: 0.2,
+                goal: None,
+                attention: None,
+            },
+            method: None,
+            critic: None,
+            words: None,
             sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
             provenance: Provenance {
                 preset: "test".into(),
@@ -264,7 +336,7 @@ mod tests {
     fn saved() -> (tempfile::TempDir, Config) {
         let folder = tempfile::tempdir().unwrap();
         let config = small();
-        let networks = Networks::new(&config.visual, &config.policy, Device::Cpu);
+        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
         (folder, config)
     }
@@ -285,6 +357,34 @@ mod tests {
         first.save(again.path(), &config).unwrap();
         let second = weights::read(&again.path().join("model.safetensors")).unwrap();
         assert!(first.tensors().iter().all(|(name, tensor)| *tensor == second[name]));
+    }
+
+    #[test]
+    fn a_critic_and_its_target_are_saved_with_the_policy() {
+        let (mut config, folder) = (small(), tempfile::tempdir().unwrap());
+        config.method = Some("iql".into());
+        config.critic = Some(CriticSpec {
+            channels: [4; 4],
+            hidden: vec![8],
+            dropout: 0.2,
+            action_embedding: 4,
+            object_embedding: 2,
+            shared_trunk: true,
+        });
+        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
+        networks.save(folder.path(), &config).unwrap();
+        let read = Config::read(folder.path()).unwrap();
+        assert_eq!(read, config);
+        let loaded = Networks::load(folder.path(), &read, Device::Cpu).unwrap().tensors();
+        assert!(networks.tensors().iter().all(|(name, tensor)| *tensor == loaded[name]));
+        assert!(loaded.contains_key("target.q1.out.weight") && loaded.contains_key("critic.value.out.bias"));
+    }
+
+    #[test]
+    fn the_shipped_agent_loads() {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first"));
+        let config = Config::read(folder).unwrap();
+        assert!(Networks::load(folder, &config, Device::Cpu).unwrap().critic.is_none());
     }
 
     #[test]

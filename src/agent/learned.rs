@@ -9,10 +9,13 @@ use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::{Config, Networks};
-use super::policy::{Decision, Policy, Situation};
+use super::goal;
+use super::policy::{Decision, Policy, Situation, Values};
 use super::select::{self, Selection};
-use crate::domain::ActionType;
+use crate::domain::{ActionType, Class};
+use crate::house::House;
 use crate::language::instruction::normalise;
+use crate::language::vocabulary::Vocabulary;
 use crate::nets::embedding_cache::Embedder;
 
 /// A sentence encoder with its cache, which several policies may share.
@@ -32,7 +35,7 @@ pub struct LearnedPolicy {
     last_image: Vec<u8>,
     blocked: Vec<ActionType>,
     last_choice: Option<ActionType>,
-    /// The instruction that was read last, with its embedding.
+    /// The instruction that was read last, with its embedding or the frames of its goal.
     read: Option<(String, Tensor)>,
     samples: bool,
     rng: ChaCha8Rng,
@@ -50,7 +53,7 @@ impl LearnedPolicy {
             let encoder = embedder.encoder();
             let (wanted, found) = (config.policy.embedding, encoder.width() as i64);
             anyhow::ensure!(
-                wanted == found,
+                wanted == found || config.policy.attention.is_some(),
                 "{}: policy.embedding is {wanted}, the sentence encoder's width is {found}",
                 folder.join("config.json").display()
             );
@@ -131,16 +134,38 @@ impl LearnedPolicy {
         }
     }
 
-    fn sentence(&mut self, instruction: &str) -> anyhow::Result<Tensor> {
-        if let Some((text, embedding)) = &self.read
-            && text == instruction
+    /// What the agent is told: the instruction's embedding or its words, or the maps of the goal's last frames.
+    fn told(&mut self, situation: &Situation<'_>) -> anyhow::Result<Tensor> {
+        if let Some((text, told)) = &self.read
+            && text == situation.instruction
         {
-            return Ok(embedding.shallow_clone());
+            return Ok(told.shallow_clone());
         }
-        let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-        let embedding = embedder.embed(&[&normalise(instruction)])?.to_device(self.device).to_kind(Kind::Float);
-        self.read = Some((instruction.to_string(), embedding.shallow_clone()));
-        Ok(embedding)
+        let told = match self.config.policy.goal {
+            Some(_) => self.goal(situation)?,
+            None if self.config.policy.attention.is_some() => {
+                let words = Vocabulary::new(self.config.words.clone().unwrap_or_default());
+                let numbers = words.numbers(&normalise(situation.instruction));
+                Tensor::from_slice(&numbers).unsqueeze(0).to_device(self.device)
+            }
+            None => {
+                let embedder = self.sentences.lock();
+                let mut embedder = embedder.map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+                embedder.embed(&[&normalise(situation.instruction)])?.to_device(self.device).to_kind(Kind::Float)
+            }
+        };
+        self.read = Some((situation.instruction.to_string(), told.shallow_clone()));
+        Ok(told)
+    }
+
+    fn goal(&self, situation: &Situation<'_>) -> anyhow::Result<Tensor> {
+        let history = self.config.policy.history as usize;
+        let visual = &self.networks.visual;
+        let see = |world| visual.spec().image(House::new(Arc::clone(situation.house.scene()), world).frame());
+        let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
+        let missing = history - images.len();
+        let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();
+        Ok(visual.encode(&stacked).flatten(0, 1).unsqueeze(0))
     }
 }
 
@@ -155,13 +180,17 @@ impl Policy for LearnedPolicy {
         self.blocked.clear();
         self.last_choice = None;
         self.seen_at = None;
+        if self.config.policy.goal.is_some() {
+            // The next episode's goal looks different, whatever its instruction.
+            self.read = None;
+        }
         self.rng = ChaCha8Rng::seed_from_u64(seed);
     }
 
     fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
         let observation = self.observe(situation);
-        let sentence = self.sentence(situation.instruction)?;
-        let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &sentence, false));
+        let told = self.told(situation)?;
+        let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &told, false));
         let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
         let (actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
         let candidates = situation.house.candidates();
@@ -169,5 +198,119 @@ impl Policy for LearnedPolicy {
         let decision = select::decide(&actions, &objects, &candidates, &self.blocked, selection);
         self.last_choice = Some(decision.action.kind);
         Ok(decision)
+    }
+
+    fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
+        if self.networks.critic.is_none() {
+            return Ok(None);
+        }
+        let (observation, told) = (self.observe(situation), self.told(situation)?);
+        let Some(critic) = &self.networks.critic else { return Ok(None) };
+        let mut possible: Vec<(ActionType, Option<Class>)> =
+            ActionType::ALL.into_iter().filter(|kind| !kind.is_interaction()).map(|kind| (kind, None)).collect();
+        for candidate in situation.house.candidates() {
+            let pair = (candidate.kind, Some(candidate.class));
+            if candidate.class.in_vocabulary() && !possible.contains(&pair) {
+                possible.push(pair);
+            }
+        }
+        let index = |&(kind, class): &(ActionType, Option<Class>)| {
+            (kind.index() as i64, class.map_or(0, |class| class.index() as i64))
+        };
+        let pairs: Vec<(i64, i64)> = possible.iter().map(index).collect();
+        let (value, q) = critic.online.appraise(&observation, &told, &pairs);
+        let q = Vec::<f32>::try_from(q.to_device(Device::Cpu))?;
+        let actions = possible.into_iter().zip(q).map(|((kind, class), q)| (kind, class, q)).collect();
+        Ok(Some(Values { value: value.double_value(&[0]) as f32, actions }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::checkpoint::{Ontology, Provenance, SentenceSpec};
+    use crate::domain::SkillKind;
+    use crate::house::grading::{Grader, Grading};
+    use crate::house::testing::{kitchen_house, role, subtask};
+    use crate::nets::critic::CriticSpec;
+    use crate::nets::embedding_cache::Embedder;
+    use crate::nets::policy::PolicySpec;
+    use crate::nets::sentence::{SentenceEncoder, default_folder};
+    use crate::nets::visual::VisualSpec;
+
+    /// A fresh agent with a critic; nothing where there is no sentence encoder.
+    fn agent(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
+        let folder = default_folder();
+        if !folder.join("model.safetensors").exists() {
+            eprintln!("skipped: needs the sentence encoder (`make setup`)");
+            return None;
+        }
+        let embedder = Embedder::new(SentenceEncoder::load(&folder, Device::Cpu).unwrap(), None);
+        let embedding = embedder.encoder().width() as i64;
+        let config = Config {
+            format_version: Config::FORMAT,
+            ontology: Ontology::current(),
+            visual: VisualSpec { input: 112, channels: [4; 4] },
+            method: None,
+            words: None,
+            policy: PolicySpec {
+                history: 5,
+                embedding,
+                channels: [4; 4],
+                hidden: vec![8],
+                dropout: 0.2,
+                goal,
+                attention: None,
+            },
+            critic: Some(CriticSpec {
+                channels: [4; 4],
+                hidden: vec![8],
+                dropout: 0.2,
+                action_embedding: 4,
+                object_embedding: 4,
+                shared_trunk: true,
+            }),
+            sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
+            provenance: Provenance {
+                preset: "test".into(),
+                dataset: "none".into(),
+                trajectories: 0,
+                seed: 1,
+                visual_steps: 0,
+                policy_steps: 0,
+            },
+        };
+        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
+        Some(LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu))
+    }
+
+    #[test]
+    fn a_critic_values_what_is_possible_and_changes_no_decision() {
+        let _chance = crate::nets::testing::chance();
+        let Some(mut agent) = agent(None) else { return };
+        agent.begin(1);
+        let mut house = kitchen_house();
+        let mut situation = Situation { house: &mut house, instruction: "take the mug", step: 0, grader: None };
+        let decision = agent.decide(&mut situation).unwrap();
+        let values = agent.values(&mut situation).unwrap().unwrap();
+        assert_eq!(agent.decide(&mut situation).unwrap().action, decision.action);
+        let candidates = situation.house.candidates();
+        let wanted: std::collections::BTreeSet<_> = candidates.iter().map(|c| (c.kind, c.class.index())).collect();
+        assert_eq!(values.actions.len(), 5 + wanted.len());
+        assert!(values.value.is_finite() && values.q(ActionType::MoveAhead, None).is_some());
+    }
+
+    #[test]
+    fn an_agent_that_is_shown_its_goal_needs_a_task() {
+        let _chance = crate::nets::testing::chance();
+        let Some(mut agent) = agent(Some([4; 4])) else { return };
+        agent.begin(1);
+        let mut house = kitchen_house();
+        let mut decide = |grader: Option<&Grader>| {
+            agent.decide(&mut Situation { house: &mut house, instruction: "", step: 0, grader }).map(|_| ())
+        };
+        assert!(decide(None).unwrap_err().to_string().contains("which a task has"));
+        let grader = Grader::new(Grading::default(), &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
+        decide(Some(&grader)).unwrap();
     }
 }

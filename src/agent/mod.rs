@@ -2,6 +2,7 @@
 
 pub mod checkpoint;
 pub mod expert;
+pub mod goal;
 pub mod learned;
 pub mod policy;
 pub mod random;
@@ -10,5 +11,5 @@ pub mod select;
 
 pub use expert::ExpertPolicy;
 pub use learned::LearnedPolicy;
-pub use policy::{Decision, Mind, Policy, Situation};
+pub use policy::{Decision, Mind, Policy, Situation, Values};
 pub use random::RandomPolicy;

@@ -39,6 +39,23 @@ pub struct Mind {
     pub greedy: Action,
 }
 
+/// What a critic makes of a situation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Values {
+    /// V: how likely the instruction will be fulfilled from here, discounted by how long it takes.
+    pub value: f32,
+    /// min(Q1, Q2) of everything that is possible now: the five ways to move, without a class, then each interaction with each
+    /// class that is a candidate of it, nearest first.
+    pub actions: Vec<(ActionType, Option<Class>, f32)>,
+}
+
+impl Values {
+    /// Q of an action, if it is possible now.
+    pub fn q(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
+        self.actions.iter().find(|(own, of, _)| (*own, *of) == (kind, class)).map(|&(_, _, q)| q)
+    }
+}
+
 /// Something that acts: a trained agent, the expert, chance.
 pub trait Policy: Send {
     /// A short name for reports.
@@ -52,4 +69,12 @@ pub trait Policy: Send {
     /// # Errors
     /// When the policy cannot go on (the expert sees no way, a forward pass fails); the episode then ends with that reason.
     fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision>;
+
+    /// What its critic makes of the situation; nothing without a critic. Asked before or after deciding, it changes no decision.
+    ///
+    /// # Errors
+    /// As [`Policy::decide`].
+    fn values(&mut self, _situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
+        Ok(None)
+    }
 }

@@ -1,13 +1,12 @@
 //! A learner: weights and their optimiser, as one state that can be saved and taken up again.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use tch::{Tensor, nn};
 
 use super::adamw::{AdamW, AdamWConfig};
 use super::schedule::Schedule;
-use crate::nets::weights::{self, Form};
+use crate::nets::weights::{self, Form, Tensors};
 
 /// How weights are optimised.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -59,16 +58,30 @@ impl<'a> Learner<'a> {
         self.optimiser.minimise(loss, rate);
     }
 
+    /// Weights and moments by name: `weight.NAME`, `mean.NAME`, `square.NAME`.
+    pub fn state(&self) -> Tensors {
+        let mut tensors: Tensors =
+            self.store.variables().into_iter().map(|(name, tensor)| (format!("weight.{name}"), tensor)).collect();
+        tensors.extend(self.optimiser.moments());
+        tensors
+    }
+
+    /// Takes up a state as it was after `step` steps.
+    ///
+    /// # Errors
+    /// When a tensor is missing or of another shape.
+    pub fn restore(&mut self, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+        self.optimiser.restore(step, tensors)?;
+        weights::copy(tensors, "weight.", self.store)
+    }
+
     /// Writes weights, moments and the count of steps as one file, whole or not at all.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        let mut tensors: BTreeMap<String, Tensor> =
-            self.store.variables().into_iter().map(|(name, tensor)| (format!("weight.{name}"), tensor)).collect();
-        tensors.extend(self.optimiser.moments());
         let metadata = [("step".to_string(), self.step().to_string()), ("seed".to_string(), self.seed.to_string())];
-        Ok(weights::write(path, &tensors, &metadata.into())?)
+        Ok(weights::write(path, &self.state(), &metadata.into())?)
     }
 
     /// Takes up a training that was saved.
@@ -83,18 +96,8 @@ impl<'a> Learner<'a> {
         };
         let (step, seed) = (number("step")?, number("seed")?);
         anyhow::ensure!(seed == self.seed, "{}: seed is {seed}, the preset's is {}", path.display(), self.seed);
-        let variables = self.store.variables();
-        let moments = self.optimiser.moments();
-        let mut forms: BTreeMap<String, Form> =
-            variables.iter().map(|(name, tensor)| (format!("weight.{name}"), Form::of(tensor))).collect();
-        forms.extend(moments.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))));
+        let forms = self.state().iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
         weights::check(path, &tensors, &forms)?;
-        self.optimiser.restore(step, &tensors)?;
-        tch::no_grad(|| {
-            for (name, mut variable) in variables {
-                variable.f_copy_(&tensors[&format!("weight.{name}")])?;
-            }
-            Ok(())
-        })
+        self.restore(step, &tensors)
     }
 }

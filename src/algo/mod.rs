@@ -2,5 +2,8 @@
 
 pub mod adamw;
 pub mod bc;
+pub mod chain;
+pub mod iql;
 pub mod learner;
 pub mod schedule;
+pub mod update;

@@ -13,6 +13,7 @@ mod explore;
 mod eval;
 mod import;
 mod logging;
+mod plot;
 mod policies;
 mod pretrain;
 mod relabel;
@@ -50,6 +51,8 @@ enum Command {
     Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
+    /// Draw the curves of trainings to SVG and PNG
+    Plot(plot::PlotCurves),
     /// Re-run recorded demonstrations in the simulator
     Replay(replay::Replay),
     /// Embed sentences: a sentence a line in, a JSON array a line out
@@ -110,6 +113,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Relabel(relabel) => relabel.run(),
         Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
+        Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Completions(completions) => completions.run(),

@@ -25,9 +25,13 @@ pub struct Pretrain {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// A shipped preset (l-bc), or a preset's file
+    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, l-bc-agg; or a preset's
+    /// file, which may extend one of these
     #[arg(long)]
     preset: String,
+    /// A size other than the preset's own, which suits two CPU cores: paper, or a file of such values
+    #[arg(long)]
+    size: Option<String>,
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -58,7 +62,7 @@ impl Pretrain {
     /// When data or an earlier state cannot be read, or the checkpoint not be written.
     #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
-        let mut preset = Preset::named(&self.preset)?;
+        let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
             preset.visual_training.optimisation.steps = steps;
         }

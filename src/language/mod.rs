@@ -7,5 +7,6 @@ pub mod passage;
 pub mod phrases;
 pub mod rules;
 pub mod summary;
+pub mod vocabulary;
 
 mod outcome;

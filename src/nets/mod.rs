@@ -1,4 +1,4 @@
-//! Networks: weights files, sentence encoders, the visual encoder and the policy, and where they compute.
+//! Networks: weights files, sentence encoders, the visual encoder, policy and critic, and where they compute.
 
 pub mod device;
 pub mod home;
@@ -7,12 +7,16 @@ pub mod weights;
 pub mod embedding_cache;
 pub mod sentence;
 
+pub mod critic;
+pub mod episodic;
 pub mod film;
 pub mod frozen;
 pub mod policy;
 pub mod resnet18;
 pub mod shrink;
 pub mod sight_heads;
+pub mod trunk;
+pub mod value;
 pub mod visual;
 
 mod bert;

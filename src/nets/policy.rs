@@ -1,11 +1,11 @@
-//! The policy network: a convolutional trunk over stacked feature maps, modulated by the sentence, and two heads.
+//! The policy network: the trunk, or attention; fully connected layers; and two heads.
 
 use serde::{Deserialize, Serialize};
 use tch::Tensor;
-use tch::nn::{self, Module, ModuleT};
+use tch::nn::{self, Module};
 
-use super::film::Film;
-use super::visual::SIDE;
+use super::episodic::{AttentionSpec, Episodic};
+use super::trunk::{Dense, Telling, Trunk};
 use crate::domain::{ActionType, Class};
 
 /// The size of a policy network.
@@ -14,7 +14,7 @@ use crate::domain::{ActionType, Class};
 pub struct PolicySpec {
     /// Frames in an observation, the present one last.
     pub history: i64,
-    /// Numbers in a sentence embedding.
+    /// Numbers in a sentence embedding, or in a token's where the agent reads words.
     pub embedding: i64,
     /// Channels of the four convolutions; the first is 1 x 1, the others 3 x 3.
     pub channels: [i64; 4],
@@ -22,6 +22,12 @@ pub struct PolicySpec {
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
     pub dropout: f64,
+    /// Where the agent is shown a state to reach instead of being told: the channels of the four convolutions that see it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<[i64; 4]>,
+    /// Where the agent reads words and attends to them: the attention layers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attention: Option<AttentionSpec>,
 }
 
 /// Logits of both heads.
@@ -33,12 +39,19 @@ pub struct Logits {
     pub objects: Tensor,
 }
 
-/// Sees the last few frames and a sentence; says what to do and to which class.
+/// How it sees, and takes in what it is told.
+#[derive(Debug)]
+enum Body {
+    Trunk { telling: Telling, trunk: Trunk },
+    Episodic(Box<Episodic>),
+}
+
+/// Sees the last few frames and is told something; says what to do and to which class.
 #[derive(Debug)]
 pub struct PolicyNet {
     spec: PolicySpec,
-    convs: Vec<(nn::Conv2D, nn::BatchNorm, Film)>,
-    dense: Vec<nn::Linear>,
+    body: Body,
+    dense: Dense,
     actions: nn::Linear,
     objects: nn::Linear,
 }
@@ -46,30 +59,24 @@ pub struct PolicyNet {
 impl PolicyNet {
     /// A network with fresh weights under `path`, over maps of `features` channels a frame.
     pub fn new(path: &nn::Path<'_>, spec: &PolicySpec, features: i64) -> PolicyNet {
-        let mut from = spec.history * features;
-        let mut convs = Vec::new();
-        for (i, &to) in spec.channels.iter().enumerate() {
-            let here = path / format!("conv{}", i + 1);
-            let (kernel, padding) = if i == 0 { (1, 0) } else { (3, 1) };
-            let config = nn::ConvConfig { padding, bias: false, ..Default::default() };
-            convs.push((
-                nn::conv2d(&here / "conv", from, to, kernel, config),
-                nn::batch_norm2d(&here / "norm", to, Default::default()),
-                Film::new(&(&here / "film"), spec.embedding, to),
-            ));
-            from = to;
-        }
-        let mut width = from * SIDE * SIDE + spec.embedding;
-        let mut dense = Vec::new();
-        for (i, &to) in spec.hidden.iter().enumerate() {
-            dense.push(nn::linear(path / format!("dense{}", i + 1), width, to, Default::default()));
-            width = to;
-        }
+        let from = spec.history * features;
+        let (body, width) = match &spec.attention {
+            Some(attention) => {
+                let (frames, tokens) = ((spec.history, features), (spec.embedding, &spec.channels, spec.dropout));
+                (Body::Episodic(Box::new(Episodic::new(path, attention, frames, tokens))), spec.embedding)
+            }
+            None => {
+                let trunk = Trunk::new(path, from, &spec.channels, Some(spec.embedding));
+                let (telling, width) = (Telling::new(path, spec.embedding, spec.goal.as_ref(), from), trunk.width());
+                (Body::Trunk { telling, trunk }, width + spec.embedding)
+            }
+        };
+        let dense = Dense::new(path, width, &spec.hidden, spec.dropout);
         PolicyNet {
-            convs,
+            body,
+            actions: nn::linear(path / "actions", dense.width(), ActionType::COUNT as i64, Default::default()),
+            objects: nn::linear(path / "objects", dense.width(), Class::VOCABULARY as i64, Default::default()),
             dense,
-            actions: nn::linear(path / "actions", width, ActionType::COUNT as i64, Default::default()),
-            objects: nn::linear(path / "objects", width, Class::VOCABULARY as i64, Default::default()),
             spec: spec.clone(),
         }
     }
@@ -79,18 +86,17 @@ impl PolicyNet {
         &self.spec
     }
 
-    /// `observation` [n, history * features, 7, 7], oldest frame first, and `sentence` [n, embedding], of unit length.
-    pub fn forward(&self, observation: &Tensor, sentence: &Tensor, train: bool) -> Logits {
-        // A unit vector's entries are tiny; scaled to unit variance they weigh as much as the other features.
-        let sentence = sentence * (self.spec.embedding as f64).sqrt();
-        let mut x = observation.shallow_clone();
-        for (conv, norm, film) in &self.convs {
-            x = film.forward(&norm.forward_t(&x.apply(conv), train), &sentence).relu();
-        }
-        let mut x = Tensor::cat(&[x.flatten(1, -1), sentence], 1);
-        for dense in &self.dense {
-            x = dense.forward(&x).relu().dropout(self.spec.dropout, train);
-        }
+    /// `observation` [n, history * features, 7, 7], oldest frame first, and `told`: sentences [n, embedding] of unit length,
+    /// goals of the observation's shape, or numbers of words [n, words].
+    pub fn forward(&self, observation: &Tensor, told: &Tensor, train: bool) -> Logits {
+        let features = match &self.body {
+            Body::Episodic(episodic) => episodic.forward(observation, told, train),
+            Body::Trunk { telling, trunk } => {
+                let told = telling.forward(told, train);
+                Tensor::cat(&[trunk.forward(observation, Some(&told), train), told], 1)
+            }
+        };
+        let x = self.dense.forward(features, train);
         Logits { actions: self.actions.forward(&x), objects: self.objects.forward(&x) }
     }
 }
@@ -100,19 +106,50 @@ mod tests {
     use tch::{Device, Kind};
 
     use super::*;
+    use crate::nets::visual::SIDE;
+
+    fn spec(goal: Option<[i64; 4]>) -> PolicySpec {
+        PolicySpec { history: 5, embedding: 6, channels: [8; 4], hidden: vec![16], dropout: 0.2, goal, attention: None }
+    }
 
     #[test]
     fn the_heads_have_12_and_82_entries_and_depend_on_the_sentence() {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(1);
         let store = nn::VarStore::new(Device::Cpu);
-        let spec = PolicySpec { history: 5, embedding: 6, channels: [8; 4], hidden: vec![16], dropout: 0.2 };
-        let net = PolicyNet::new(&store.root(), &spec, 4);
+        let net = PolicyNet::new(&store.root(), &spec(None), 4);
         let observation = Tensor::rand([2, 20, SIDE, SIDE], (Kind::Float, Device::Cpu));
         let say = |v: f32| Tensor::full([2, 6], f64::from(v), (Kind::Float, Device::Cpu));
         let one = net.forward(&observation, &say(0.4), false);
         let other = net.forward(&observation, &say(-0.4), false);
         assert_eq!((one.actions.size(), one.objects.size()), (vec![2, 12], vec![2, 82]));
         assert!((one.actions - other.actions).abs().max().double_value(&[]) > 1e-3);
+    }
+
+    #[test]
+    fn a_policy_that_is_shown_its_goal_depends_on_it() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(1);
+        let store = nn::VarStore::new(Device::Cpu);
+        let net = PolicyNet::new(&store.root(), &spec(Some([4; 4])), 4);
+        let frames = || Tensor::rand([2, 20, SIDE, SIDE], (Kind::Float, Device::Cpu));
+        let observation = frames();
+        let one = net.forward(&observation, &frames(), false);
+        let other = net.forward(&observation, &frames(), false);
+        assert!((one.actions - other.actions).abs().max().double_value(&[]) > 1e-4);
+    }
+
+    #[test]
+    fn padding_says_nothing_to_a_policy_that_reads_words() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(1);
+        let store = nn::VarStore::new(Device::Cpu);
+        let attention = Some(AttentionSpec { words: 9, layers: 1, heads: 2, inner: 8 });
+        let net = PolicyNet::new(&store.root(), &PolicySpec { attention, ..spec(None) }, 4);
+        let observation = Tensor::rand([1, 20, SIDE, SIDE], (Kind::Float, Device::Cpu));
+        let say = |words: &[i64]| net.forward(&observation, &Tensor::from_slice(words).unsqueeze(0), false).actions;
+        let differs = |a: Tensor, b: Tensor| (a - b).abs().max().double_value(&[]) > 1e-4;
+        assert!(differs(say(&[2, 3]), say(&[3, 2])), "the order of words matters");
+        assert!(!differs(say(&[2, 3]), say(&[2, 3, 0, 0])));
     }
 }

@@ -205,6 +205,21 @@ pub fn load(path: &Path, variables: &mut nn::VarStore) -> Result<BTreeMap<String
     })
 }
 
+/// Copies tensors, those under `prefix`, over all of a store's variables of the same names.
+///
+/// # Errors
+/// When one is missing or of another shape.
+pub fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<()> {
+    tch::no_grad(|| {
+        for (name, mut variable) in to.variables() {
+            let name = format!("{prefix}{name}");
+            let tensor = from.get(&name).ok_or_else(|| anyhow::anyhow!("the tensor {name} is missing"))?;
+            variable.f_copy_(tensor)?;
+        }
+        Ok(())
+    })
+}
+
 /// Writes tensors and metadata to a file, atomically: a reader sees the old file or the whole new one.
 ///
 /// The same tensors and metadata give the same bytes, so that a file's hash identifies its weights.

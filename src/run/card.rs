@@ -5,6 +5,30 @@ use std::fmt::Write;
 use super::appraise::Findings;
 use crate::agent::checkpoint::Config;
 
+/// The method in words.
+fn method(config: &Config) -> &'static str {
+    match config.method.as_deref() {
+        Some("iql") => "implicit Q-learning",
+        Some("sprint") => "implicit Q-learning with skills chained across trajectories",
+        Some("et") => "behaviour cloning of an Episodic Transformer",
+        Some("am") => "Actionable Models: it is shown the state to reach",
+        _ => "behaviour cloning",
+    }
+}
+
+/// What it is told, in words.
+fn told(config: &Config) -> String {
+    let policy = &config.policy;
+    match (&policy.goal, &policy.attention) {
+        (Some(_), _) => "is shown the last frames of the state to reach".into(),
+        (None, Some(_)) => "reads the instruction word by word".into(),
+        (None, None) => format!(
+            "reads the instruction as a sentence embedding ({}, {} numbers)",
+            config.sentence_encoder.name, policy.embedding
+        ),
+    }
+}
+
 /// The card's text.
 pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
     let from = &config.provenance;
@@ -14,9 +38,8 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         text,
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
-         ({input} x {input} pixels to {features} x 7 x 7, channels {channels:?}), reads the instruction as a sentence embedding \
-         ({encoder}, {width} numbers) and chooses one of 12 actions and one of 82 object classes.\n\n\
-         Trained with the preset `{preset}` (behaviour cloning) on {trajectories} demonstrations in generated houses (dataset \
+         ({input} x {input} pixels to {features} x 7 x 7, channels {channels:?}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
+         Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations in generated houses (dataset \
          `{dataset}`): {visual_steps} steps of the visual encoder, {policy_steps} of the policy, seed {seed}.\n\n\
          ## Measured in generated houses that no training saw\n\n\
          `sprint pretrain` measures this at its end.\n\n\
@@ -27,9 +50,9 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         input = config.visual.input,
         features = config.visual.features(),
         channels = config.visual.channels,
-        encoder = config.sentence_encoder.name,
-        width = config.policy.embedding,
+        told = told(config),
         preset = from.preset,
+        method = method(config),
         trajectories = from.trajectories,
         dataset = from.dataset,
         visual_steps = from.visual_steps,

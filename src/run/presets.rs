@@ -5,7 +5,11 @@ use std::path::Path;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
+use crate::algo::chain::{Chaining, Pairs};
+use crate::algo::iql::Iql;
 use crate::algo::learner::Optimisation;
+use crate::data::items::Selection;
+use crate::nets::critic::CriticSpec;
 use crate::nets::policy::PolicySpec;
 use crate::nets::visual::VisualSpec;
 
@@ -25,13 +29,24 @@ pub struct Preset {
     pub save_every: u64,
     /// Steps between two reports.
     pub report_every: u64,
+    /// What is learned from.
+    pub data: Selection,
     /// The visual encoder.
     pub visual: VisualSpec,
     /// Its training.
     pub visual_training: VisualTraining,
     /// The policy network.
     pub policy: PolicySpec,
-    /// Its training.
+    /// The critic; absent for behaviour cloning.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub critic: Option<CriticSpec>,
+    /// How the critic learns and weighs the policy; there if the critic is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iql: Option<Iql>,
+    /// How skills are chained; absent where they are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chaining: Option<Chaining>,
+    /// The training of policy and critic.
     pub training: Optimisation,
     /// How the result is measured.
     pub appraisal: Appraisal,
@@ -62,20 +77,60 @@ pub struct Appraisal {
 impl Preset {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 1;
-    const SHIPPED: [(&'static str, &'static str); 1] = [("l-bc", include_str!("../../assets/presets/l-bc.toml"))];
+    const SHIPPED: [(&'static str, &'static str); 9] = [
+        ("sprint", include_str!("../../assets/presets/sprint.toml")),
+        ("l-bc", include_str!("../../assets/presets/l-bc.toml")),
+        ("iql-primitive", include_str!("../../assets/presets/iql-primitive.toml")),
+        ("am", include_str!("../../assets/presets/am.toml")),
+        ("et", include_str!("../../assets/presets/et.toml")),
+        ("sprint-no-chain", include_str!("../../assets/presets/sprint-no-chain.toml")),
+        ("sprint-no-agg", include_str!("../../assets/presets/sprint-no-agg.toml")),
+        ("sprint-concat-agg", include_str!("../../assets/presets/sprint-concat-agg.toml")),
+        ("l-bc-agg", include_str!("../../assets/presets/l-bc-agg.toml")),
+    ];
+    /// Sizes other than the presets' own, which suits two CPU cores.
+    const SIZES: [(&'static str, &'static str); 1] = [("paper", include_str!("../../assets/presets/sizes/paper.toml"))];
 
-    /// A shipped preset by name, or one from a file.
+    /// The names of the shipped presets.
+    pub fn names() -> Vec<&'static str> {
+        Preset::SHIPPED.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// A shipped preset by name, or one from a file, in its own size.
     ///
     /// # Errors
-    /// When there is neither, or it is malformed; the field is named.
+    /// As [`Preset::sized`].
     pub fn named(name: &str) -> anyhow::Result<Preset> {
-        if let Some((_, text)) = Preset::SHIPPED.iter().find(|(shipped, _)| *shipped == name) {
-            return Preset::parse(text).with_context(|| format!("the preset {name}"));
+        Preset::sized(name, None)
+    }
+
+    /// A shipped preset by name, or one from a file, which may extend a shipped one. `size` names a shipped size or a file;
+    /// it changes only what the preset has.
+    ///
+    /// # Errors
+    /// When there is no such preset or size, or it is malformed; the field is named.
+    pub fn sized(name: &str, size: Option<&str>) -> anyhow::Result<Preset> {
+        let mut table = Preset::table(name).with_context(|| format!("the preset {name}"))?;
+        if let Some(size) = size {
+            let size: toml::Table =
+                shipped(&Preset::SIZES, size, "size")?.parse().with_context(|| format!("the size {size}"))?;
+            resize(&mut table, size);
         }
-        let names: Vec<&str> = Preset::SHIPPED.iter().map(|(name, _)| *name).collect();
-        let text = std::fs::read_to_string(Path::new(name))
-            .with_context(|| format!("there is no preset {name:?}: use {} or a file", names.join(", ")))?;
-        Preset::parse(&text).with_context(|| name.to_string())
+        Preset::parse(&toml::to_string(&table)?).with_context(|| format!("the preset {name}"))
+    }
+
+    /// A preset's text with what it extends.
+    fn table(name: &str) -> anyhow::Result<toml::Table> {
+        let mut table: toml::Table = shipped(&Preset::SHIPPED, name, "preset")?.parse()?;
+        match table.remove("extends") {
+            None => Ok(table),
+            Some(toml::Value::String(base)) if Preset::names().contains(&base.as_str()) && base != name => {
+                let mut whole = Preset::table(&base)?;
+                extend(&mut whole, table);
+                Ok(whole)
+            }
+            Some(other) => anyhow::bail!("extends is {other}, which is no other shipped preset"),
+        }
     }
 
     fn parse(text: &str) -> anyhow::Result<Preset> {
@@ -95,24 +150,129 @@ impl Preset {
         ] {
             anyhow::ensure!((2..=65_536).contains(&batch), "{field} is {batch}, which is not between 2 and 65536");
         }
+        preset.check_method()?;
         Ok(preset)
+    }
+
+    /// What a method consists of has to fit together.
+    fn check_method(&self) -> anyhow::Result<()> {
+        anyhow::ensure!(
+            self.critic.is_some() == self.iql.is_some(),
+            "critic and iql go together: one of them is absent"
+        );
+        if let Some(attention) = &self.policy.attention {
+            anyhow::ensure!(self.critic.is_none(), "policy.attention reads words, which no critic here does");
+            anyhow::ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
+            attention.check(self.policy.embedding).context("policy")?;
+        }
+        let Some(chaining) = &self.chaining else { return Ok(()) };
+        anyhow::ensure!(self.critic.is_some(), "chaining needs a critic");
+        anyhow::ensure!(chaining.batch > 0, "chaining.batch is 0");
+        for (field, value) in [
+            ("chaining.weight", chaining.weight),
+            ("chaining.chain", chaining.chain),
+            ("chaining.aggregate", chaining.aggregate),
+        ] {
+            anyhow::ensure!(value.is_finite() && value >= 0.0, "{field} is {value}");
+        }
+        anyhow::ensure!(chaining.chain + chaining.aggregate > 0.0, "chaining.chain and chaining.aggregate are both 0");
+        let sentences = self.policy.goal.is_none();
+        anyhow::ensure!(sentences || chaining.aggregate == 0.0, "chaining.aggregate joins sentences; goals have none");
+        anyhow::ensure!(
+            sentences || chaining.pairs == Pairs::InBatch,
+            "chaining.pairs: a pool is of sentences; goals are paired in-batch"
+        );
+        Ok(())
+    }
+
+    /// The method in a word.
+    pub fn method(&self) -> &'static str {
+        match (&self.iql, &self.chaining, &self.policy.goal) {
+            (_, _, Some(_)) => "am",
+            (None, ..) if self.policy.attention.is_some() => "et",
+            (None, ..) => "bc",
+            (Some(_), None, _) => "iql",
+            (Some(_), Some(_), _) => "sprint",
+        }
+    }
+}
+
+/// A shipped text by name, or a file's.
+fn shipped(texts: &[(&'static str, &'static str)], name: &str, what: &str) -> anyhow::Result<String> {
+    if let Some((_, text)) = texts.iter().find(|(shipped, _)| *shipped == name) {
+        return Ok((*text).to_string());
+    }
+    let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
+    std::fs::read_to_string(Path::new(name))
+        .with_context(|| format!("there is no {what} {name:?}: use {} or a file", names.join(", ")))
+}
+
+/// Puts `over` over `table`, section by section; `false` takes a section away.
+fn extend(table: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(value)) => extend(below, value),
+            (Some(toml::Value::Table(_)), toml::Value::Boolean(false)) => drop(table.remove(&key)),
+            (_, value) => drop(table.insert(key, value)),
+        }
+    }
+}
+
+/// Puts the values of a size over those that `table` has.
+fn resize(table: &mut toml::Table, size: toml::Table) {
+    for (key, value) in size {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(value)) => resize(below, value),
+            (Some(own), value) => *own = value,
+            (None, _) => {}
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::items::Composites;
 
     #[test]
-    fn every_shipped_preset_parses() {
-        for (name, _) in Preset::SHIPPED {
-            assert_eq!(Preset::named(name).unwrap().name, name);
+    fn every_shipped_preset_parses_in_every_size_and_is_what_its_name_says() {
+        for name in Preset::names() {
+            let preset = Preset::named(name).unwrap();
+            assert_eq!(preset.name, name);
+            let paper = Preset::sized(name, Some("paper")).unwrap();
+            assert_eq!((paper.training.batch, paper.policy.embedding), (1024, 768), "{name}");
+            assert_eq!(paper.method(), preset.method(), "{name}");
+            assert!(paper.critic.is_none_or(|critic| !critic.shared_trunk), "{name}");
+            assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == Pairs::InBatch), "{name}");
         }
+        let method = |name| Preset::named(name).unwrap().method();
+        let methods = ["sprint", "sprint-no-agg", "sprint-no-chain", "iql-primitive", "l-bc", "l-bc-agg", "am", "et"];
+        assert_eq!(methods.map(method), ["sprint", "sprint", "iql", "iql", "bc", "bc", "am", "et"]);
+        let composites = |name| Preset::named(name).unwrap().data.composites;
+        let selections = ["sprint", "l-bc", "iql-primitive", "sprint-no-agg", "sprint-concat-agg"].map(composites);
+        assert_eq!(
+            selections,
+            [Composites::Labels, Composites::None, Composites::None, Composites::None, Composites::Concat]
+        );
     }
 
     #[test]
     fn an_unknown_hyper_parameter_is_named() {
         let text = format!("surprise = 1\n{}", Preset::SHIPPED[0].1);
         assert!(format!("{:#}", Preset::parse(&text).unwrap_err()).contains("surprise"));
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        let refused = |over: &str, what: &str| {
+            let mut table = Preset::table("sprint").unwrap();
+            extend(&mut table, over.parse().unwrap());
+            let error = format!("{:#}", Preset::parse(&toml::to_string(&table).unwrap()).unwrap_err());
+            assert!(error.contains(what), "{error}");
+        };
+        refused("critic = false", "critic and iql");
+        refused("critic = false\niql = false", "chaining needs a critic");
+        refused("[policy]\ngoal = [4, 4, 4, 4]", "goals have none");
+        refused("[chaining]\nbatch = 0", "chaining.batch");
     }
 }

@@ -1,22 +1,30 @@
 //! Pretraining: visual encoder, feature maps, sentences, policy; each stage can be stopped and taken up again.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use tch::{Device, Tensor};
 
-use super::cloning::{self, Material};
+use super::batches::Batches;
 use super::encoding;
+use super::events::Events;
 use super::footage::Footage;
+use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
 use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
+use super::trainer::Trainer;
 use super::visual_training;
 use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceSpec};
 use crate::agent::learned::SharedEmbedder;
+use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
-use crate::data::items::{Composites, Items, Selection, Source};
+use crate::data::features::Features;
+use crate::data::items::{Composites, Items, Source};
 use crate::data::summaries::Summaries;
+use crate::language::vocabulary::Vocabulary;
+use crate::nets::frozen::FrameEncoder;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -68,39 +76,140 @@ impl Pretraining {
         std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
+        let mut report = Events::open(&training, &mut report)?;
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let footage = Footage::open(&datasets)?;
         tch::manual_seed(self.preset.seed as i64);
-        let networks = Networks::new(&self.preset.visual, &self.preset.policy, self.device);
+        let Preset { visual, policy, critic, .. } = &self.preset;
+        let networks = Networks::new(visual, policy, critic.as_ref(), self.device);
         if !self.train_visual(&networks, &footage, &mut report, stop)? {
             return Ok(Trained::Stopped);
         }
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
         let digest = digests.join("-");
         if let Some(folder) = &self.policy_from {
-            copy(&self.given(folder)?.policy_store, "", &networks.policy_store)?;
+            self.start_from(folder, &networks)?;
         }
         let encoder = networks.visual.frozen(&networks.visual_store)?;
         let Some(features) = encoding::features(&encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
-        let selection = Selection::of(Composites::Whole);
-        let summaries = Summaries::default();
+        let summaries = self.summaries()?;
         let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
-        let items = Items::of(&source, footage.labels()?, &selection, self.preset.hold_out)?;
-        let Some(sentences) = self.embed(&items.texts, &mut report, stop)? else { return Ok(Trained::Stopped) };
-        let material = Material { items: &items, features: &features, sentences: &sentences };
-        let config = |steps: u64| self.config(&digest, footage.trajectories.len() as u64, steps);
-        let finished = cloning::train(
-            (&networks.policy_store, &networks.policy),
-            &material,
-            &self.preset,
-            &training.join("policy.safetensors"),
-            &mut report,
-            stop,
-            &mut |steps| networks.save(&self.out, &config(steps)?),
-        )?;
+        let items = Items::of(&source, footage.labels()?, &self.preset.data, self.preset.hold_out)?;
+        anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
+        let words = self.preset.policy.attention.as_ref().map(|attention| {
+            let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
+            Vocabulary::of(texts, attention.words as usize)
+        });
+        let embed = |texts: &[&str]| -> anyhow::Result<Tensor> {
+            let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+            embedder.encoder().encode(texts)
+        };
+        let Some(material) = self.material(&items, &features, &embed, words.as_ref(), &mut report, stop)? else {
+            return Ok(Trained::Stopped);
+        };
+        let config = |steps: u64| -> anyhow::Result<Config> {
+            let config = self.config(&digest, footage.trajectories.len() as u64, steps)?;
+            Ok(Config { words: words.as_ref().map(|words| words.words().to_vec()), ..config })
+        };
+        let trainer = Trainer {
+            networks: &networks,
+            preset: &self.preset,
+            state: &training.join("state.safetensors"),
+            identity: &self.identity(encoder.digest(), &digest, &config(0)?),
+        };
+        let batches = Batches::new(
+            material,
+            self.preset.policy.history,
+            networks.critic.is_some(),
+            self.preset.chaining.as_ref(),
+            (self.preset.seed, self.preset.training.batch),
+            self.device,
+        );
+        let mut save = |steps| networks.save(&self.out, &config(steps)?);
+        let finished = trainer.train(batches, &items.held_out, &mut report, stop, &mut save)?;
         Ok(if finished { Trained::Finished } else { Trained::Stopped })
+    }
+
+    /// Everything that batches are made of; nothing when it was stopped meanwhile.
+    fn material<'a>(
+        &self,
+        items: &'a Items,
+        features: &'a Features,
+        embed: &'a Embed<'a>,
+        words: Option<&Vocabulary>,
+        report: &mut dyn Report,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Option<Material<'a>>> {
+        let told = if self.preset.policy.goal.is_some() {
+            Told::Goals
+        } else if let Some(words) = words {
+            Told::Words(items.texts.iter().map(|text| words.numbers(text)).collect())
+        } else {
+            let Some(sentences) = self.embed(&items.texts, report, stop)? else { return Ok(None) };
+            Told::Sentences(Rows::new(&sentences, self.device)?)
+        };
+        let pool = match self.preset.chaining.as_ref().map(|chaining| chaining.pairs) {
+            Some(Pairs::Pool(count)) => {
+                let pairs = Pool::draw(items, self.preset.seed, count);
+                let texts: Vec<String> = pairs.iter().map(|&pair| joined(items, pair)).collect();
+                let Some(joint) = self.embed(&texts, report, stop)? else { return Ok(None) };
+                Some(Pool::new(items, pairs, &joint, self.device)?)
+            }
+            _ => None,
+        };
+        Ok(Some(Material { items, maps: Maps::on(features, self.device), told, pool, embed }))
+    }
+
+    /// The labels of the datasets, where the preset asks for labels.
+    fn summaries(&self) -> anyhow::Result<Summaries> {
+        if self.preset.data.composites != Composites::Labels {
+            return Ok(Summaries::default());
+        }
+        let folders: Vec<&Path> = self.data.iter().map(PathBuf::as_path).collect();
+        Summaries::read(&folders, self.preset.data.labels_of.as_deref())
+    }
+
+    /// What a saved state belongs to.
+    fn identity(&self, encoder: &str, data: &str, config: &Config) -> BTreeMap<String, String> {
+        [
+            ("format_version", "1".to_string()),
+            ("dataset", data.to_string()),
+            ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
+            ("visual_encoder", encoder.to_string()),
+            ("sentence_encoder", config.sentence_encoder.digest.clone()),
+            ("embedding", config.policy.embedding.to_string()),
+            ("seed", self.preset.seed.to_string()),
+        ]
+        .map(|(name, value)| (name.to_string(), value))
+        .into()
+    }
+
+    /// Begins with a checkpoint's policy, and with its critic where both have one of the same size.
+    fn start_from(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
+        let (config, given) = self.given(folder)?;
+        let file = folder.join("config.json");
+        let (found, own) = (&config.policy, &self.preset.policy);
+        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+        let own = self.config("", 0, 0)?.sentence_encoder;
+        let found = &config.sentence_encoder;
+        anyhow::ensure!(
+            found.digest == own.digest,
+            "{}: sentence_encoder is {} ({}), this training's is {} ({})",
+            file.display(),
+            found.name,
+            found.digest,
+            own.name,
+            own.digest
+        );
+        copy(&given.policy_store, "", &networks.policy_store)?;
+        if config.critic == self.preset.critic
+            && let (Some(given), Some(own)) = (&given.critic, &networks.critic)
+        {
+            copy(&given.online_store, "", &own.online_store)?;
+        }
+        Ok(())
     }
 
     /// A training goes on only with the preset it began with.
@@ -123,7 +232,7 @@ impl Pretraining {
     ) -> anyhow::Result<bool> {
         let state = self.out.join("training/visual.safetensors");
         if let Some(folder) = &self.visual_from {
-            copy(&self.given(folder)?.visual_store, "", &networks.visual_store)?;
+            copy(&self.given(folder)?.1.visual_store, "", &networks.visual_store)?;
             return Ok(true);
         }
         // The heads live in a store of their own shape, so the trained encoder is copied out of it.
@@ -135,15 +244,14 @@ impl Pretraining {
         Ok(finished)
     }
 
-    /// The networks of a checkpoint of the preset's sizes.
-    fn given(&self, folder: &Path) -> anyhow::Result<Networks> {
+    /// A checkpoint whose visual encoder is of the preset's size.
+    fn given(&self, folder: &Path) -> anyhow::Result<(Config, Networks)> {
         let config = Config::read(folder)?;
         let file = folder.join("config.json");
         let (found, own) = (&config.visual, &self.preset.visual);
         anyhow::ensure!(found == own, "{}: visual is {found:?}, the preset's is {own:?}", file.display());
-        let (found, own) = (&config.policy, &self.preset.policy);
-        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
-        Networks::load(folder, &config, self.device)
+        let networks = Networks::load(folder, &config, self.device)?;
+        Ok((config, networks))
     }
 
     fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
@@ -164,7 +272,7 @@ impl Pretraining {
     fn config(&self, dataset: &str, trajectories: u64, policy_steps: u64) -> anyhow::Result<Config> {
         let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
         anyhow::ensure!(
-            self.preset.policy.embedding == embedder.encoder().width() as i64,
+            self.preset.policy.embedding == embedder.encoder().width() as i64 || self.preset.policy.attention.is_some(),
             "the preset's policy.embedding is {}, the sentence encoder's width is {}",
             self.preset.policy.embedding,
             embedder.encoder().width()
@@ -173,7 +281,10 @@ impl Pretraining {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
             visual: self.preset.visual.clone(),
+            method: Some(self.preset.method().to_string()),
             policy: self.preset.policy.clone(),
+            critic: self.preset.critic.clone(),
+            words: None,
             sentence_encoder: SentenceSpec {
                 name: self.sentence_encoder.clone(),
                 digest: embedder.encoder().digest().to_string(),

@@ -1,0 +1,173 @@
+//! Cross-trajectory chaining: what the end of one skill is worth to whoever goes on with another (the paper's equations 4
+//! and 5). Pairs (A, B) of items; z_A and z_B are their instructions. No trajectory is joined: each part is trained on alone.
+
+use serde::{Deserialize, Serialize};
+use tch::Tensor;
+
+/// How skills are chained. Where the paper leaves a choice open, the fields say what is taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Chaining {
+    /// Where pairs come from.
+    pub pairs: Pairs,
+    /// Pairs in a step; the paper's is the batch.
+    pub batch: usize,
+    /// Which transitions of A equation 4 ends at.
+    pub cut: Cut,
+    /// What stands for the worth of a state to B.
+    pub worth: Worth,
+    /// Whether the worth is clipped to 0..1, where every return lies.
+    pub clip: bool,
+    /// The weight of both equations together; that of the base loss is 1.
+    pub weight: f64,
+    /// The weight of equation 4 within chaining.
+    pub chain: f64,
+    /// The weight of equation 5 within chaining; 0 where there are no sentences to join.
+    pub aggregate: f64,
+}
+
+/// Where pairs of skills come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pairs {
+    /// The batch and a permutation of it; the joint sentences are embedded at every step.
+    InBatch,
+    /// So many pairs of texts, drawn once; their joint sentences are embedded once.
+    Pool(usize),
+}
+
+/// Where equation 4 ends A.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cut {
+    /// At a step uniformly between the drawn one and the span's last.
+    Uniform,
+    /// At the drawn step.
+    Always,
+    /// At the span's last step.
+    End,
+}
+
+impl Cut {
+    /// How likely a transition is the cut, `left` steps (itself included) before its span's end.
+    pub fn chance(self, left: u32) -> f64 {
+        match self {
+            Cut::Uniform => 1.0 / f64::from(left.max(1)),
+            Cut::Always => 1.0,
+            Cut::End => f64::from(u8::from(left <= 1)),
+        }
+    }
+}
+
+/// What stands for the worth of the state that A ends in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Worth {
+    /// V(s′, z_B): of the state after A's last action. The paper's implementation.
+    NextValue,
+    /// V(s, z_B): of the state before it.
+    PresentValue,
+    /// min Q̄(s, a, z_B) of the last action itself. The paper's equations, and Actionable Models.
+    TargetQ,
+}
+
+/// A transition's reward and whether it ends the episode, both [n].
+#[derive(Debug)]
+pub struct Ends {
+    /// r.
+    pub reward: Tensor,
+    /// d, 0 or 1.
+    pub terminal: Tensor,
+}
+
+impl Ends {
+    /// A demonstrated skill: reward 1 on the transition into the span's last state, which ends it. Also equation 5's B.
+    pub fn of_skill(terminal: &Tensor) -> Ends {
+        Ends { reward: terminal.shallow_clone(), terminal: terminal.shallow_clone() }
+    }
+
+    /// Equation 4: A told z_B, cut where `cut` is 1; the cut is worth what B can make of it. Equation 5's A, told "A. B.": the
+    /// cut is the span's own end.
+    pub fn chained(cut: &Tensor, worth: &Tensor) -> Ends {
+        Ends { reward: cut * worth, terminal: cut.shallow_clone() }
+    }
+}
+
+/// The worth of states as a reward: without gradient, and where `clip` says so within 0..1.
+pub fn as_reward(worth: &Tensor, clip: bool) -> Tensor {
+    if clip { worth.detach().clamp(0.0, 1.0) } else { worth.detach() }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind, nn};
+
+    use super::*;
+    use crate::algo::iql;
+
+    #[test]
+    fn rewards_by_hand() {
+        let (d, worth) = (Tensor::from_slice(&[0.0f32, 1.0, 1.0]), Tensor::from_slice(&[0.7f32, 1.3, 0.4]));
+        let base = Ends::of_skill(&d);
+        assert_eq!(Vec::<f32>::try_from(base.reward).unwrap(), [0.0, 1.0, 1.0]);
+        let chained = Ends::chained(&d, &as_reward(&worth, true));
+        assert_eq!(Vec::<f32>::try_from(chained.reward).unwrap(), [0.0, 1.0, 0.4]);
+        assert_eq!(Vec::<f32>::try_from(as_reward(&worth, false)).unwrap(), [0.7, 1.3, 0.4]);
+    }
+
+    #[test]
+    fn each_transition_left_is_as_likely_a_cut() {
+        assert_eq!([1, 2, 4].map(|left| Cut::Uniform.chance(left)), [1.0, 0.5, 0.25]);
+        assert_eq!([1, 2].map(|left| Cut::End.chance(left)), [1.0, 0.0]);
+        assert_eq!(Cut::Always.chance(9), 1.0);
+    }
+
+    /// V by tables: two demonstrations, states 0 to 2 told A and 2 to 4 told B, and "A. B." from state 0. Rows are texts (A, B,
+    /// "A. B."), columns states.
+    fn values(chaining: bool) -> Vec<Vec<f64>> {
+        const DISCOUNT: f64 = 0.9;
+        let store = nn::VarStore::new(Device::Cpu);
+        let value = store.root().zeros("value", &[3, 5]);
+        let mut q = store.root().zeros("q", &[3, 5]);
+        let row = |states: [i64; 2], text: i64| -> (Tensor, Tensor) {
+            (Tensor::from_slice(&[text; 2]), Tensor::from_slice(&states))
+        };
+        let at = |table: &Tensor, (text, state): &(Tensor, Tensor), shift: i64| {
+            table.index(&[Some(text), Some(&(state + shift))])
+        };
+        let ends = Tensor::from_slice(&[0.0f32, 1.0]);
+        let (first, second) = ([0, 1], [2, 3]);
+        let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 2.0).unwrap();
+        for _ in 0..200 {
+            let worth = as_reward(&at(&value, &row(first, 1), 1), true);
+            let mut parts = vec![(row(first, 0), Ends::of_skill(&ends)), (row(second, 1), Ends::of_skill(&ends))];
+            if chaining {
+                parts.push((row(first, 1), Ends::chained(&ends, &worth)));
+                parts.push((row(first, 2), Ends::chained(&ends, &worth)));
+                parts.push((row(second, 2), Ends::of_skill(&ends)));
+            }
+            let mut loss = Tensor::from(0.0f32);
+            for (place, Ends { reward, terminal }) in &parts {
+                let target = iql::q_target(reward, terminal, &at(&value, place, 1), DISCOUNT);
+                loss += iql::q_loss(&at(&q, place, 0), &target).mean(Kind::Float);
+                loss += iql::value_loss(&at(&value, place, 0), &at(&q, place, 0), 0.5).mean(Kind::Float);
+            }
+            optimiser.backward_step(&loss);
+        }
+        q.zero_grad();
+        (0..3).map(|text| Vec::<f64>::try_from(value.get(text).to_kind(Kind::Double).detach()).unwrap()).collect()
+    }
+
+    #[test]
+    fn only_chaining_stitches_two_trajectories() {
+        // A step towards the end of either skill is worth 0.9 of what it leads to; the joint itself costs nothing.
+        let with = values(true);
+        let told_b_at_the_start = with[1][0];
+        let told_both_at_the_start = with[2][0];
+        assert!((told_b_at_the_start - 0.81).abs() < 0.01, "{with:?}");
+        assert!((told_both_at_the_start - 0.81).abs() < 0.01, "{with:?}");
+        assert!((with[2][2] - 0.9).abs() < 0.01, "half way it is B that is left: {with:?}");
+        let without = values(false);
+        assert!(without[1][0].abs() < 0.01 && without[2][0].abs() < 0.01, "{without:?}");
+    }
+}

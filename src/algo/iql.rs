@@ -1,0 +1,153 @@
+//! Implicit Q-learning (Kostrikov et al., 2022), conditioned on an instruction z: an equation a function. All are over items
+//! [n]; how items are averaged is the caller's.
+
+use serde::{Deserialize, Serialize};
+use tch::{Kind, Tensor, nn};
+
+/// The hyper-parameters of IQL.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Iql {
+    /// γ.
+    pub discount: f64,
+    /// τ: which expectile of Q over the demonstrated actions V is.
+    pub expectile: f64,
+    /// β: how many times the advantage enters the exponent of the policy's weights.
+    pub temperature: f64,
+    /// No weight is above this.
+    pub weight_cap: f64,
+    /// The share by which the target Q follows Q after each step.
+    pub target_rate: f64,
+}
+
+/// (V − Q̄)² times τ where V is below Q̄, else times 1 − τ. No gradient reaches `q`.
+pub fn value_loss(value: &Tensor, q: &Tensor, expectile: f64) -> Tensor {
+    let above = value - q.detach();
+    let weight = above.lt(0.0).to_kind(Kind::Float) * (2.0 * expectile - 1.0) + (1.0 - expectile);
+    weight * above.square()
+}
+
+/// r + (1 − d) γ V(s′, z), without gradient.
+pub fn q_target(reward: &Tensor, terminal: &Tensor, next_value: &Tensor, discount: f64) -> Tensor {
+    let goes_on = terminal.neg() + 1.0;
+    (reward + goes_on * next_value * discount).detach()
+}
+
+/// (Q − target)². No gradient reaches `target`.
+pub fn q_loss(q: &Tensor, target: &Tensor) -> Tensor {
+    (q - target.detach()).square()
+}
+
+/// min(exp(β (Q̄ − V)), cap), without gradient.
+pub fn advantage_weights(q: &Tensor, value: &Tensor, temperature: f64, cap: f64) -> Tensor {
+    ((q - value) * temperature).exp().clamp_max(cap).detach()
+}
+
+/// A target network that follows another one: Polyak averaging.
+pub struct Tracking {
+    pairs: Vec<(Tensor, Tensor)>,
+}
+
+impl Tracking {
+    /// Follows `online` with `target`, two stores of one network. Weights are averaged; statistics of batch norms, which are
+    /// averages already, are copied.
+    pub fn new(online: &nn::VarStore, target: &nn::VarStore) -> Tracking {
+        let mut targets = target.variables();
+        let pair = |(name, tensor): (String, Tensor)| Some((tensor, targets.remove(&name)?));
+        Tracking { pairs: online.variables().into_iter().filter_map(pair).collect() }
+    }
+
+    /// Moves the target by `rate` of what separates it from the followed network.
+    pub fn follow(&mut self, rate: f64) {
+        tch::no_grad(|| {
+            for (online, target) in &mut self.pairs {
+                if online.requires_grad() {
+                    let _ = target.lerp_(online, rate);
+                } else {
+                    target.copy_(online);
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::Device;
+
+    use super::*;
+
+    fn tensor(values: &[f32]) -> Tensor {
+        Tensor::from_slice(values)
+    }
+
+    fn close(found: &Tensor, expected: &[f64]) {
+        let found = Vec::<f64>::try_from(found.to_kind(Kind::Double)).unwrap();
+        assert_eq!(found.len(), expected.len());
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?} is not {expected:?}");
+    }
+
+    #[test]
+    fn the_expectile_loss_by_hand() {
+        // 0.5 below: 0.9 x 0.25. 0.5 above: 0.1 x 0.25. Equal: 0.
+        close(&value_loss(&tensor(&[0.0, 1.0, 0.5]), &tensor(&[0.5, 0.5, 0.5]), 0.9), &[0.225, 0.025, 0.0]);
+    }
+
+    #[test]
+    fn the_bootstrap_stops_at_the_end_by_hand() {
+        let target = q_target(&tensor(&[0.0, 1.0]), &tensor(&[0.0, 1.0]), &tensor(&[0.5, 0.5]), 0.98);
+        close(&target, &[0.49, 1.0]);
+        close(&q_loss(&tensor(&[0.5, 0.5]), &target), &[0.0001, 0.25]);
+    }
+
+    #[test]
+    fn weights_grow_with_the_advantage_up_to_the_cap_by_hand() {
+        let weights = advantage_weights(&tensor(&[0.5, 0.6, 0.4, 1.0]), &tensor(&[0.5, 0.5, 0.5, 0.5]), 10.0, 100.0);
+        let e = std::f64::consts::E;
+        close(&weights, &[1.0, e, 1.0 / e, 100.0]);
+    }
+
+    #[test]
+    fn gradients_are_the_finite_differences_and_reach_only_what_is_learned() {
+        let (q, target) = (tensor(&[0.3, 0.8]).set_requires_grad(true), tensor(&[0.6, 0.1]).set_requires_grad(true));
+        let slope = |loss: &dyn Fn(&Tensor) -> Tensor, at: &Tensor| {
+            let step = 1e-3;
+            (loss(&(at + step)) - loss(&(at - step))) / (2.0 * step)
+        };
+        let losses: [&dyn Fn(&Tensor) -> Tensor; 2] =
+            [&|value| value_loss(value, &target, 0.9), &|value| q_loss(value, &target)];
+        for loss in losses {
+            let mut q = q.detach().set_requires_grad(true);
+            loss(&q).sum(Kind::Float).backward();
+            let expected = Vec::<f64>::try_from(slope(loss, &q.detach()).to_kind(Kind::Double)).unwrap();
+            let found = Vec::<f64>::try_from(q.grad().to_kind(Kind::Double)).unwrap();
+            assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-3), "{found:?} {expected:?}");
+            q.zero_grad();
+        }
+        assert!(!target.grad().defined());
+        assert!(!q_target(&q, &q, &q, 0.9).requires_grad());
+        assert!(!advantage_weights(&q, &q, 1.0, 1.0).requires_grad());
+    }
+
+    #[test]
+    fn the_minimum_of_the_expectile_loss_is_the_expectile() {
+        // Of 0 and 1 in equal shares the 0.9-expectile is 0.9: 0.9 (1 − v) = 0.1 v.
+        let q = tensor(&[0.0, 1.0]);
+        let loss = |v: f64| value_loss(&tensor(&[v as f32; 2]), &q, 0.9).sum(Kind::Float).double_value(&[]);
+        assert!(loss(0.9) < loss(0.88) && loss(0.9) < loss(0.92));
+    }
+
+    #[test]
+    fn a_target_follows_by_its_rate_and_copies_statistics() {
+        let [online, target] = [2.0, 1.0].map(|value| {
+            let store = nn::VarStore::new(Device::Cpu);
+            let _ = store.root().var("weight", &[1], nn::Init::Const(value));
+            let _ = store.root().zeros_no_train("mean", &[1]) + value;
+            tch::no_grad(|| store.variables()["mean"].shallow_clone().fill_(value));
+            store
+        });
+        Tracking::new(&online, &target).follow(0.005);
+        assert!((target.variables()["weight"].double_value(&[0]) - 1.005).abs() < 1e-6);
+        assert_eq!(target.variables()["mean"].double_value(&[0]), 2.0);
+    }
+}

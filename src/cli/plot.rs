@@ -1,0 +1,51 @@
+//! `sprint plot`: draws the curves of trainings.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+
+use super::Ending;
+use crate::agent::checkpoint::write_whole;
+use crate::run::plot::{self, Plot};
+
+/// Draws the curves of trainings.
+#[derive(Args)]
+pub struct PlotCurves {
+    /// Checkpoint folders that trainings wrote
+    #[arg(required = true, num_args = 1..)]
+    runs: Vec<PathBuf>,
+    /// Where to draw; .svg or .png says how, and another name gets both
+    #[arg(long, value_name = "FILE", default_value = "curves")]
+    out: PathBuf,
+    /// Only scalars whose names contain one of these words
+    #[arg(long, value_name = "WORD", value_delimiter = ',')]
+    only: Vec<String>,
+}
+
+impl PlotCurves {
+    /// Draws, and prints the files' names.
+    ///
+    /// # Errors
+    /// When a training's progress cannot be read, or the picture not be written.
+    #[allow(clippy::print_stdout)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let read = |folder: &PathBuf| Ok((folder.display().to_string(), plot::read(folder)?));
+        let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
+        let plot = Plot::of(&trainings, &self.only)?;
+        let extension = self.out.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_lowercase();
+        let files = match extension.as_str() {
+            "svg" | "png" => vec![self.out.clone()],
+            _ => ["svg", "png"].map(|kind| PathBuf::from(format!("{}.{kind}", self.out.display()))).to_vec(),
+        };
+        for file in files {
+            let is_svg = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
+            let bytes = if is_svg { plot.svg().into_bytes() } else { plot.png()? };
+            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+            write_whole(&folder.join(file.file_name().unwrap_or_default()), &bytes)?;
+            println!("{}", file.display());
+        }
+        Ok(Ending::Ok)
+    }
+}

@@ -1,0 +1,228 @@
+//! The critic: twin Q(s, a, z) and V(s, z).
+
+use serde::{Deserialize, Serialize};
+use tch::Tensor;
+use tch::nn::{self, Module};
+
+use super::trunk::{Dense, Telling, Trunk};
+use super::value::ValueHead;
+use crate::domain::{ActionType, Class};
+
+/// The size of a critic. What it sees and is told is the policy's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CriticSpec {
+    /// Channels of a trunk's four convolutions.
+    pub channels: [i64; 4],
+    /// Width of the fully connected layers of each head.
+    pub hidden: Vec<i64>,
+    /// Share of the fully connected units that is dropped in training.
+    pub dropout: f64,
+    /// Numbers that stand for an action.
+    pub action_embedding: i64,
+    /// Numbers that stand for an object class; navigation has the class `None`.
+    pub object_embedding: i64,
+    /// Whether both Q and V read one trunk. The paper's have one each.
+    pub shared_trunk: bool,
+}
+
+/// What a critic is told and sees: its inputs' sizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Senses {
+    /// Channels of an observation.
+    pub channels: i64,
+    /// Numbers in a sentence embedding, or that a goal is turned into.
+    pub told: i64,
+    /// The channels of the convolutions that see a goal, where there is one.
+    pub goal: Option<[i64; 4]>,
+}
+
+#[derive(Debug)]
+struct QHead {
+    action: nn::Embedding,
+    object: nn::Embedding,
+    dense: Dense,
+    out: nn::Linear,
+}
+
+impl QHead {
+    fn new(path: &nn::Path<'_>, from: i64, spec: &CriticSpec) -> QHead {
+        let from = from + spec.action_embedding + spec.object_embedding;
+        let dense = Dense::new(path, from, &spec.hidden, spec.dropout);
+        let table = |name: &str, entries: usize, width: i64| {
+            nn::embedding(path / name, entries as i64, width, Default::default())
+        };
+        QHead {
+            action: table("action", ActionType::COUNT, spec.action_embedding),
+            object: table("object", Class::VOCABULARY, spec.object_embedding),
+            out: nn::linear(path / "out", dense.width(), 1, Default::default()),
+            dense,
+        }
+    }
+
+    fn forward(&self, input: &Tensor, actions: &Tensor, objects: &Tensor, train: bool) -> Tensor {
+        let joined = Tensor::cat(&[input, &self.action.forward(actions), &self.object.forward(objects)], 1);
+        self.out.forward(&self.dense.forward(joined, train)).squeeze_dim(1)
+    }
+}
+
+/// A critic's opinion of a batch in training.
+#[derive(Debug)]
+pub struct Judgement {
+    /// Both Q, each [n].
+    pub q: [Tensor; 2],
+    /// V [n].
+    pub value: Tensor,
+    /// V [n] of the same features without dropout and without gradient: what advantages are measured against.
+    pub baseline: Tensor,
+}
+
+/// Twin Q and V over one trunk or one each.
+#[derive(Debug)]
+pub struct Critic {
+    telling: Telling,
+    trunks: Vec<Trunk>,
+    q: [QHead; 2],
+    value: ValueHead,
+}
+
+impl Critic {
+    /// A critic with fresh weights under `path`.
+    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, senses: Senses) -> Critic {
+        let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
+        let trunk = |name: &&str| Trunk::new(&(path / *name), senses.channels, &spec.channels, Some(senses.told));
+        let trunks: Vec<Trunk> = names.iter().map(trunk).collect();
+        let from = trunks[0].width() + senses.told;
+        Critic {
+            telling: Telling::new(path, senses.told, senses.goal.as_ref(), senses.channels),
+            trunks,
+            q: ["q1", "q2"].map(|name| QHead::new(&(path / name), from, spec)),
+            value: ValueHead::new(&(path / "value"), from, &spec.hidden, spec.dropout),
+        }
+    }
+
+    /// The input of head `head` (0 and 1: Q, 2: V), given what an earlier head read.
+    fn input(&self, head: usize, observation: &Tensor, told: &Tensor, earlier: Option<&Tensor>, train: bool) -> Tensor {
+        match (earlier, &self.trunks[..]) {
+            (Some(earlier), [_]) => earlier.shallow_clone(),
+            (_, trunks) => {
+                let trunk = &trunks[head.min(trunks.len() - 1)];
+                Tensor::cat(&[&trunk.forward(observation, Some(told), train), told], 1)
+            }
+        }
+    }
+
+    /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` [n]
+    /// (class indices, 0 for navigation).
+    pub fn judge(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Judgement {
+        let told = self.telling.forward(told, true);
+        let first = self.input(0, observation, &told, None, true);
+        let second = self.input(1, observation, &told, Some(&first), true);
+        let third = self.input(2, observation, &told, Some(&first), true);
+        Judgement {
+            q: [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, true)),
+            value: self.value.forward(&third, true),
+            baseline: tch::no_grad(|| self.value.forward(&third, false)),
+        }
+    }
+
+    /// min(Q1, Q2) [n], without dropout and without gradient.
+    pub fn least_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
+        tch::no_grad(|| {
+            let told = self.telling.forward(told, false);
+            let first = self.input(0, observation, &told, None, false);
+            let second = self.input(1, observation, &told, Some(&first), false);
+            let [one, other] =
+                [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, false));
+            one.minimum(&other)
+        })
+    }
+
+    /// V [n], without dropout and without gradient.
+    pub fn value(&self, observation: &Tensor, told: &Tensor) -> Tensor {
+        tch::no_grad(|| {
+            let told = self.telling.forward(told, false);
+            self.value.forward(&self.input(2, observation, &told, None, false), false)
+        })
+    }
+
+    /// Of one situation, V and min(Q1, Q2) of each (action, object) pair; the situation is looked at once.
+    pub fn appraise(&self, observation: &Tensor, told: &Tensor, pairs: &[(i64, i64)]) -> (Tensor, Tensor) {
+        let column = |of: fn(&(i64, i64)) -> i64| {
+            Tensor::from_slice(&pairs.iter().map(of).collect::<Vec<i64>>()).to_device(observation.device())
+        };
+        let (actions, objects) = (column(|pair| pair.0), column(|pair| pair.1));
+        tch::no_grad(|| {
+            let told = self.telling.forward(told, false);
+            let first = self.input(0, observation, &told, None, false);
+            let inputs =
+                [0, 1, 2].map(|head| self.input(head, observation, &told, (head > 0).then_some(&first), false));
+            let rows = pairs.len() as i64;
+            let [one, other] =
+                [0, 1].map(|k| self.q[k].forward(&inputs[k].expand([rows, -1], false), &actions, &objects, false));
+            (self.value.forward(&inputs[2], false), one.minimum(&other))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+    use crate::nets::visual::SIDE;
+
+    fn critic(store: &nn::VarStore, shared_trunk: bool) -> Critic {
+        let spec = CriticSpec {
+            channels: [4; 4],
+            hidden: vec![8],
+            dropout: 0.2,
+            action_embedding: 6,
+            object_embedding: 3,
+            shared_trunk,
+        };
+        Critic::new(&store.root(), &spec, Senses { channels: 10, told: 5, goal: None })
+    }
+
+    fn inputs(n: i64) -> (Tensor, Tensor, Tensor, Tensor) {
+        let float = (Kind::Float, Device::Cpu);
+        let indices = |high: i64| Tensor::randint(high, [n], (Kind::Int64, Device::Cpu));
+        (Tensor::rand([n, 10, SIDE, SIDE], float), Tensor::rand([n, 5], float), indices(12), indices(82))
+    }
+
+    #[test]
+    fn a_shared_trunk_has_a_third_of_the_convolutions_and_all_shapes_agree() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(2);
+        let (observation, told, actions, objects) = inputs(3);
+        let convolutions = [true, false].map(|shared| {
+            let store = nn::VarStore::new(Device::Cpu);
+            let critic = critic(&store, shared);
+            let judged = critic.judge(&observation, &told, &actions, &objects);
+            assert!([&judged.q[0], &judged.q[1], &judged.value, &judged.baseline].iter().all(|t| t.size() == [3]));
+            assert!(judged.value.requires_grad() && !judged.baseline.requires_grad());
+            store.variables().keys().filter(|name| name.ends_with("conv.weight")).count()
+        });
+        assert_eq!(convolutions, [4, 12]);
+    }
+
+    #[test]
+    fn pairs_of_one_situation_are_judged_as_in_a_batch() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(3);
+        for shared in [true, false] {
+            let store = nn::VarStore::new(Device::Cpu);
+            let critic = critic(&store, shared);
+            let (observation, told, ..) = inputs(1);
+            let pairs = [(0, 0), (5, 2), (5, 40), (9, 81)];
+            let (value, q) = critic.appraise(&observation, &told, &pairs);
+            let (actions, objects) = (Tensor::from_slice(&pairs.map(|p| p.0)), Tensor::from_slice(&pairs.map(|p| p.1)));
+            let repeat = |tensor: &Tensor| tensor.repeat([&[4i64][..], &vec![1; tensor.dim() - 1]].concat());
+            let (many, tellings) = (repeat(&observation), repeat(&told));
+            let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-5;
+            assert!(close(&q, &critic.least_q(&many, &tellings, &actions, &objects)));
+            assert!(close(&value, &critic.value(&many, &tellings)));
+            assert!((q.max() - q.min()).double_value(&[]) > 1e-4, "the action matters");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The Episodic Transformer (Pashevich et al., 2021): words and the last frames as one sequence of tokens. Of its inputs, past
+//! actions are left out: in demonstrations they give the next one away.
+
+use serde::{Deserialize, Serialize};
+use tch::nn::{self, Module};
+use tch::{Kind, Tensor};
+
+use super::trunk::Trunk;
+use super::visual::SIDE;
+
+/// The size of the attention layers; the tokens' width is the policy's `embedding`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AttentionSpec {
+    /// Entries of the table of words: at most so many, those for padding and unknown words included.
+    pub words: i64,
+    /// Layers that read the words alone, and again as many that read words and frames.
+    pub layers: i64,
+    /// Heads of a layer.
+    pub heads: i64,
+    /// Width of a layer's inner network.
+    pub inner: i64,
+}
+
+impl AttentionSpec {
+    /// Whether tokens of `width` numbers can be attended to.
+    ///
+    /// # Errors
+    /// When they do not divide among the heads, or have no halves for sines and cosines.
+    pub fn check(&self, width: i64) -> anyhow::Result<()> {
+        anyhow::ensure!(
+            width % 2 == 0 && self.heads > 0 && width % self.heads == 0,
+            "embedding is {width}, which is not even or no multiple of attention.heads, {}",
+            self.heads
+        );
+        Ok(())
+    }
+}
+
+#[derive(Debug)]
+struct Layer {
+    query_key_value: nn::Linear,
+    attended: nn::Linear,
+    attended_norm: nn::LayerNorm,
+    inner: nn::Linear,
+    outer: nn::Linear,
+    norm: nn::LayerNorm,
+    heads: i64,
+    dropout: f64,
+}
+
+impl Layer {
+    fn new(path: &nn::Path<'_>, width: i64, spec: &AttentionSpec, dropout: f64) -> Layer {
+        let linear = |name: &str, from: i64, to: i64| nn::linear(path / name, from, to, Default::default());
+        let norm = |name: &str| nn::layer_norm(path / name, vec![width], Default::default());
+        Layer {
+            query_key_value: linear("query_key_value", width, 3 * width),
+            attended: linear("attended", width, width),
+            attended_norm: norm("attended_norm"),
+            inner: linear("inner", width, spec.inner),
+            outer: linear("outer", spec.inner, width),
+            norm: norm("norm"),
+            heads: spec.heads,
+            dropout,
+        }
+    }
+
+    /// `tokens` [n, tokens, width]; `bias` [n, 1, 1, tokens] keeps attention away from padding.
+    fn forward(&self, tokens: &Tensor, bias: &Tensor, train: bool) -> Tensor {
+        let (n, count) = (tokens.size()[0], tokens.size()[1]);
+        let split = self.query_key_value.forward(tokens).view([n, count, 3, self.heads, -1]).permute([2, 0, 3, 1, 4]);
+        let (query, key, value) = (split.get(0), split.get(1), split.get(2));
+        let scores = query.matmul(&key.transpose(-1, -2)) / (key.size()[3] as f64).sqrt() + bias;
+        let read = scores.softmax(-1, Kind::Float).matmul(&value).transpose(1, 2).reshape([n, count, -1]);
+        let read = self.attended.forward(&read).dropout(self.dropout, train);
+        let tokens = self.attended_norm.forward(&(tokens + read));
+        let changed = self.outer.forward(&self.inner.forward(&tokens).relu()).dropout(self.dropout, train);
+        self.norm.forward(&(tokens + changed))
+    }
+}
+
+/// Reads words and frames; gives the last frame's token.
+#[derive(Debug)]
+pub struct Episodic {
+    words: nn::Embedding,
+    trunk: Trunk,
+    frame: nn::Linear,
+    language: Vec<Layer>,
+    fusion: Vec<Layer>,
+    norm: nn::LayerNorm,
+    history: i64,
+    width: i64,
+}
+
+impl Episodic {
+    /// A network with fresh weights under `path` over `history` frames of `features` channels.
+    pub fn new(
+        path: &nn::Path<'_>,
+        spec: &AttentionSpec,
+        (history, features): (i64, i64),
+        (width, channels, dropout): (i64, &[i64; 4], f64),
+    ) -> Episodic {
+        let layers = |name: &str| -> Vec<Layer> {
+            (1..=spec.layers).map(|i| Layer::new(&(path / format!("{name}{i}")), width, spec, dropout)).collect()
+        };
+        let trunk = Trunk::new(&(path / "frame"), features, channels, None);
+        Episodic {
+            words: nn::embedding(path / "words", spec.words, width, Default::default()),
+            frame: nn::linear(path / "frame" / "out", trunk.width(), width, Default::default()),
+            trunk,
+            language: layers("language"),
+            fusion: layers("fusion"),
+            norm: nn::layer_norm(path / "norm", vec![width], Default::default()),
+            history,
+            width,
+        }
+    }
+
+    /// `observation` [n, history * features, 7, 7] and `words` [n, words], 0 for padding, to [n, width].
+    pub fn forward(&self, observation: &Tensor, words: &Tensor, train: bool) -> Tensor {
+        let n = words.size()[0];
+        let told = words.gt(0).to_kind(Kind::Float);
+        let bias = |mask: &Tensor| (mask.unsqueeze(1).unsqueeze(1) - 1.0) * 1e4;
+        let read = self.words.forward(words) + self.places(0, words.size()[1], words);
+        let read = self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&told), train));
+        let frames = observation.view([n * self.history, -1, SIDE, SIDE]);
+        let seen = self.frame.forward(&self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
+        // Frames come after the longest text, so that their places do not depend on what is told.
+        let tokens = Tensor::cat(&[&read, &(&seen + self.places(1000, self.history, words))], 1);
+        let mask = Tensor::cat(&[&told, &told.new_ones([n, self.history], (Kind::Float, told.device()))], 1);
+        let tokens = self.norm.forward(&tokens);
+        let tokens = self.fusion.iter().fold(tokens, |tokens, layer| layer.forward(&tokens, &bias(&mask), train));
+        tokens.select(1, -1) + seen.select(1, -1)
+    }
+
+    /// Sines and cosines of the places from `first` on, [count, width].
+    fn places(&self, first: i64, count: i64, like: &Tensor) -> Tensor {
+        let half = self.width / 2;
+        let device = (Kind::Float, like.device());
+        let rates = (Tensor::arange(half, device) * (-(1e4f64.ln()) / half as f64)).exp();
+        let angles = (Tensor::arange(count, device) + first as f64).unsqueeze(1) * rates.unsqueeze(0);
+        Tensor::cat(&[angles.sin(), angles.cos()], 1) / (self.width as f64).sqrt()
+    }
+}

@@ -1,0 +1,26 @@
+//! V(s, z): the head that says how likely the instruction will be fulfilled from here.
+
+use tch::Tensor;
+use tch::nn::{self, Module};
+
+use super::trunk::Dense;
+
+/// Fully connected layers over a trunk's features and what the agent is told, down to one number.
+#[derive(Debug)]
+pub struct ValueHead {
+    dense: Dense,
+    out: nn::Linear,
+}
+
+impl ValueHead {
+    /// A head over `from` numbers with fresh weights under `path`.
+    pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> ValueHead {
+        let dense = Dense::new(path, from, hidden, dropout);
+        ValueHead { out: nn::linear(path / "out", dense.width(), 1, Default::default()), dense }
+    }
+
+    /// `input` [n, from] to [n].
+    pub fn forward(&self, input: &Tensor, train: bool) -> Tensor {
+        self.out.forward(&self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
+    }
+}

@@ -1,0 +1,193 @@
+//! Everything that batches are made of: items, feature maps, what the agent is told, and the pool of pairs to chain.
+
+use std::collections::HashMap;
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use tch::{Device, Kind, Tensor};
+
+use crate::data::features::Features;
+use crate::data::items::{Item, Items, Span};
+
+/// Embeds texts.
+pub type Embed<'a> = dyn Fn(&[&str]) -> anyhow::Result<Tensor> + Sync + 'a;
+
+/// Everything that batches are made of.
+pub struct Material<'a> {
+    /// Spans and labels.
+    pub items: &'a Items,
+    /// A map a frame.
+    pub maps: Maps<'a>,
+    /// What the agent is told.
+    pub told: Told,
+    /// Pairs of texts to chain, where they are drawn beforehand.
+    pub pool: Option<Pool>,
+    /// Embeds texts that are joined while training, [texts, width].
+    pub embed: &'a Embed<'a>,
+}
+
+/// Feature maps, in memory or, where it computes elsewhere, on the device.
+pub enum Maps<'a> {
+    /// In this machine's memory.
+    Memory(&'a Features),
+    /// [frames, numbers], 16-bit floats.
+    Device(Tensor),
+}
+
+impl<'a> Maps<'a> {
+    /// Keeps the maps where `device` reads them best: on a device with memory of its own they are copied there if they fit.
+    pub fn on(features: &'a Features, device: Device) -> Maps<'a> {
+        if device == Device::Cpu || features.is_empty() {
+            return Maps::Memory(features);
+        }
+        match copied(features, device) {
+            Ok(maps) => Maps::Device(maps),
+            Err(error) => {
+                tracing::warn!("the features stay in memory: {error:#}");
+                Maps::Memory(features)
+            }
+        }
+    }
+
+    /// The maps of frames [frames, numbers] on `device`, 16-bit floats.
+    ///
+    /// # Errors
+    /// When a map cannot be read, or the device's memory is full.
+    pub fn gather(&self, frames: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
+        match self {
+            Maps::Memory(features) => {
+                let mut bytes = Vec::new();
+                features.gather_all(frames, &mut bytes)?;
+                let width = features.width();
+                let rows = (bytes.len() / width.max(1)) as i64;
+                Ok(Tensor::f_from_data_size(&bytes, &[rows, width as i64 / 2], Kind::Half)?.to_device(device))
+            }
+            Maps::Device(maps) => {
+                let rows: Vec<i64> = frames.map(|frame| frame as i64).collect();
+                Ok(maps.index_select(0, &Tensor::from_slice(&rows).to_device(maps.device())))
+            }
+        }
+    }
+}
+
+/// Rows that are copied to a device at once.
+const COPIED: usize = 4096;
+
+fn copied(features: &Features, device: Device) -> anyhow::Result<Tensor> {
+    let mut bytes = Vec::new();
+    let width = features.width() as i64 / 2;
+    let maps = Tensor::f_empty([features.len() as i64, width], (Kind::Half, device))?;
+    for first in (0..features.len()).step_by(COPIED) {
+        bytes.clear();
+        let last = (first + COPIED).min(features.len());
+        features.gather_run(first..last, &mut bytes)?;
+        let rows = (last - first) as i64;
+        let chunk = Tensor::f_from_data_size(&bytes, &[rows, width], Kind::Half)?;
+        maps.narrow(0, first as i64, rows).f_copy_(&chunk)?;
+    }
+    Ok(maps)
+}
+
+/// Rows of numbers, such as embeddings.
+pub struct Rows {
+    numbers: Vec<f32>,
+    width: usize,
+    /// The same where it computes.
+    there: Option<Tensor>,
+}
+
+impl Rows {
+    /// Of a tensor [rows, width], to be read on `device`.
+    ///
+    /// # Errors
+    /// When the tensor is no matrix of numbers.
+    pub fn new(tensor: &Tensor, device: Device) -> anyhow::Result<Rows> {
+        let (_, width) = tensor.size2()?;
+        let numbers = Vec::<f32>::try_from(tensor.to_device(Device::Cpu).to_kind(Kind::Float).flatten(0, -1))?;
+        let there = (device != Device::Cpu).then(|| tensor.to_device(device));
+        Ok(Rows { numbers, width: width as usize, there })
+    }
+
+    /// Some of them, [n, width].
+    ///
+    /// # Errors
+    /// When there is no such row.
+    pub fn rows(&self, rows: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
+        if let Some(there) = &self.there {
+            let rows: Vec<i64> = rows.map(|row| row as i64).collect();
+            return Ok(there.f_index_select(0, &Tensor::from_slice(&rows).to_device(there.device()))?);
+        }
+        let mut numbers: Vec<f32> = Vec::new();
+        for row in rows {
+            let numbers_of = self.numbers.get(row * self.width..(row + 1) * self.width);
+            numbers.extend(numbers_of.ok_or_else(|| anyhow::anyhow!("there is no row {row}"))?);
+        }
+        let width = self.width as i64;
+        Ok(Tensor::from_slice(&numbers).view([-1, width]).to_device(device))
+    }
+}
+
+/// What the agent is told.
+pub enum Told {
+    /// A row a text: its sentence's embedding.
+    Sentences(Rows),
+    /// The words of a text, by their numbers.
+    Words(Vec<Vec<i64>>),
+    /// The frames of a state to reach anywhere in the trajectory.
+    Goals,
+}
+
+/// Pairs of texts whose joint sentences are embedded beforehand.
+pub struct Pool {
+    /// Texts of A and B.
+    pub pairs: Vec<(u32, u32)>,
+    /// "A. B." of each.
+    pub joint: Rows,
+    /// The spans that bear a text.
+    bearers: HashMap<u32, Vec<u32>>,
+}
+
+impl Pool {
+    /// So many pairs, texts as often as items bear them; drawn by the seed alone.
+    pub fn draw(items: &Items, seed: u64, count: usize) -> Vec<(u32, u32)> {
+        let drawn = Items::draw(&items.training, seed, u64::MAX / 3, 2 * count);
+        drawn.chunks_exact(2).map(|pair| (pair[0].text, pair[1].text)).collect()
+    }
+
+    /// A pool of pairs and their joint sentences' embeddings [pairs, width].
+    ///
+    /// # Errors
+    /// When there are no pairs.
+    pub fn new(items: &Items, pairs: Vec<(u32, u32)>, joint: &Tensor, device: Device) -> anyhow::Result<Pool> {
+        anyhow::ensure!(!pairs.is_empty(), "there are no pairs of texts to chain");
+        let mut bearers: HashMap<u32, Vec<u32>> = HashMap::new();
+        for (number, span) in items.training.iter().enumerate() {
+            bearers.entry(span.text).or_default().push(number as u32);
+        }
+        Ok(Pool { pairs, joint: Rows::new(joint, device)?, bearers })
+    }
+
+    /// An item of a span that bears `text`.
+    pub fn item(&self, spans: &[Span], text: u32, rng: &mut ChaCha8Rng) -> Item {
+        let bearers = &self.bearers[&text];
+        let span = &spans[bearers[rng.random_range(0..bearers.len())] as usize];
+        Item { first: span.first, frame: rng.random_range(span.start..span.end), end: span.end, text }
+    }
+}
+
+/// Two texts as one: "A. B.".
+pub fn joined(items: &Items, (first, second): (u32, u32)) -> String {
+    format!("{} {}", items.texts[first as usize], items.texts[second as usize])
+}
+
+impl Material<'_> {
+    /// "A. B." of pairs of items, embedded now and not kept: [pairs, width].
+    ///
+    /// # Errors
+    /// When the encoder fails.
+    pub fn embed_joint(&self, first: &[Item], second: &[Item]) -> anyhow::Result<Tensor> {
+        let texts: Vec<String> = first.iter().zip(second).map(|(a, b)| joined(self.items, (a.text, b.text))).collect();
+        let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+        (self.embed)(&texts)
+    }
+}

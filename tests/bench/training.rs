@@ -1,0 +1,122 @@
+//! How long an update takes with each preset in its own size, and how long its batch takes to gather. Maps and texts are
+//! random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`.
+
+#![allow(clippy::print_stdout)]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+use sprint_explorer::agent::checkpoint::Networks;
+use sprint_explorer::algo::chain::Pairs;
+use sprint_explorer::data::features::{Features, Header, Writer};
+use sprint_explorer::data::items::{Items, Label, Span};
+use sprint_explorer::nets::device::best_device;
+use sprint_explorer::run::batches::Batches;
+use sprint_explorer::run::material::{Maps, Material, Pool, Rows, Told, joined};
+use sprint_explorer::run::presets::Preset;
+use sprint_explorer::run::trainer::Trainer;
+use tch::{Device, Kind, Tensor};
+
+const FRAMES: u32 = 6000;
+/// Frames of a span, and of a trajectory of three.
+const SPAN: u32 = 15;
+const TEXTS: u32 = 200;
+const WARM: u64 = 3;
+const STEPS: u64 = 12;
+
+fn main() -> anyhow::Result<()> {
+    let asked: Vec<String> = std::env::args().skip(1).filter(|name| !name.starts_with("--")).collect();
+    let device = best_device();
+    println!("{device:?}, {} threads; milliseconds, medians of {STEPS}", tch::get_num_threads());
+    println!("{:<18} {:>6} {:>7} {:>8} {:>9}", "preset", "batch", "pairs", "update", "gathering");
+    for name in Preset::names() {
+        if asked.is_empty() || asked.iter().any(|wanted| wanted == name) {
+            measure(&Preset::named(name)?, device)?;
+        }
+    }
+    Ok(())
+}
+
+fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
+    let (features, items) = (features(preset)?, items());
+    let width = preset.policy.embedding;
+    let embed = |texts: &[&str]| -> anyhow::Result<Tensor> {
+        Ok(Tensor::randn([texts.len() as i64, width], (Kind::Float, Device::Cpu)) / (width as f64).sqrt())
+    };
+    let texts: Vec<&str> = items.texts.iter().map(String::as_str).collect();
+    let told = match (&preset.policy.goal, &preset.policy.attention) {
+        (Some(_), _) => Told::Goals,
+        (None, Some(_)) => Told::Words((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect()),
+        (None, None) => Told::Sentences(Rows::new(&embed(&texts)?, device)?),
+    };
+    let pool = match preset.chaining.as_ref().map(|chaining| chaining.pairs) {
+        Some(Pairs::Pool(count)) => {
+            let pairs = Pool::draw(&items, preset.seed, count);
+            let texts: Vec<String> = pairs.iter().map(|&pair| joined(&items, pair)).collect();
+            let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>())?;
+            Some(Pool::new(&items, pairs, &joint, device)?)
+        }
+        _ => None,
+    };
+    let networks = Networks::new(&preset.visual, &preset.policy, preset.critic.as_ref(), device);
+    let material = Material { items: &items, maps: Maps::on(&features, device), told, pool, embed: &embed };
+    let (judged, batch) = (networks.critic.is_some(), preset.training.batch);
+    let batches =
+        Batches::new(material, preset.policy.history, judged, preset.chaining.as_ref(), (preset.seed, batch), device);
+    let trainer = Trainer { networks: &networks, preset, state: Path::new(""), identity: &BTreeMap::new() };
+    let mut update = trainer.update()?;
+    let (mut gathering, mut updating) = (Vec::new(), Vec::new());
+    for step in 0..WARM + STEPS {
+        let begun = Instant::now();
+        let gathered = batches.at(step)?;
+        let between = Instant::now();
+        update.update(&gathered, false)?;
+        if step >= WARM {
+            gathering.push((between - begun).as_secs_f64() * 1e3);
+            updating.push(between.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    let pairs = preset.chaining.as_ref().map_or(0, |chaining| chaining.batch);
+    let (update, gather) = (median(updating), median(gathering));
+    println!("{:<18} {batch:>6} {pairs:>7} {update:>8.1} {gather:>9.1}", preset.name);
+    Ok(())
+}
+
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers[numbers.len() / 2]
+}
+
+fn features(preset: &Preset) -> anyhow::Result<Features> {
+    let folder = tempfile::tempdir()?;
+    let numbers = preset.visual.map() as u64;
+    let header =
+        Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: u64::from(FRAMES), numbers };
+    let mut writer = Writer::open(folder.path(), header.clone())?;
+    let map = Tensor::rand([numbers as i64], (Kind::Half, Device::Cpu));
+    let mut bytes = vec![0; map.numel() * 2];
+    map.copy_data_u8(&mut bytes, map.numel());
+    for frame in 0..FRAMES {
+        bytes.rotate_right(2 * (frame as usize % 7));
+        writer.add(&bytes)?;
+    }
+    writer.finish()?;
+    Features::read(folder.path(), &header)?.ok_or_else(|| anyhow::anyhow!("the features are gone"))
+}
+
+fn items() -> Items {
+    let label = |frame: u32| Label { action: (frame % 12) as u8, object: if frame % 4 == 0 { 7 } else { 0 } };
+    let span = |number: u32| {
+        let (start, trajectory) = (number * SPAN, number / 3);
+        let first = trajectory * 3 * SPAN;
+        Span { trajectory, skills: 0..1, first, start, end: start + SPAN, text: number % TEXTS }
+    };
+    Items {
+        labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
+        texts: (0..TEXTS).map(|text| format!("Text {text}.")).collect(),
+        training: (0..FRAMES / SPAN - 1).map(span).collect(),
+        held_out: Vec::new(),
+        firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
+    }
+}
