@@ -8,8 +8,8 @@
 //! | [`language`] | instruction text, the phrase grammar, summaries by rules |
 //! | [`house`] | the simulator: rules, sight, rendering, graders, the expert, generated houses |
 //! | [`data`] | dataset folders, the ALFRED importer, task files, training items, labels, feature files |
-//! | [`nets`] | visual encoders, FiLM policy, sentence encoders, strict weights files |
-//! | [`algo`] | losses, optimiser, learner |
+//! | [`nets`] | visual encoders, policy and critic, sentence encoders, strict weights files |
+//! | [`algo`] | behaviour cloning, IQL, chaining; the update, optimiser, learner |
 //! | [`agent`] | what decides the next action: trained, expert, chance |
 //! | [`run`] | the one loop that steps an environment, and the runs that use it |
 //! | [`tui`] | the explorer |

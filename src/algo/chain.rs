@@ -128,7 +128,7 @@ mod tests {
         const DISCOUNT: f64 = 0.9;
         let store = nn::VarStore::new(Device::Cpu);
         let value = store.root().zeros("value", &[3, 5]);
-        let mut q = store.root().zeros("q", &[3, 5]);
+        let q = store.root().zeros("q", &[3, 5]);
         let row = |states: [i64; 2], text: i64| -> (Tensor, Tensor) {
             (Tensor::from_slice(&[text; 2]), Tensor::from_slice(&states))
         };
@@ -137,7 +137,7 @@ mod tests {
         };
         let ends = Tensor::from_slice(&[0.0f32, 1.0]);
         let (first, second) = ([0, 1], [2, 3]);
-        let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 2.0).unwrap();
+        let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 1.0).unwrap();
         for _ in 0..200 {
             let worth = as_reward(&at(&value, &row(first, 1), 1), true);
             let mut parts = vec![(row(first, 0), Ends::of_skill(&ends)), (row(second, 1), Ends::of_skill(&ends))];
@@ -154,7 +154,6 @@ mod tests {
             }
             optimiser.backward_step(&loss);
         }
-        q.zero_grad();
         (0..3).map(|text| Vec::<f64>::try_from(value.get(text).to_kind(Kind::Double).detach()).unwrap()).collect()
     }
 

@@ -143,7 +143,7 @@ mod tests {
             let store = nn::VarStore::new(Device::Cpu);
             let _ = store.root().var("weight", &[1], nn::Init::Const(value));
             let _ = store.root().zeros_no_train("mean", &[1]) + value;
-            tch::no_grad(|| store.variables()["mean"].shallow_clone().fill_(value));
+            let _ = tch::no_grad(|| store.variables()["mean"].shallow_clone().fill_(value));
             store
         });
         Tracking::new(&online, &target).follow(0.005);

@@ -427,7 +427,7 @@ mod tests {
         Optimisation {
             steps,
             batch: 1,
-            schedule: Schedule { learning_rate: 5e-3, warmup_steps: 10, final_share: 0.01 },
+            schedule: Schedule { learning_rate: 8e-3, warmup_steps: 10, final_share: 0.01 },
             adamw: AdamWConfig { beta1: 0.9, beta2: 0.999, epsilon: 1e-8, weight_decay: 0.0 },
         }
     }
@@ -493,9 +493,9 @@ mod tests {
     fn a_chain_of_two_states_is_learned_to_a_hundredth() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();
-        let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(16).collect();
+        let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(8).collect();
         let batch = Batch { base: transitions(&rows), pairs: None };
-        let mut update = update(&nets, 1200, None);
+        let mut update = update(&nets, 800, None);
         while !update.is_done() {
             update.update(&batch, false).unwrap();
         }
@@ -523,7 +523,7 @@ mod tests {
         let (a, b) = ((0, 0, 0, 1, 1.0), (1, 1, 0, 2, 1.0));
         let chaining = Chaining {
             pairs: Source::Pool(1),
-            batch: 8,
+            batch: 4,
             cut: Cut::Uniform,
             worth: Worth::NextValue,
             clip: true,
@@ -532,13 +532,13 @@ mod tests {
             aggregate: 0.5,
         };
         let nets = nets();
-        let mut update = update(&nets, 600, Some(chaining));
-        let many = |row| transitions(&[row; 8]);
+        let mut update = update(&nets, 300, Some(chaining));
+        let many = |row| transitions(&[row; 4]);
         let batch = || {
-            let base: Vec<_> = [a, b].into_iter().cycle().take(16).collect();
-            let first = Transitions { told: say(&[1; 8]), ..many(a) };
+            let base: Vec<_> = [a, b].into_iter().cycle().take(8).collect();
+            let first = Transitions { told: say(&[1; 4]), ..many(a) };
             let cut = first.terminal.shallow_clone();
-            let joint = Some((say(&[2; 8]), Transitions { told: say(&[2; 8]), ..many(b) }));
+            let joint = Some((say(&[2; 4]), Transitions { told: say(&[2; 4]), ..many(b) }));
             Batch { base: transitions(&base), pairs: Some(Pairs { first, cut, joint }) }
         };
         let mut numbers = BTreeMap::new();
