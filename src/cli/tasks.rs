@@ -9,13 +9,14 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::ProgressBar;
 
 use super::Ending;
-use crate::agent::ExpertPolicy;
+use crate::agent::{ExpertPolicy, Solo};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
 use crate::house::grading::{Grading, describe};
-use crate::run::evaluate::{Evaluation, Options, told};
+use crate::run::evaluate::{Evaluation, Options};
 use crate::run::scenes::Scenes;
 use crate::run::tasks::{self, Phrasing, Wish};
+use crate::run::wording::told;
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
@@ -158,20 +159,14 @@ impl Check {
     fn run(self) -> anyhow::Result<Ending> {
         let set = taskset::read(&self.file)?;
         let scenes = Scenes::of(&self.file, &set.value);
-        let options = Options {
-            grading: Grading::Class,
-            seeds: 1,
-            limit: None,
-            jobs: super::threads(self.jobs),
-            step_by_step: false,
-        };
+        let options = Options { jobs: super::threads(self.jobs), ..Options::plain(Grading::Class) };
         let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
             .with_context(|| self.file.display().to_string())?;
         let mut out = std::io::stdout().lock();
         let mut unsolved = 0;
         evaluation.play(
             &evaluation.all(),
-            &|| Ok(Box::new(ExpertPolicy::default())),
+            &|| Ok(Box::new(Solo(Box::new(ExpertPolicy::new())))),
             &AtomicBool::new(false),
             &mut |episode| {
                 if !episode.success {

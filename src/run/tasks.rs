@@ -163,6 +163,19 @@ pub fn sample_dataset(
     Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes, tasks })
 }
 
+/// The set with these of its tasks, as it is written in another folder: the scenes are where they were.
+///
+/// # Errors
+/// When the scenes' folder cannot be found.
+pub fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &Path) -> anyhow::Result<TaskSet> {
+    let scenes = set.scenes.as_ref().map(|scenes| {
+        let beside = file.parent().unwrap_or(Path::new("")).join(scenes);
+        // A set of generated houses may name a folder that is not there.
+        if beside.is_dir() { relative(&beside, folder) } else { Ok(scenes.clone()) }
+    });
+    Ok(TaskSet { scenes: scenes.transpose()?, tasks: tasks.to_vec(), ..set.clone() })
+}
+
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
 fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
     let said = |steps: &[String]| {

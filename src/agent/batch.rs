@@ -1,0 +1,102 @@
+//! A trained agent that acts in several episodes at once, with one forward pass for all of them.
+//!
+//! The pass always has the same shape: an empty seat is a row of zeros. A row of a pass of one shape is computed the same
+//! way whatever the other rows hold, so a decision depends on its own episode and seat alone; the tests hold this.
+
+use tch::{Device, Kind, Tensor};
+
+use super::checkpoint::{Config, Networks};
+use super::learned::LearnedPolicy;
+use super::memory::{Memory, SharedEmbedder};
+use super::policy::Situation;
+use super::team::{Decisions, Team};
+use crate::nets::visual::SIDE;
+
+/// A trained agent with several seats.
+pub struct LearnedTeam {
+    name: String,
+    config: Config,
+    networks: Networks,
+    sentences: SharedEmbedder,
+    device: Device,
+    samples: bool,
+    seats: Vec<Memory>,
+    /// What an empty seat shows.
+    blank: Vec<u8>,
+}
+
+impl LearnedTeam {
+    /// Rows of a pass on the CPU: enough to read the weights once for several episodes, few enough to stay in its caches.
+    pub const SEATS: usize = 8;
+
+    /// Seats for an agent.
+    pub fn new(agent: LearnedPolicy, seats: usize) -> LearnedTeam {
+        let LearnedPolicy { name, config, networks, sentences, device, samples, memory: _ } = agent;
+        let blank = vec![0; (3 * config.visual.input * config.visual.input) as usize];
+        let seats = (0..seats.max(1)).map(|_| Memory::default()).collect();
+        LearnedTeam { name, config, networks, sentences, device, samples, seats, blank }
+    }
+
+    /// The maps [seats, features, 7, 7] of what each seat sees now.
+    fn see(&mut self, situations: &mut [Option<Situation<'_>>]) -> Tensor {
+        let spec = self.networks.visual.spec();
+        let image = |(situation, memory): (&mut Option<Situation<'_>>, &mut Memory)| match situation {
+            Some(here) => {
+                let image = spec.image(here.house.frame());
+                memory.look(&image, here.step);
+                image
+            }
+            None => self.blank.clone(),
+        };
+        let images: Vec<Vec<u8>> = situations.iter_mut().zip(&mut self.seats).map(image).collect();
+        self.networks.visual.encode(&images)
+    }
+}
+
+impl Team for LearnedTeam {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn seats(&self) -> usize {
+        self.seats.len()
+    }
+
+    fn begin(&mut self, seat: usize, seed: u64) {
+        self.seats[seat].begin(seed);
+    }
+
+    fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+        anyhow::ensure!(situations.len() == self.seats.len(), "{} situations are not one a seat", situations.len());
+        let maps = self.see(situations);
+        let (history, features) = (self.config.policy.history, self.config.visual.features());
+        let floats = (Kind::Float, self.device);
+        let mut observations = Vec::new();
+        let mut sentences = Vec::new();
+        for ((seat, memory), situation) in (0i64..).zip(&mut self.seats).zip(situations.iter()) {
+            match situation {
+                Some(here) => {
+                    observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
+                    sentences.push(memory.sentence(here.instruction, &self.sentences, self.device)?);
+                }
+                None => {
+                    observations.push(Tensor::zeros([1, history * features, SIDE, SIDE], floats));
+                    sentences.push(Tensor::zeros([1, self.config.policy.embedding], floats));
+                }
+            }
+        }
+        let (observations, sentences) = (Tensor::cat(&observations, 0), Tensor::cat(&sentences, 0));
+        let logits = tch::no_grad(|| self.networks.policy.forward(&observations, &sentences, false));
+        let numbers = |tensor: Tensor| -> anyhow::Result<(usize, Vec<f32>)> {
+            let width = tensor.size()[1] as usize;
+            Ok((width, Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu))?))
+        };
+        let ((kinds, actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        let rows = actions.chunks_exact(kinds).zip(objects.chunks_exact(classes));
+        let decided = rows.zip(&mut self.seats).zip(situations).map(|(((actions, objects), memory), situation)| {
+            let here = situation.as_mut()?;
+            Some(Ok(memory.decide(actions, objects, &here.house.candidates(), self.samples)))
+        });
+        Ok(decided.collect())
+    }
+}
