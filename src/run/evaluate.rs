@@ -279,7 +279,7 @@ pub(super) fn policy_seed(booking: &Booking) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::collections::BTreeSet;
     use std::sync::atomic::Ordering;
 
@@ -294,11 +294,17 @@ mod tests {
     use crate::house::testing::kitchen;
 
     /// Walks by chance, sometimes touching what it can; fails in the ways that it is told to.
-    struct Walker {
+    pub(crate) struct Walker {
         rng: ChaCha8Rng,
         steps: u32,
         fails: bool,
         panics: bool,
+    }
+
+    impl Walker {
+        pub(crate) fn new(fails: bool, panics: bool) -> Walker {
+            Walker { rng: ChaCha8Rng::seed_from_u64(0), steps: 0, fails, panics }
+        }
     }
 
     impl Policy for Walker {
@@ -326,7 +332,7 @@ mod tests {
     }
 
     fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Team>> {
-        Ok(Box::new(Solo(Box::new(Walker { rng: ChaCha8Rng::seed_from_u64(0), steps: 0, fails, panics }))))
+        Ok(Box::new(Solo(Box::new(Walker::new(fails, panics)))))
     }
 
     /// Three tasks in the test kitchen, and the folder that they live in.
@@ -362,16 +368,21 @@ mod tests {
         (folder, document)
     }
 
-    fn options() -> Options {
+    pub(crate) fn options() -> Options {
         Options { seeds: 4, ..Options::plain(Grading::Class) }
     }
 
-    struct Ran {
-        summary: Summary,
-        lines: String,
+    pub(crate) struct Ran {
+        pub(crate) summary: Summary,
+        pub(crate) lines: String,
     }
 
-    fn run(into: &std::path::Path, options: Options, make: &MakeTeam<'_>, stop_after: usize) -> anyhow::Result<Ran> {
+    pub(crate) fn run(
+        into: &std::path::Path,
+        options: Options,
+        make: &MakeTeam<'_>,
+        stop_after: usize,
+    ) -> anyhow::Result<Ran> {
         let (folder, set) = tasks();
         let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
         let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::episode::{Episode, Key};
+use super::plot;
 use super::shard::Shard;
 use crate::data::json;
 use crate::domain::TaskSet;
@@ -187,6 +188,7 @@ impl RunFolder {
     pub fn write_summary(&self, summary: &super::report::Summary) -> anyhow::Result<()> {
         json::write_bytes(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
         json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)?;
+        plot::write(&self.path, plot::PROGRESS, &plot::progress_by_length(&[summary]))?;
         json::write_pretty(&self.path.join(Self::SUMMARY), summary)
     }
 }

@@ -345,3 +345,139 @@ fn guarded<T>(run: impl FnOnce() -> anyhow::Result<T>) -> Result<T, String> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::agent::team::Decisions;
+    use crate::run::evaluate::Options;
+    use crate::run::evaluate::tests::{Ran, Walker, options, run};
+
+    /// Walkers at one table. The whole table panics, or fails, when somebody at it is told `trouble`.
+    struct Walkers {
+        seats: Vec<Walker>,
+        trouble: &'static str,
+        panics: bool,
+    }
+
+    impl Team for Walkers {
+        fn name(&self) -> &str {
+            "walkers"
+        }
+
+        fn seats(&self) -> usize {
+            self.seats.len()
+        }
+
+        fn begin(&mut self, seat: usize, seed: u64) {
+            self.seats[seat].begin(seed);
+        }
+
+        fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+            let troubled =
+                situations.iter().flatten().any(|here| here.instruction.contains(self.trouble) && here.step == 3);
+            assert!(!(troubled && self.panics), "the table broke");
+            anyhow::ensure!(!troubled, "the table broke");
+            let pairs = situations.iter_mut().zip(&mut self.seats);
+            Ok(pairs.map(|(here, walker)| here.as_mut().map(|here| walker.decide(here))).collect())
+        }
+    }
+
+    fn walkers(seats: usize, trouble: &'static str, panics: bool) -> anyhow::Result<Box<dyn Team>> {
+        let seats = (0..seats).map(|_| Walker::new(false, false)).collect();
+        Ok(Box::new(Walkers { seats, trouble, panics }))
+    }
+
+    fn played(options: Options, make: &MakeTeam<'_>) -> Ran {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path(), options, make, usize::MAX).unwrap()
+    }
+
+    #[test]
+    fn the_result_does_not_depend_on_seats_and_threads() {
+        let alone = played(options(), &|| walkers(1, "nobody", false));
+        for (seats, jobs) in [(1, 3), (4, 1), (4, 2), (16, 3)] {
+            let ran = played(Options { jobs, ..options() }, &|| walkers(seats, "nobody", false));
+            assert_eq!(ran.lines, alone.lines, "{seats} seats, {jobs} threads");
+        }
+    }
+
+    #[test]
+    fn what_breaks_a_whole_table_is_recorded_where_it_belongs_and_nowhere_else() {
+        let sound = played(options(), &|| walkers(4, "nobody", false));
+        let (trouble, _) = sound.lines.split_once("\"instruction\":\"Take the ").unwrap().1.split_once('.').unwrap();
+        let trouble: &'static str = trouble.to_owned().leak();
+        for panics in [false, true] {
+            let ran = played(Options { jobs: 2, ..options() }, &|| walkers(4, trouble, panics));
+            for (line, before) in ran.lines.lines().zip(sound.lines.lines()) {
+                match before.contains(&format!("Take the {trouble}.")) && before.matches("\"do\"").count() > 3 {
+                    true => assert!(line.contains("the table broke"), "{line}"),
+                    false => assert_eq!(line, before),
+                }
+            }
+            assert!(ran.summary.errors > 0 && ran.summary.errors < 12);
+            assert_eq!(ran.summary.errored.len(), ran.summary.errors);
+        }
+    }
+
+    #[test]
+    fn an_error_is_tried_again_as_often_as_asked_and_what_came_of_it_is_recorded() {
+        /// Fails the first few times, whoever it is.
+        struct Moody(Walker, &'static Mutex<u32>);
+        impl Policy for Moody {
+            fn name(&self) -> &str {
+                "moody"
+            }
+            fn begin(&mut self, seed: u64) {
+                self.0.begin(seed);
+            }
+            fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+                let mut left = self.1.lock().unwrap();
+                if *left > 0 {
+                    *left -= 1;
+                    anyhow::bail!("in a mood");
+                }
+                drop(left);
+                self.0.decide(situation)
+            }
+        }
+        let sound = played(options(), &|| walkers(1, "nobody", false));
+        let counter: &'static Mutex<u32> = Box::leak(Box::new(Mutex::new(3)));
+        let moody = || -> anyhow::Result<Box<dyn Team>> {
+            Ok(Box::new(crate::agent::Solo(Box::new(Moody(Walker::new(false, false), counter)))))
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let first = run(folder.path(), Options { retries: 1, ..options() }, &moody, usize::MAX).unwrap();
+        assert_eq!(first.summary.errors, 1, "two attempts of the first episode failed, then one of the second");
+        assert!(first.lines.contains("in a mood") && first.lines.contains("\"attempts\":2"));
+        let again = run(folder.path(), Options { retries: 2, ..options() }, &moody, usize::MAX).unwrap();
+        assert_eq!(again.summary.errors, 0);
+        assert_eq!(again.lines.lines().count(), 13, "the failed record stays where it is");
+        assert_eq!(again.summary.success, sound.summary.success);
+        let untouched = run(folder.path(), Options { retries: 9, ..options() }, &moody, usize::MAX).unwrap();
+        assert_eq!(untouched.lines, again.lines);
+    }
+
+    #[test]
+    fn an_episode_that_takes_too_long_is_an_error_and_is_counted() {
+        let options = Options { timeout: Some(Duration::ZERO), ..options() };
+        let ran = played(options, &|| walkers(4, "nobody", false));
+        assert_eq!((ran.summary.episodes, ran.summary.errors), (12, 12));
+        assert!(ran.lines.contains("\"error\":\"timed out"));
+    }
+
+    #[test]
+    fn a_team_that_cannot_be_made_again_is_an_error_of_its_episodes() {
+        let made = AtomicUsize::new(0);
+        let make = || match made.fetch_add(1, Ordering::Relaxed) {
+            0 => walkers(1, "Take", true),
+            _ => anyhow::bail!("the checkpoint is gone"),
+        };
+        let ran = played(options(), &make);
+        assert_eq!((ran.summary.episodes, ran.summary.errors), (12, 12));
+        assert!(ran.lines.contains("could not be made again: the checkpoint is gone"), "{}", ran.lines);
+    }
+}
