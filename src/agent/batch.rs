@@ -141,14 +141,12 @@ mod tests {
         let mut minds = Vec::new();
         for step in 0..10 {
             let told = ["Take the mug.", "Slice the bread.", "Open the fridge."];
-            let situation = |(place, house): (usize, &mut Option<House>)| -> Option<Situation<'_>> {
-                let instruction = if place == seat { "Put the apple in the sink." } else { told[place % 3] };
-                Some(Situation { house: house.as_mut()?, instruction, step, grader: None })
-            };
             let mut situations: Vec<Option<Situation<'_>>> = Vec::new();
-            situations.extend(houses.iter_mut().enumerate().map(situation));
+            for (place, house) in houses.iter_mut().enumerate() {
+                let instruction = if place == seat { "Put the apple in the sink." } else { told[place % 3] };
+                situations.push(house.as_mut().map(|house| Situation { house, instruction, step, grader: None }));
+            }
             let decisions = team.decide(&mut situations).unwrap();
-            drop(situations);
             for (place, decision) in decisions.into_iter().enumerate() {
                 let Some(decision) = decision.map(Result::unwrap) else { continue };
                 if let Some(house) = &mut houses[place] {
