@@ -383,6 +383,38 @@ pub(crate) mod tests {
         assert!(read_episodes(&path).unwrap_err().to_string().contains("lines 1 and 2"));
     }
 
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(200))]
+        #[test]
+        fn damaged_episodes_and_manifests_are_read_or_refused(
+            edits in proptest::collection::vec((proptest::prelude::any::<usize>(), proptest::prelude::any::<u8>(), 0u8..4), 1..8),
+        ) {
+            let damaged = |text: String| {
+                let mut bytes = text.into_bytes();
+                for &(at, byte, edit) in &edits {
+                    let at = at % bytes.len().max(1);
+                    match edit {
+                        0 => bytes.truncate(at),
+                        1 if at < bytes.len() => bytes[at] = byte,
+                        2 if at < bytes.len() => drop(bytes.remove(at)),
+                        _ => bytes.insert(at.min(bytes.len()), byte),
+                    }
+                }
+                bytes
+            };
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("episodes.jsonl");
+            let line = |task| serde_json::to_string(&episode(task)).unwrap() + "\n";
+            std::fs::write(&path, damaged(line("a") + &line("b") + &line("c"))).unwrap();
+            if let Ok((episodes, whole)) = read_episodes(&path) {
+                proptest::prop_assert!(whole <= std::fs::metadata(&path).unwrap().len());
+                proptest::prop_assert!(episodes.len() <= 11);
+            }
+            let text = serde_json::to_string_pretty(&manifest()).unwrap();
+            let _ = json::parse::<Manifest>(&damaged(text), Manifest::FORMAT);
+        }
+    }
+
     #[test]
     fn a_default_folder_is_named_by_set_and_time() {
         let first = Path::new("runs/eval-100-x-19700101-000000");
