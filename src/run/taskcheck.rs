@@ -137,6 +137,7 @@ mod tests {
         let mut set = sample_set();
         set.tasks.truncate(1);
         set.tasks[0].start = None;
+        set.tasks[0].roles[0].bound = None;
         let good = serde_json::to_string_pretty(&set).unwrap();
         assert_eq!(of(&good), Vec::<String>::new());
         let told =
