@@ -5,10 +5,10 @@
 //! | floor | what lives there |
 //! |---|---|
 //! | [`domain`] | the words of the program as plain data: classes, actions, scenes, worlds, skills, tasks, trajectories |
-//! | [`language`] | instruction text and the phrase grammar |
+//! | [`language`] | instruction text, the phrase grammar, summaries by rules |
 //! | [`house`] | the simulator: rules, sight, rendering, graders, the expert, generated houses |
-//! | [`data`] | dataset folders, the ALFRED importer, task files, training items |
-//! | [`nets`] | visual encoder, FiLM policy, sentence encoders, strict weights files |
+//! | [`data`] | dataset folders, the ALFRED importer, task files, training items, labels, feature files |
+//! | [`nets`] | visual encoders, FiLM policy, sentence encoders, strict weights files |
 //! | [`algo`] | losses, optimiser, learner |
 //! | [`agent`] | what decides the next action: trained, expert, chance |
 //! | [`run`] | the one loop that steps an environment, and the runs that use it |

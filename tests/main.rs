@@ -3,6 +3,7 @@
 // Helpers of tests may fail loudly, and say on standard error why a test was skipped.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
+mod alfred;
 mod explore;
 mod eval;
 mod floors;

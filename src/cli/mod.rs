@@ -9,6 +9,7 @@ mod collect;
 mod compare;
 mod doctor;
 mod embed;
+mod encode;
 mod explore;
 mod eval;
 mod import;
@@ -16,6 +17,7 @@ mod logging;
 mod merge;
 mod policies;
 mod pretrain;
+mod relabel;
 mod replay;
 mod report;
 mod schema;
@@ -54,6 +56,10 @@ enum Command {
     Import(import::Import),
     /// Collect demonstrations in generated houses
     Collect(collect::Collect),
+    /// Label a dataset's runs of skills, to learn from them
+    Relabel(relabel::Relabel),
+    /// Draw and encode every frame of a dataset, ahead of a training
+    Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
     /// Re-run recorded demonstrations in the simulator
@@ -117,6 +123,8 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
+        Command::Relabel(relabel) => relabel.run(),
+        Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),

@@ -1,12 +1,18 @@
-//! Training items of behaviour cloning: (span, t), a span with its sentence and a step in it.
+//! Training items: (span, t), a run of adjacent skills with the sentence of one annotator, and a step in it.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
+use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
+use super::summaries::Summaries;
 use crate::domain::Trajectory;
+use crate::domain::trajectory::Annotation;
 use crate::language::instruction::normalise;
+use crate::language::passage::{Passage, concatenated};
 
 /// One frame's label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,17 +23,70 @@ pub struct Label {
     pub object: u8,
 }
 
-/// A run of adjacent skills with the texts that describe it.
+/// Which runs of two or more skills are learned from, and under which text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Composites {
+    /// None: single skills alone.
+    None,
+    /// All, under the summaries in the dataset's `labels.jsonl`.
+    Labels,
+    /// All, under the annotator's sentences one after the other.
+    Concat,
+    /// Whole trajectories alone, under what the annotator wrote of the whole.
+    Whole,
+}
+
+/// Which spans are learned from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Selection {
+    /// Spans of two or more skills.
+    pub composites: Composites,
+    /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels_of: Option<String>,
+}
+
+impl Selection {
+    /// A selection of composites; with labels, of the only source there is.
+    pub fn of(composites: Composites) -> Selection {
+        Selection { composites, labels_of: None }
+    }
+}
+
+/// What items are made of.
+pub struct Source<'a> {
+    /// The trajectories, in the order of their frames.
+    pub trajectories: &'a [Trajectory],
+    /// Those of which the whole must not be learned as one span.
+    pub held_out: &'a [String],
+    /// What composite spans are called; needed for [`Composites::Labels`] alone.
+    pub summaries: &'a Summaries,
+}
+
+/// A run of adjacent skills as one annotator tells it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Span {
+    /// The trajectory's position.
+    pub trajectory: u32,
+    /// Its skills in the trajectory; one of them for a primitive.
+    pub skills: Range<u8>,
     /// The position of the trajectory's first frame among all frames.
     pub first: u32,
     /// The span's first step, as a frame.
     pub start: u32,
-    /// The frame after its last step.
+    /// The frame after its last step: the state in which it is done.
     pub end: u32,
-    /// Positions in [`Items::texts`].
-    pub texts: Vec<u32>,
+    /// Position in [`Items::texts`].
+    pub text: u32,
+}
+
+impl Span {
+    /// Whether it is a single skill.
+    pub fn is_primitive(&self) -> bool {
+        self.skills.len() == 1
+    }
 }
 
 /// Every item of a dataset. Frames are numbered through: each trajectory has one more than it has actions.
@@ -39,85 +98,154 @@ pub struct Items {
     pub texts: Vec<String>,
     /// Spans to learn from.
     pub training: Vec<Span>,
-    /// Spans that are held out: whole trajectories.
+    /// Spans that are held out: whole trajectories, those of splits other than `train` among them.
     pub held_out: Vec<Span>,
+    /// The number of each trajectory's first frame, and at the end the number of frames.
+    pub firsts: Vec<u32>,
 }
 
-/// A drawn item.
+/// A drawn item: the transition from `frame` to the frame after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
     /// The trajectory's first frame: history does not reach behind it.
     pub first: u32,
     /// The present frame.
     pub frame: u32,
+    /// The frame after the span's last step: the transition into it is rewarded and ends the span.
+    pub end: u32,
     /// The text.
     pub text: u32,
 }
 
 impl Items {
-    /// The primitives and the whole of every trajectory; every `hold_out`th trajectory is held out. `labels` are those of
-    /// all frames.
-    pub fn of(trajectories: &[Trajectory], labels: Vec<Option<Label>>, hold_out: usize) -> Items {
-        let mut items = Items { labels, ..Items::default() };
+    /// All primitives, and the composites that are selected, once for each aligned annotation. Held out are every `hold_out`th
+    /// trajectory and the splits other than `train`; dropped are the wholes that [`Source::held_out`] names. `labels` are those
+    /// of all frames.
+    ///
+    /// # Errors
+    /// When composites should have labels and one has none.
+    pub fn of(
+        source: &Source<'_>,
+        labels: Vec<Option<Label>>,
+        selection: &Selection,
+        hold_out: usize,
+    ) -> anyhow::Result<Items> {
+        let mut items = Items { labels, firsts: vec![0], ..Items::default() };
         let mut numbers = HashMap::new();
         let mut first = 0;
-        for (position, trajectory) in trajectories.iter().enumerate() {
-            let mut spans = spans(trajectory, first, &mut |text| {
-                let text = normalise(text);
-                *numbers.entry(text.clone()).or_insert_with(|| {
-                    items.texts.push(text);
-                    items.texts.len() as u32 - 1
-                })
-            });
-            spans.retain(|span| span.start < span.end && !span.texts.is_empty());
-            let held_out = hold_out > 0 && position % hold_out == hold_out - 1;
-            if held_out { &mut items.held_out } else { &mut items.training }.extend(spans);
+        for (position, trajectory) in source.trajectories.iter().enumerate() {
+            let held_out = trajectory.split != "train" || hold_out > 0 && position % hold_out == hold_out - 1;
+            for annotation in &trajectory.annotations {
+                for (skills, text) in told(source, selection, trajectory, annotation)? {
+                    let (from, to) =
+                        (trajectory.skill_range(skills.start).start, trajectory.skill_range(skills.end - 1).end);
+                    let text = normalise(&text);
+                    if from >= to || text.is_empty() {
+                        continue;
+                    }
+                    let text = *numbers.entry(text).or_insert_with_key(|text| {
+                        items.texts.push(text.clone());
+                        items.texts.len() as u32 - 1
+                    });
+                    let span = Span {
+                        trajectory: position as u32,
+                        skills: skills.start as u8..skills.end as u8,
+                        first,
+                        start: first + from as u32,
+                        end: first + to as u32,
+                        text,
+                    };
+                    if held_out { &mut items.held_out } else { &mut items.training }.push(span);
+                }
+            }
             first += trajectory.actions.len() as u32 + 1;
+            items.firsts.push(first);
         }
-        items
+        Ok(items)
     }
 
-    /// A batch of training items: spans uniformly, then a step uniformly, then one of the span's texts. A function of seed and step alone,
-    /// so that a resumed training draws what the uninterrupted one would have.
+    /// A batch of items: spans uniformly, then a step uniformly. A function of seed and step alone, so that a resumed training
+    /// draws what the uninterrupted one would have.
     pub fn draw(spans: &[Span], seed: u64, step: u64, batch: usize) -> Vec<Item> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(step + 1);
         let draw = |_| {
             let span = &spans[rng.random_range(0..spans.len())];
-            Item {
-                first: span.first,
-                frame: rng.random_range(span.start..span.end),
-                text: span.texts[rng.random_range(0..span.texts.len())],
-            }
+            let frame = rng.random_range(span.start..span.end);
+            Item { first: span.first, frame, end: span.end, text: span.text }
         };
         if spans.is_empty() { Vec::new() } else { (0..batch).map(draw).collect() }
     }
+
+    /// All frames of the trajectory that an item lies in.
+    pub fn trajectory_of(&self, item: &Item) -> Range<u32> {
+        let next = self.firsts.partition_point(|&first| first <= item.first);
+        item.first..self.firsts.get(next).copied().unwrap_or(item.end + 1)
+    }
 }
 
-fn spans(trajectory: &Trajectory, first: u32, number: &mut impl FnMut(&str) -> u32) -> Vec<Span> {
-    let count = trajectory.skills.len();
-    let mut spans = Vec::new();
-    for skill in 0..count {
-        let range = trajectory.skill_range(skill);
-        let aligned = trajectory.annotations.iter().filter(|annotation| annotation.steps.len() == count);
-        let texts = aligned.map(|annotation| number(&annotation.steps[skill])).collect();
-        spans.push(Span { first, start: first + range.start as u32, end: first + range.end as u32, texts });
+/// The spans of a trajectory with what one annotator says of each.
+fn told(
+    source: &Source<'_>,
+    selection: &Selection,
+    trajectory: &Trajectory,
+    annotation: &Annotation,
+) -> anyhow::Result<Vec<(Range<usize>, String)>> {
+    let mut told = Vec::new();
+    if annotation.steps.len() == trajectory.skills.len() {
+        told.extend(annotation.steps.iter().enumerate().map(|(skill, step)| (skill..skill + 1, step.clone())));
     }
-    let goals: Vec<u32> = trajectory.annotations.iter().map(|annotation| number(&annotation.goal)).collect();
-    match &mut spans[..] {
+    if selection.composites == Composites::Whole {
         // Of a single skill, goal and step say the same.
-        [only] => only.texts.extend(goals),
-        _ => spans.push(Span { first, start: first, end: first + trajectory.actions.len() as u32, texts: goals }),
+        if !source.held_out.contains(&trajectory.id) && !trajectory.skills.is_empty() {
+            told.push((0..trajectory.skills.len(), annotation.goal.clone()));
+        }
+        return Ok(told);
     }
-    spans
+    for skills in composites(trajectory, source.held_out) {
+        let Some(passage) = Passage::of(trajectory, annotation, skills.clone()) else { break };
+        let text = match selection.composites {
+            Composites::Labels => source.summaries.find(&passage).map(str::to_owned).with_context(|| {
+                format!("{}: skills {skills:?} have no label; `sprint relabel` writes what is missing", trajectory.id)
+            })?,
+            Composites::Concat => concatenated(passage.sentences),
+            Composites::None | Composites::Whole => break,
+        };
+        told.push((skills, text));
+    }
+    Ok(told)
+}
+
+/// The runs of two or more skills of a trajectory, without the whole where that is held out.
+pub fn composites(trajectory: &Trajectory, held_out: &[String]) -> Vec<Range<usize>> {
+    let count = trajectory.skills.len();
+    let mut runs: Vec<_> = (0..count).flat_map(|from| (from + 2..=count).map(move |to| from..to)).collect();
+    if held_out.contains(&trajectory.id) {
+        runs.retain(|run| run.len() < count);
+    }
+    runs
 }
 
 impl Item {
     /// The frames of the observation, oldest first; before the trajectory's first frame there was the first one.
-    pub fn stack(&self, history: u32) -> impl Iterator<Item = usize> {
-        let (first, frame) = (self.first, self.frame);
-        (0..history).map(move |i| frame.saturating_sub(history - 1 - i).max(first) as usize)
+    pub fn stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
+        stack(self.first, self.frame, history)
     }
+
+    /// The frames of the observation after the step.
+    pub fn next_stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
+        stack(self.first, self.frame + 1, history)
+    }
+
+    /// Whether the step ends the span: reward 1, and nothing after it.
+    pub fn is_last(&self) -> bool {
+        self.frame + 1 == self.end
+    }
+}
+
+/// `frame` and those before it, `history` in all, oldest first; none lies before `first`.
+pub fn stack(first: u32, frame: u32, history: u32) -> impl Iterator<Item = usize> + use<> {
+    (0..history).map(move |i| (frame + 1 + i).saturating_sub(history).max(first) as usize)
 }
 
 #[cfg(test)]
@@ -148,29 +276,76 @@ mod tests {
         }
     }
 
+    fn items(trajectories: &[Trajectory], composites: Composites, hold_out: usize, held_out: &[String]) -> Items {
+        let summaries = Summaries::default();
+        let source = Source { trajectories, held_out, summaries: &summaries };
+        Items::of(&source, Vec::new(), &Selection::of(composites), hold_out).unwrap()
+    }
+
+    fn edges(items: &Items) -> Vec<(u32, u32, u32)> {
+        items.training.iter().map(|span| (span.first, span.start, span.end)).collect()
+    }
+
     #[test]
     fn a_trajectory_gives_its_primitives_and_its_whole() {
-        let items = Items::of(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Vec::new(), 0);
-        let edges: Vec<(u32, u32, u32)> =
-            items.training.iter().map(|span| (span.first, span.start, span.end)).collect();
-        assert_eq!(edges, [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9)]);
+        let items = items(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Composites::Whole, 0, &[]);
+        assert_eq!(edges(&items), [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9), (6, 6, 9)]);
         assert_eq!(items.texts, ["step 0", "step 1", "all"].map(normalise));
-        assert_eq!(items.training[3].texts, [0, 2]);
+        assert_eq!(items.firsts, [0, 6, 10]);
+        assert_eq!(items.trajectory_of(&Item { first: 0, frame: 1, end: 2, text: 0 }), 0..6);
+    }
+
+    #[test]
+    fn every_run_of_skills_is_a_span_and_a_held_out_whole_is_not() {
+        let three = [trajectory(vec![0, 2, 3], 5)];
+        let concat = items(&three, Composites::Concat, 0, &[]);
+        assert_eq!(edges(&concat), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 0, 5), (0, 2, 5)]);
+        assert_eq!(concat.texts[concat.training[3].text as usize], "Step 0. step 1.");
+        assert_eq!(concat.training[5].skills, 1..3);
+        let dropped = items(&three, Composites::Concat, 0, &["t".to_string()]);
+        assert_eq!(edges(&dropped), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 2, 5)]);
+        assert_eq!(items(&three, Composites::None, 0, &[]).training.len(), 3);
+    }
+
+    #[test]
+    fn a_span_without_its_label_is_an_error_that_says_what_to_do() {
+        let summaries = Summaries::default();
+        let source = Source { trajectories: &[trajectory(vec![0, 2], 5)], held_out: &[], summaries: &summaries };
+        let error = Items::of(&source, Vec::new(), &Selection::of(Composites::Labels), 0).unwrap_err().to_string();
+        assert!(error.contains("skills 0..2") && error.contains("sprint relabel"), "{error}");
+    }
+
+    #[test]
+    fn an_annotation_that_is_not_aligned_is_left_out() {
+        let mut odd = trajectory(vec![0, 2], 5);
+        odd.annotations[0].steps.pop();
+        assert!(items(&[odd], Composites::Concat, 0, &[]).training.is_empty());
     }
 
     #[test]
     fn held_out_trajectories_are_whole_and_draws_depend_on_the_step_alone() {
-        let items = Items::of(&[trajectory(vec![0], 4), trajectory(vec![0], 4)], Vec::new(), 2);
-        assert_eq!((items.training.len(), items.held_out.len()), (1, 1));
+        let mut seen = trajectory(vec![0], 4);
+        seen.split = "valid_seen".into();
+        let items = items(&[trajectory(vec![0], 4), trajectory(vec![0], 4), seen], Composites::None, 2, &[]);
+        assert_eq!((items.training.len(), items.held_out.len()), (1, 2));
         let draw = |step| Items::draw(&items.training, 7, step, 20);
         assert_eq!(draw(3), draw(3));
         assert_ne!(draw(3), draw(4));
+        assert!(draw(3).iter().all(|item| item.frame < 4 && item.is_last() == (item.frame == 3)));
     }
 
     #[test]
     fn history_repeats_the_first_frame() {
-        let stack = |frame| Item { first: 10, frame, text: 0 }.stack(5).collect::<Vec<_>>();
-        assert_eq!(stack(11), [10, 10, 10, 10, 11]);
-        assert_eq!(stack(16), [12, 13, 14, 15, 16]);
+        let item = |frame| Item { first: 10, frame, end: 20, text: 0 };
+        assert_eq!(item(11).stack(5).collect::<Vec<_>>(), [10, 10, 10, 10, 11]);
+        assert_eq!(item(11).next_stack(5).collect::<Vec<_>>(), [10, 10, 10, 11, 12]);
+        assert_eq!(item(16).stack(5).collect::<Vec<_>>(), [12, 13, 14, 15, 16]);
+    }
+
+    #[test]
+    fn a_selection_is_written_in_kebab_case() {
+        let read: Selection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
+        assert_eq!(read, Selection { composites: Composites::Labels, labels_of: Some("rules".into()) });
+        assert!(toml::from_str::<Selection>("composites = \"some\"").is_err());
     }
 }

@@ -7,6 +7,7 @@ pub mod items;
 pub mod json;
 pub mod lines;
 pub mod schema;
+pub mod summaries;
 pub mod taskset;
 
 pub use dataset::Dataset;

@@ -43,7 +43,7 @@ pub fn open_door(fixture: &Fixture) -> Option<Extent> {
     let [sin, cos] = BEYOND;
     // From the hinge to the free edge: straight out of the front, and a little to the left.
     let along = sides * Vec3::new(-sin, 0.0, -cos);
-    let out = sides * Vec3::new(-cos, 0.0, sin);
+    let out = sides * Vec3::new(cos, 0.0, -sin);
     let hinge = cuboid.centre().metres() + sides * Vec3::new(-half.x, 0.0, -half.z);
     Some(Extent {
         shape: Shape::Box,
@@ -92,6 +92,7 @@ mod tests {
             let (x, z) = facing.step();
             let out = door.centre.dot(Vec3::new(f32::from(x), 0.0, f32::from(z)));
             assert!(out > 0.5, "{facing:?}: {}", door.centre);
+            assert!(door.axes.determinant() > 0.0, "{facing:?}: mirrored");
         }
     }
 }

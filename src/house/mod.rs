@@ -7,6 +7,7 @@ pub mod expert;
 pub mod generate;
 pub mod goals;
 pub mod grading;
+pub mod occlusion;
 pub mod outcome;
 pub mod placing;
 pub mod render;

@@ -1,5 +1,6 @@
 //! Where a Put leaves an object: the free point of the receptacle that is nearest to the agent.
 
+use super::occlusion::in_sight;
 use crate::domain::place::Rect;
 use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Fixture, Point, Scene};
@@ -32,7 +33,8 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 ///
 /// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. First a point where the whole
 /// outline is free and on the surface, then one where only the pivot is; where walls stand around, before both a free point
-/// away from them, where it can be seen. In a movable receptacle: at its pivot, moved aside for each thing that already lies
+/// away from them, and before all a point that no shelf and no rim hides from the agent; in a garbage can at last on top of the
+/// rest. In a movable receptacle: at its pivot, moved aside for each thing that already lies
 /// there.
 pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
@@ -68,7 +70,10 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 }
             }
             points.sort_by_key(|&(level, distance, at)| (level, distance, at));
-            let fits = |level: usize, at: Point, pass: Pass| {
+            let eye = world.agent.cell.centre(scene.camera_y());
+            let middle = object_height(scene, object) / 2 - object.class.info().rest;
+            let seen = |at: Point| in_sight(fixture, eye, Point::new(at.x - shift.x, at.y + middle, at.z - shift.z));
+            let fits = |level: usize, at: Point, pass: Pass, wants_sight: bool| {
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
                 let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
@@ -76,19 +81,32 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
                 let on = |area: &Rect| match pass {
                     Pass::Inside => away_from_walls(fixture, area).contains(x, z),
                     Pass::Whole => area.grown(RASTER).contains(x, z),
-                    Pass::Pivot => true,
+                    Pass::Pivot | Pass::Heap => true,
                 };
                 let free = |other: &Rect| match pass {
+                    Pass::Heap => true,
                     Pass::Pivot => !other.contains(at.x, at.z),
                     Pass::Inside | Pass::Whole => !overlap(&ground, other),
                 };
-                taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
-                    && surface.areas.iter().any(on)
+                surface.areas.iter().any(on)
+                    && taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
+                    && (!wants_sight || seen(at))
             };
-            let passes = [Pass::Inside, Pass::Whole, Pass::Pivot].into_iter();
-            passes
-                .filter(|&pass| pass != Pass::Inside || has_walls(fixture))
-                .find_map(|pass| points.iter().find(|&&(level, _, at)| fits(level, at, pass)).map(|&(_, _, at)| at))
+            let passes = [
+                (Pass::Inside, true),
+                (Pass::Whole, true),
+                (Pass::Inside, false),
+                (Pass::Whole, false),
+                (Pass::Pivot, false),
+                (Pass::Heap, false),
+            ];
+            let walled = has_walls(fixture);
+            // Without walls nothing hides a place, and no place is away from them.
+            let passes = passes.into_iter().filter(|&(pass, sight)| walled || !sight && pass != Pass::Inside);
+            let heaps = fixture.class.name() == "GarbageCan";
+            let passes = passes.filter(|&(pass, _)| heaps || pass != Pass::Heap);
+            let first = |(pass, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, pass, sight));
+            passes.filter_map(first).map(|&(_, _, at)| at).next()
         }
     }
 }
@@ -102,6 +120,8 @@ enum Pass {
     Whole,
     /// Its pivot free.
     Pivot,
+    /// On top of what lies there: how things lie in a garbage can.
+    Heap,
 }
 
 /// Whether walls stand around what lies in it.
@@ -109,8 +129,9 @@ fn has_walls(fixture: &Fixture) -> bool {
     fixture.class.info().openable || is_tub(fixture)
 }
 
-fn is_tub(fixture: &Fixture) -> bool {
-    matches!(fixture.class.name(), "Sink" | "Bathtub")
+/// Whether it is open above and its contents lie inside.
+pub fn is_tub(fixture: &Fixture) -> bool {
+    matches!(fixture.class.name(), "Sink" | "Bathtub" | "GarbageCan")
 }
 
 /// The middle third of a surface; behind a door all of its depth.
@@ -159,5 +180,41 @@ pub fn carry_contents(world: &mut World, carrier: Instance, by: Point) {
     for index in moved {
         let at = &mut world.objects[usize::from(index)].at;
         *at = Point::new(at.x + by.x, at.y + by.y, at.z + by.z);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::place::Cuboid;
+    use crate::domain::scene::Surface;
+    use crate::domain::{Class, Heading, Pose, Room};
+
+    /// How many soap bars go into a receptacle of 16 cm a side, of ten.
+    fn held_by(class: &str) -> usize {
+        let body = Cuboid::between(Point::new(-100, 0, 500), Point::new(100, 300, 700));
+        let surface = Surface { height: 20, areas: vec![body.footprint().grown(-20)] };
+        let class = Class::named(class).unwrap();
+        let (id, pivot, facing) = (class.name().to_string(), body.centre(), Heading::South);
+        let fixture = Fixture { id, class, pivot, facing, body: vec![body], surfaces: vec![surface], stand: None };
+        let (name, format_version) = ("test".to_string(), Scene::FORMAT);
+        let fixtures = vec![fixture];
+        let (walls, cells, meshes) = (Vec::new(), Vec::new(), Vec::new());
+        let scene = Scene { format_version, name, room: Room::Bathroom, agent_y: 900, cells, fixtures, walls, meshes };
+        let soap = Object { class: Class::named("SoapBar").unwrap(), ..Object::default() };
+        let mut world = World::new(&scene, Pose::default(), Vec::new());
+        let receptacle = Instance::Fixture(0);
+        while world.objects.len() < 10
+            && let Some(at) = spot(&scene, &world, &soap, receptacle)
+        {
+            world.objects.push(Object { at, parent: Parent::In(receptacle), ..soap.clone() });
+        }
+        world.objects.len()
+    }
+
+    #[test]
+    fn things_heap_up_in_a_garbage_can_but_not_in_a_sink() {
+        assert_eq!(held_by("GarbageCan"), 10);
+        assert!((1..10).contains(&held_by("Sink")));
     }
 }

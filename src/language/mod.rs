@@ -2,5 +2,10 @@
 
 pub mod grammar;
 pub mod instruction;
+pub mod nouns;
+pub mod passage;
 pub mod phrases;
+pub mod rules;
 pub mod summary;
+
+mod outcome;

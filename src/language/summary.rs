@@ -4,21 +4,9 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::grammar::{Slots, grammar, with_article};
+use super::outcome::{Outcome, outcomes};
 use super::phrases::{Story, destination_slots};
-use crate::domain::skill::{SkillKind, Subtask};
-
-/// What is different in the end.
-#[derive(Clone, Debug, PartialEq)]
-enum Outcome {
-    /// Things lie somewhere: which, what lies in the first of them, and where.
-    Placed { things: Vec<u8>, content: Option<u8>, place: u8 },
-    /// Something is in the hand.
-    Held(u8),
-    /// Something is cut, and no slice of it is used.
-    Cut(u8),
-    /// A lamp shines, on what is in the hand.
-    Lit { lamp: u8, held: Option<u8> },
-}
+use crate::domain::skill::SkillKind;
 
 /// The chain's outcomes, told together.
 pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
@@ -34,54 +22,6 @@ pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
     text
 }
 
-fn outcomes(story: &Story<'_>) -> Vec<Outcome> {
-    let mut found: Vec<Outcome> = Vec::new();
-    for (step, subtask) in story.subtasks.iter().enumerate() {
-        match (subtask.skill, subtask.receptacle) {
-            (SkillKind::Put, Some(place)) => put(story, &mut found, subtask.object, place),
-            (SkillKind::Slice, _) if !uses_slice(story, &story.subtasks[step..], subtask.object) => {
-                found.push(Outcome::Cut(subtask.object));
-            }
-            (SkillKind::Toggle, _) => {
-                let held = story.holds_before(step).then(|| story.subtasks[step - 1].object);
-                found.push(Outcome::Lit { lamp: subtask.object, held });
-            }
-            _ => {}
-        }
-    }
-    // What is still in the hand at the end, unless a lamp was lit to look at it.
-    if let Some(last) = story.subtasks.last()
-        && story.holds_before(story.subtasks.len())
-    {
-        found.push(Outcome::Held(last.object));
-    }
-    found
-}
-
-/// Whether a slice of what was cut appears later.
-fn uses_slice(story: &Story<'_>, later: &[Subtask], whole: u8) -> bool {
-    let class = story.class(whole);
-    later.iter().any(|subtask| story.class(subtask.object) == class && story.is_slice(subtask.object))
-}
-
-fn put(story: &Story<'_>, found: &mut Vec<Outcome>, thing: u8, place: u8) {
-    for outcome in found.iter_mut() {
-        if let Outcome::Placed { things, content, place: at } = outcome {
-            // What it is put into was filled before: the two go together.
-            if *at == thing {
-                (*content, *things, *at) = (things.first().copied(), vec![thing], place);
-                return;
-            }
-            let like = things.first().is_some_and(|&first| story.alike(first, thing));
-            if *at == place && like && content.is_none() {
-                things.push(thing);
-                return;
-            }
-        }
-    }
-    found.push(Outcome::Placed { things: vec![thing], content: None, place });
-}
-
 fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
     let mut slots = Slots::new();
     match outcome {
@@ -95,8 +35,12 @@ fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
             slots.insert("object", object);
             grammar().say(rule, &slots, rng)
         }
-        Outcome::Held(thing) => {
-            slots.insert("object", described(story, *thing, rng));
+        Outcome::Held { thing, content } => {
+            let object = match content {
+                Some(content) => with_content(story, *thing, *content, rng),
+                None => described(story, *thing, rng),
+            };
+            slots.insert("object", object);
             grammar().say("keep", &slots, rng)
         }
         Outcome::Cut(thing) => {

@@ -8,7 +8,9 @@ pub mod embedding_cache;
 pub mod sentence;
 
 pub mod film;
+pub mod frozen;
 pub mod policy;
+pub mod resnet18;
 pub mod shrink;
 pub mod sight_heads;
 pub mod visual;

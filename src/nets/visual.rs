@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use tch::nn::{self, ModuleT};
 use tch::{Device, Kind, Tensor};
 
+use super::frozen::{Folded, FrameEncoder, Norm, stacked};
 use super::shrink::shrink;
+use super::weights;
 use crate::house::view::Frame;
 
 /// The side of a feature map.
@@ -55,6 +57,10 @@ impl Layer {
 
     fn forward(&self, x: &Tensor, train: bool) -> Tensor {
         self.norm.forward_t(&x.apply(&self.conv), train)
+    }
+
+    fn folded(&self, stride: i64) -> Folded {
+        Folded::new(&self.conv.ws, Norm::of(&self.norm).as_ref(), stride)
     }
 }
 
@@ -120,11 +126,72 @@ impl VisualEncoder {
         self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train))
     }
 
+    /// The encoder as it is now, for computing alone.
+    ///
+    /// # Errors
+    /// When the weights cannot be read.
+    pub fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
+        let stage = |stage: &Stage| [stage.down.folded(2), stage.first.folded(1), stage.second.folded(1)];
+        Ok(FrozenVisual {
+            spec: self.spec.clone(),
+            stem: self.stem.folded(2),
+            stages: self.stages.iter().map(stage).collect(),
+            device: self.device,
+            digest: weights::digest(store.variables())?,
+        })
+    }
+
     /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualSpec::image`]), without gradients.
     pub fn encode(&self, images: &[Vec<u8>]) -> Tensor {
         let side = self.spec.input;
         let pixels = Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]);
         tch::no_grad(|| self.forward(&pixels, false))
+    }
+}
+
+/// A trained encoder that only computes, faster than it trains.
+#[derive(Debug)]
+pub struct FrozenVisual {
+    spec: VisualSpec,
+    stem: Folded,
+    stages: Vec<[Folded; 3]>,
+    device: Device,
+    digest: String,
+}
+
+impl FrameEncoder for FrozenVisual {
+    fn image(&self, frame: &Frame) -> Vec<u8> {
+        self.spec.image(frame)
+    }
+
+    fn features(&self) -> i64 {
+        self.spec.features()
+    }
+
+    fn encode(&self, images: &[Vec<u8>]) -> Tensor {
+        tch::no_grad(|| {
+            let pixels = stacked(images).to_device(self.device).to_kind(Kind::Float);
+            let mut x = self.stem.forward_relu(&((pixels - 127.5) / 64.0));
+            for [down, first, second] in &self.stages {
+                x = down.forward_relu(&x);
+                x = (second.forward(&first.forward_relu(&x)) + &x).relu_();
+            }
+            x.contiguous()
+        })
+    }
+
+    fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    fn twin(&self) -> Box<dyn FrameEncoder> {
+        Box::new(FrozenVisual {
+            spec: self.spec.clone(),
+            stem: self.stem.twin(),
+            stages: self.stages.iter().map(|stage| stage.each_ref().map(Folded::twin)).collect(),
+            device: self.device,
+            digest: self.digest.clone(),
+        })
     }
 }
 
@@ -144,5 +211,23 @@ mod tests {
         assert_eq!(maps.size(), [3, 16, SIDE, SIDE]);
         let alone = encoder.encode(&images[1..2]);
         assert!((maps.narrow(0, 1, 1) - alone).abs().max().double_value(&[]) < 1e-5);
+    }
+
+    #[test]
+    fn frozen_it_sees_the_same() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(5);
+        let store = nn::VarStore::new(Device::Cpu);
+        let encoder = VisualEncoder::new(&store.root(), &VisualSpec { input: 112, channels: [4, 8, 8, 16] });
+        let noise = Tensor::randint(255, [4, 3, 112, 112], (Kind::Uint8, Device::Cpu));
+        // Batch norms that are not the identity.
+        for _ in 0..20 {
+            let _ = encoder.forward(&noise, true);
+        }
+        let images: Vec<Vec<u8>> = (0..4).map(|i| Vec::try_from(noise.get(i).flatten(0, -1)).unwrap()).collect();
+        let frozen = encoder.frozen(&store).unwrap().twin();
+        let (slow, fast) = (encoder.encode(&images), frozen.encode(&images));
+        assert!(slow.abs().max().double_value(&[]) > 0.1);
+        assert!((slow - fast).abs().max().double_value(&[]) < 1e-5);
     }
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 use tch::{Kind, Tensor, nn};
 
 /// Tensors by name.
@@ -146,6 +147,21 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Tensors, BTreeMap<String, String>),
         tensors.insert(name.into(), tensor);
     }
     Ok((tensors, metadata))
+}
+
+/// Identifies weights: the first 16 digits of a sha256 over names and numbers, by name.
+///
+/// # Errors
+/// When a tensor cannot be read as 32-bit floats.
+pub fn digest(tensors: impl IntoIterator<Item = (String, Tensor)>) -> anyhow::Result<String> {
+    let tensors: BTreeMap<String, Tensor> = tensors.into_iter().collect();
+    let mut hash = Sha256::new();
+    for (name, tensor) in tensors {
+        hash.update(name.as_bytes());
+        let numbers: Vec<f32> = tensor.detach().to_device(tch::Device::Cpu).flatten(0, -1).try_into()?;
+        numbers.iter().for_each(|number| hash.update(number.to_le_bytes()));
+    }
+    Ok(format!("{:x}", hash.finalize())[..16].to_string())
 }
 
 /// Compares a file's tensors with what a model expects, both ways.

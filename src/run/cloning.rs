@@ -42,9 +42,7 @@ impl Material<'_> {
         let mut bytes = Vec::new();
         let (mut actions, mut objects) = (Vec::new(), Vec::new());
         for item in items {
-            for frame in item.stack(history as u32) {
-                self.features.gather(frame, &mut bytes);
-            }
+            self.features.gather_all(item.stack(history as u32), &mut bytes)?;
             let label = self.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
@@ -177,7 +175,7 @@ mod tests {
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];
         maps.copy_data_u8(&mut bytes, maps.numel());
-        let mut writer = Writer::create(folder.path(), header.clone()).unwrap();
+        let mut writer = Writer::open(folder.path(), header.clone()).unwrap();
         writer.add(&bytes).unwrap();
         writer.finish().unwrap();
         Features::read(folder.path(), &header).unwrap().unwrap()
@@ -185,12 +183,14 @@ mod tests {
 
     fn items() -> Items {
         let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
-        let span = |first: u32| Span { first, start: first, end: first + 6, texts: vec![0, 1] };
+        let span =
+            |text| move |first: u32| Span { trajectory: 0, skills: 0..1, first, start: first, end: first + 6, text };
         Items {
             labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),
             texts: vec!["one".into(), "two".into()],
-            training: (0..4).map(|i| span(6 * i)).collect(),
-            held_out: vec![span(0)],
+            training: (0..8).map(|i| span(i % 2)(i / 2 * 6)).collect(),
+            held_out: vec![span(0)(0), span(1)(0)],
+            firsts: vec![0, FRAMES as u32],
         }
     }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::data::dataset::Dataset;
 use crate::data::items::Label;
 use crate::domain::task::SceneRef;
-use crate::domain::{Scene, Trajectory, World};
+use crate::domain::{Action, Scene, Trajectory, World};
 use crate::house::{generate, rules};
 
 /// The trajectories of datasets with the scenes they play in.
@@ -22,6 +22,8 @@ pub struct Footage {
     pub parts: Vec<Range<usize>>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     firsts: Vec<usize>,
+    /// Trajectories of which the whole must not be trained on as one span.
+    pub held_out: Vec<String>,
 }
 
 impl Footage {
@@ -55,7 +57,8 @@ impl Footage {
         for trajectory in &trajectories {
             firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
         }
-        Ok(Footage { trajectories, scenes, parts, firsts })
+        let held_out = datasets.iter().flat_map(|dataset| dataset.manifest().held_out.clone()).collect();
+        Ok(Footage { trajectories, scenes, parts, firsts, held_out })
     }
 
     /// How many frames there are: each trajectory has one more than it has actions.
@@ -116,22 +119,36 @@ impl Footage {
         Ok((scene, world))
     }
 
-    /// What a learner should do in every frame; nothing in the last of a trajectory.
+    /// What a learner should do in every frame, which is what the expert would do; nothing in the last of a trajectory.
     ///
     /// # Errors
     /// Never for a footage that was opened.
     pub fn labels(&self) -> anyhow::Result<Vec<Option<Label>>> {
+        self.labelled(Trajectory::choice)
+    }
+
+    /// What was done in every frame and led to the next one: other than [`Footage::labels`] where chance disturbed the expert.
+    ///
+    /// # Errors
+    /// Never for a footage that was opened.
+    pub fn taken(&self) -> anyhow::Result<Vec<Option<Label>>> {
+        self.labelled(|trajectory, step| trajectory.actions.get(step).copied())
+    }
+
+    fn labelled(
+        &self,
+        action: impl Fn(&Trajectory, usize) -> Option<Action> + Sync,
+    ) -> anyhow::Result<Vec<Option<Label>>> {
         let of = |trajectory: usize| -> anyhow::Result<Vec<Option<Label>>> {
-            let mut labels = Vec::new();
+            let recorded = &self.trajectories[trajectory];
+            let mut labels = Vec::with_capacity(recorded.actions.len() + 1);
             self.replay(trajectory, |scene, world, step| {
-                labels.push(self.trajectories[trajectory].choice(step).map(|choice| {
-                    let class = choice.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
+                let action = action(recorded, step).filter(|_| step < recorded.actions.len());
+                labels.push(action.map(|action| {
+                    let class = action.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
                     let object = if class.in_vocabulary() { class.index() as u8 } else { 0 };
-                    Label { action: choice.kind.index() as u8, object }
+                    Label { action: action.kind.index() as u8, object }
                 }));
-                if step == self.trajectories[trajectory].actions.len() {
-                    labels[step] = None;
-                }
                 Ok(())
             })?;
             Ok(labels)
@@ -147,4 +164,22 @@ fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
     let mut found = datasets.iter().map(|dataset| dataset.scene(name));
     let first = found.next().context("there is no dataset")?;
     first.or_else(|error| found.find_map(Result::ok).ok_or(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::domain::{Action, ActionType};
+    use crate::run::visual_training::testing::footage;
+
+    #[test]
+    fn what_was_done_and_what_the_expert_would_have_done_are_told_apart() {
+        let mut footage = footage();
+        footage.trajectories[0].choices = vec![Action::navigate(ActionType::MoveAhead); 4];
+        let kinds = |labels: Vec<Option<super::Label>>| -> Vec<Option<usize>> {
+            labels[..5].iter().map(|label| label.map(|label| usize::from(label.action))).collect()
+        };
+        let four = |kind: ActionType| [[Some(kind.index()); 4].as_slice(), &[None]].concat();
+        assert_eq!(kinds(footage.labels().unwrap()), four(ActionType::MoveAhead));
+        assert_eq!(kinds(footage.taken().unwrap()), four(ActionType::RotateLeft));
+    }
 }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
-use sha2::{Digest, Sha256};
 use tch::{Device, Tensor};
 
 use super::cloning::{self, Material};
+use super::encoding;
 use super::footage::Footage;
 use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
@@ -15,8 +15,8 @@ use super::visual_training;
 use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceSpec};
 use crate::agent::learned::SharedEmbedder;
 use crate::data::dataset::Dataset;
-use crate::data::features::{Features, Header};
-use crate::data::items::Items;
+use crate::data::items::{Composites, Items, Selection, Source};
+use crate::data::summaries::Summaries;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -80,10 +80,14 @@ impl Pretraining {
         if let Some(folder) = &self.policy_from {
             copy(&self.given(folder)?.policy_store, "", &networks.policy_store)?;
         }
-        let Some(features) = self.features(&networks, &footage, &digests, &mut report, stop)? else {
+        let encoder = networks.visual.frozen(&networks.visual_store)?;
+        let Some(features) = encoding::features(&encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
-        let items = Items::of(&footage.trajectories, footage.labels()?, self.preset.hold_out);
+        let selection = Selection::of(Composites::Whole);
+        let summaries = Summaries::default();
+        let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
+        let items = Items::of(&source, footage.labels()?, &selection, self.preset.hold_out)?;
         let Some(sentences) = self.embed(&items.texts, &mut report, stop)? else { return Ok(Trained::Stopped) };
         let material = Material { items: &items, features: &features, sentences: &sentences };
         let config = |steps: u64| self.config(&digest, footage.trajectories.len() as u64, steps);
@@ -142,43 +146,6 @@ impl Pretraining {
         Networks::load(folder, &config, self.device)
     }
 
-    /// Every dataset's maps, one after the other; each is computed once and kept in that dataset's cache.
-    fn features(
-        &self,
-        networks: &Networks,
-        footage: &Footage,
-        digests: &[String],
-        report: &mut dyn Report,
-        stop: &AtomicBool,
-    ) -> anyhow::Result<Option<Features>> {
-        let mut all: Option<Features> = None;
-        let encoder = digest(&networks.visual_store)?;
-        for ((folder, trajectories), dataset) in self.data.iter().zip(&footage.parts).zip(digests) {
-            let header = Header {
-                format_version: Header::FORMAT,
-                encoder: encoder.clone(),
-                dataset: dataset.clone(),
-                maps: footage.frames_of(trajectories) as u64,
-                numbers: self.preset.visual.map() as u64,
-            };
-            let cache = folder.join("cache");
-            let mut features = Features::read(&cache, &header)?;
-            if features.is_none() {
-                let visual = &networks.visual;
-                if !visual_training::encode(visual, footage, trajectories.clone(), &cache, &header, report, stop)? {
-                    return Ok(None);
-                }
-                features = Features::read(&cache, &header)?;
-            }
-            let features = features.with_context(|| format!("{} changed meanwhile", cache.display()))?;
-            match &mut all {
-                Some(all) => all.append(features),
-                None => all = Some(features),
-            }
-        }
-        Ok(all)
-    }
-
     fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
         let mut rows = Vec::new();
         let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -233,17 +200,4 @@ fn copy(from: &tch::nn::VarStore, prefix: &str, to: &tch::nn::VarStore) -> anyho
         }
         Ok(())
     })
-}
-
-/// Identifies a store's weights: the first 16 digits of their sha256.
-fn digest(store: &tch::nn::VarStore) -> anyhow::Result<String> {
-    let mut variables: Vec<(String, Tensor)> = store.variables().into_iter().collect();
-    variables.sort_by(|a, b| a.0.cmp(&b.0));
-    let mut hash = Sha256::new();
-    for (name, tensor) in variables {
-        hash.update(name.as_bytes());
-        let numbers: Vec<f32> = tensor.detach().to_device(Device::Cpu).flatten(0, -1).try_into()?;
-        numbers.iter().for_each(|number| hash.update(number.to_le_bytes()));
-    }
-    Ok(format!("{:x}", hash.finalize())[..16].to_string())
 }

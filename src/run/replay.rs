@@ -55,9 +55,9 @@ pub struct Report {
 /// One failure.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Failure {
-    /// `legal`, `goals`, `skills_class` or `skills_strict`.
+    /// `legal`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
     pub what: &'static str,
-    /// The trajectory.
+    /// The trajectory or task.
     pub id: String,
     /// Why.
     pub reason: String,
@@ -132,7 +132,8 @@ pub fn replay(dataset: &Dataset, options: &Options, progress: &(dyn Fn(u64) + Sy
             let set = dataset.tasks(name)?;
             let sources: Vec<&str> = set.tasks.iter().filter_map(|task| Some(&*task.source.as_ref()?.0)).collect();
             let recorded = recorded(dataset, &sources)?;
-            report.task_sets.insert(name.to_owned(), replay_set(&set.tasks, &recorded, &scenes)?);
+            let done = replay_set(&set.tasks, &recorded, &scenes, &mut report.failed)?;
+            report.task_sets.insert(name.to_owned(), done);
         }
     }
     Ok(report)
@@ -194,7 +195,7 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     for (what, grader) in [("skills_class", class), ("skills_strict", strict)] {
         if !grader.is_done() {
             let (at, of) = (grader.completed(), grader.total());
-            replayed.failures.push((what, format!("{at} of {of}; waits for: {}", grader.waits_for(scene, &world))));
+            replayed.failures.push((what, format!("{at} of {of}; {}", grader.waits_for(scene, &world))));
         }
     }
     replayed
@@ -295,6 +296,7 @@ fn replay_set(
     tasks: &[Task],
     recorded: &BTreeMap<String, Trajectory>,
     scenes: &BTreeMap<String, Arc<Scene>>,
+    failed: &mut Vec<Failure>,
 ) -> anyhow::Result<SetReport> {
     let mut report = SetReport { tasks: tasks.len(), ..SetReport::default() };
     for task in tasks {
@@ -314,6 +316,12 @@ fn replay_set(
         }
         report.class += usize::from(graders[0].is_done());
         report.strict += usize::from(graders[1].is_done());
+        for (what, grader) in [("task_class", &graders[0]), ("task_strict", &graders[1])] {
+            if !grader.is_done() {
+                let reason = format!("{id}: {}", grader.waits_for(scene, &world));
+                failed.push(Failure { what, id: task.id.clone(), reason });
+            }
+        }
     }
     Ok(report)
 }
@@ -328,5 +336,79 @@ mod tests {
         assert_eq!(iou(unit, unit), 1.0);
         assert_eq!(iou(unit, [20.0, 0.0, 30.0, 10.0]), 0.0);
         assert!((iou(unit, [5.0, 0.0, 15.0, 10.0]) - 1.0 / 3.0).abs() < 1e-6);
+    }
+
+    /// ALFRED from the shared data, unpacked once under `target/`; `None` where it is absent.
+    fn alfred() -> Option<std::path::PathBuf> {
+        let shared = std::env::var("SPRINT_SHARED").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").into());
+        let archive = std::path::Path::new(&shared).join("alfred/alfred.tar.xz");
+        let target = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/target"));
+        let unpacked = target.join("alfred");
+        if !unpacked.is_dir() && archive.is_file() {
+            std::fs::create_dir_all(target).unwrap();
+            let fresh = tempfile::tempdir_in(target).unwrap();
+            let tar = std::process::Command::new("tar").arg("-xJf").arg(&archive).arg("-C").arg(fresh.path()).status();
+            assert!(tar.unwrap().success(), "tar could not unpack {}", archive.display());
+            // Another test run may have been faster.
+            let _ = std::fs::rename(fresh.path().join("alfred"), &unpacked);
+        }
+        unpacked.is_dir().then_some(unpacked)
+    }
+
+    #[test]
+    fn alfreds_demonstrations_replay_and_its_counts_and_task_sets_come_out() {
+        let Some(source) = alfred() else {
+            eprintln!("skipped: replaying ALFRED needs the shared data");
+            return;
+        };
+        let out = tempfile::tempdir().unwrap();
+        let options = crate::data::alfred::Options::default();
+        let began = std::time::Instant::now();
+        let summary = crate::data::alfred::import(&source, out.path(), &options, &|_| {}).unwrap();
+        assert!(began.elapsed().as_secs() < 60, "the import took {:?}", began.elapsed());
+        assert_eq!(summary.manifest.skipped, []);
+        let train = summary.manifest.counts["train"];
+        assert_eq!((train.trajectories, train.annotated_primitives, train.aligned_primitives), (6574, 73395, 73248));
+        assert_eq!((train.spans, train.spans_after_holdout), (111_339, 110_828));
+        assert_eq!(summary.manifest.counts["valid_seen"].trajectories, 251);
+        assert_eq!(summary.manifest.held_out.len(), 20);
+        let built: Vec<_> = summary.sets.iter().map(|set| set.tasks.as_ref().ok().copied()).collect();
+        assert_eq!(built, [Some(100), Some(20), None]);
+
+        let dataset = Dataset::open(out.path()).unwrap();
+        let set = dataset.tasks("eval_100").unwrap();
+        assert_eq!(set.tasks.iter().filter(|task| task.reworded).count(), 25);
+        let report = replay(&dataset, &Options { split: None, boxes: true }, &|_| {}).unwrap();
+        assert_eq!(report.trajectories, 6825);
+        assert!(report.legal >= 0.999, "{}", report.legal);
+        assert!(report.goals >= 0.995, "{}", report.goals);
+        assert!(report.skills_class >= 0.995, "{}", report.skills_class);
+        assert_eq!(report.task_sets["eval_100"], SetReport { tasks: 100, class: 100, strict: 87 });
+        assert_eq!(report.task_sets["eval_chain"], SetReport { tasks: 20, class: 20, strict: 11 });
+        let boxes = report.boxes.unwrap();
+        assert!(boxes.pickup_median_iou >= 0.78, "{}", boxes.pickup_median_iou);
+        assert!(boxes.put_median_iou >= 0.80, "{}", boxes.put_median_iou);
+    }
+
+    #[test]
+    fn complete_files_with_masks_and_images_say_the_same_as_those_without() {
+        let Some(source) = alfred() else {
+            eprintln!("skipped: complete ALFRED files need the shared data");
+            return;
+        };
+        let mut compared = 0;
+        for task in std::fs::read_dir(source.join("data/json_2.1.0_originals/train")).unwrap() {
+            for trial in std::fs::read_dir(task.unwrap().path()).unwrap() {
+                let complete = trial.unwrap().path().join("traj_data.json");
+                let stripped = source.join("data/json_2.1.0/train");
+                let id = complete.strip_prefix(source.join("data/json_2.1.0_originals/train")).unwrap();
+                let Ok(stripped) = std::fs::read(stripped.join(id)) else { continue };
+                let parse =
+                    |text: &[u8]| crate::data::alfred::import::parse_recording(text, "task/trial", "train").unwrap();
+                assert_eq!(parse(&std::fs::read(&complete).unwrap()), parse(&stripped), "{}", complete.display());
+                compared += 1;
+            }
+        }
+        assert!(compared > 0);
     }
 }

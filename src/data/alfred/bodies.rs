@@ -17,21 +17,38 @@ const ARM_RISE: i32 = 180;
 const BOWL: i32 = 420;
 /// Walls of tubs and cupboards around their contents.
 const WALL: i32 = 30;
+/// What it costs to turn something away from its users, in units of overlap.
+const RETURN: f32 = 0.03;
 /// A cupboard's contents need at least this height.
 const HEADROOM: i32 = 60;
 
-/// Gives a fixture its body, and cuts the surfaces that lie inside it to fit. The fixture comes with surfaces and facing.
+/// Gives a fixture its body, and cuts the surfaces that lie inside it to fit. The fixture comes with surfaces and facing;
+/// seats and toilets, which are used from any side, are turned as they were seen.
 pub fn furnish(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell]) {
+    let turnable = matches!(furniture::of(fixture.class).build, Build::Seat | Build::Toilet);
+    let voted = fixture.facing;
+    let facings = Heading::ALL.into_iter().filter(|&facing| facing == voted || turnable);
+    let fitted = facings.map(|facing| {
+        let mut turned = Fixture { facing, ..fixture.clone() };
+        let cost = furnish_as_turned(&mut turned, found, agent_y, cells);
+        (cost + if facing == voted { 0.0 } else { RETURN }, turned)
+    });
+    if let Some((_, best)) = fitted.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        *fixture = best;
+    }
+}
+
+/// Gives a fixture its body in the direction that it faces; how badly that agrees with its views.
+fn furnish_as_turned(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell]) -> f32 {
     let floor = agent_y - 900;
     let row = furniture::of(fixture.class);
     let first = first_guess(fixture, row, floor);
     let areas = fixture.surfaces.first().map_or(0, |surface| surface.areas.len());
-    if row.build == Build::Block && areas > 1 {
-        // An outline of several parts: each goes down to the floor, and the contents tell more than any view.
-        let top = fixture.surfaces.last().map_or(first.max.y, |surface| surface.height);
+    if matches!(row.build, Build::Block | Build::Slab) && areas > 1 {
+        // An outline of several parts: the contents tell more than any view.
         let surfaces = fixture.surfaces.iter().flat_map(|surface| &surface.areas);
-        fixture.body = surfaces.map(|area| upright(*area, floor, top.max(floor + 10))).collect();
-        return;
+        fixture.body = surfaces.map(|area| upright(*area, first.min.y, first.max.y)).collect();
+        return 0.0;
     }
     let shape = fixture.clone();
     let parts = |outer: Cuboid| parts(outer, &shape, row, floor);
@@ -41,15 +58,16 @@ pub fn furnish(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell
         subject.cells = &[];
     }
     let on_floor = matches!(row.bottom, Height::Floor(_));
-    let top_known = matches!(row.build, Build::Block | Build::Toilet);
+    let top_known = matches!(row.build, Build::Block | Build::Slab | Build::Toilet);
     subject.free = [true, !on_floor, true, true, !top_known, true];
     subject.contents = contents(fixture, row);
-    let outer = subject.fit(first);
+    let (outer, cost) = subject.fit(first);
     fixture.body = parts(outer);
     if matches!(row.build, Build::Tub | Build::Shell | Build::Board) {
         let inset = if row.build == Build::Board { 0 } else { WALL };
         within(&mut fixture.surfaces, &outer, inset);
     }
+    cost
 }
 
 /// The outer box before any view is looked at.
@@ -70,6 +88,7 @@ fn first_guess(fixture: &Fixture, row: &Furniture, floor: i32) -> Cuboid {
             let all = union(&union(&area, &back), &union(&left, &right));
             upright(all, floor, lowest.height.max(floor + 20) + row.body[1] / 2)
         }
+        Build::Slab => upright(area, lowest.height - row.body[1], lowest.height),
         Build::Board => upright(area, lowest.height - BOARD, lowest.height),
         Build::Tub => {
             let outline = area.grown(WALL - MARGIN / 2);
@@ -90,7 +109,7 @@ fn contents(fixture: &Fixture, row: &Furniture) -> Option<Cuboid> {
     let area = outline(fixture);
     match row.build {
         Build::Thing | Build::Board => None,
-        Build::Block | Build::Seat | Build::Toilet => {
+        Build::Block | Build::Slab | Build::Seat | Build::Toilet => {
             let points = area.grown(-MARGIN);
             let points = if points.min[0] <= points.max[0] && points.min[1] <= points.max[1] { points } else { area };
             Some(upright(points, lowest.height, lowest.height))

@@ -75,7 +75,7 @@ impl<'a> Subject<'a> {
         cells: &'a [Cell],
         parts: &'a dyn Fn(Cuboid) -> Vec<Cuboid>,
     ) -> Subject<'a> {
-        if !matches!(build, Build::Block | Build::Seat) {
+        if !matches!(build, Build::Block | Build::Slab | Build::Seat) {
             fixture.surfaces.clear();
         }
         let scene = Scene {
@@ -92,10 +92,10 @@ impl<'a> Subject<'a> {
         Subject { scene, world, views: views(uses), contents: None, cells, free: [true; 6], parts }
     }
 
-    /// The outer box that agrees best with all views, starting from `first`.
-    pub fn fit(&mut self, first: Cuboid) -> Cuboid {
+    /// The outer box that agrees best with all views, starting from `first`, and how badly it still does.
+    pub fn fit(&mut self, first: Cuboid) -> (Cuboid, f32) {
         if self.views.is_empty() {
-            return first;
+            return (first, 0.0);
         }
         let start = sides(first);
         let mut best = start;
@@ -118,7 +118,7 @@ impl<'a> Subject<'a> {
                 }
             }
         }
-        cuboid(best)
+        (cuboid(best), least)
     }
 
     fn cost(&mut self, sides: [i32; 6], start: [i32; 6]) -> f32 {
@@ -142,7 +142,7 @@ impl<'a> Subject<'a> {
 }
 
 /// How badly two boxes agree: 0 when equal; the mean distance of edges keeps a slope where they do not meet.
-fn misfit(a: [f32; 4], b: [f32; 4]) -> f32 {
+pub fn misfit(a: [f32; 4], b: [f32; 4]) -> f32 {
     let area = |[left, top, right, bottom]: [f32; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
     let shared = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
     let union = (area(a) + area(b) - shared).max(1.0);
@@ -230,7 +230,7 @@ mod tests {
             Use { kind: ActionType::Put, pose, bounds: Some(bounds.map(|edge| edge.round() as u16)), open: false }
         });
         let first = Cuboid::between(Point::new(-150, 650, 1000), Point::new(250, 1100, 1250));
-        let found = Subject::new(fixture(first), Build::Thing, &uses, 900, &[], &parts).fit(first);
+        let found = Subject::new(fixture(first), Build::Thing, &uses, 900, &[], &parts).fit(first).0;
         for (a, b) in sides(found).into_iter().zip(sides(truth)) {
             assert!((a - b).abs() <= 60, "{found:?}");
         }

@@ -119,7 +119,8 @@ impl Inventory {
     fn add(&mut self, name: Name, point: Option<Point>) {
         let pivot = point.unwrap_or(name.at);
         let same = |found: &Found| found.name.class == name.class && found.pivot.distance(pivot) < SAME;
-        let number = match self.found.iter().position(same) {
+        let known = self.numbers.get(&name).map(|&number| usize::from(number));
+        let number = match known.or_else(|| self.found.iter().position(same)) {
             Some(number) => {
                 let found = &mut self.found[number];
                 if point.is_some() && !found.exact {

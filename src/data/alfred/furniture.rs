@@ -16,6 +16,8 @@ pub enum Height {
 pub enum Build {
     /// From the floor to the surface: tables, counters, beds.
     Block,
+    /// The top of a counter; what is below is not part of it.
+    Slab,
     /// A block with a back that rises behind it: sofas.
     Seat,
     /// A bowl before a tank that things stand on.
@@ -49,7 +51,7 @@ pub struct Furniture {
     pub behind: i32,
 }
 
-use Build::{Block, Board, Seat, Shell, Thing, Toilet, Tub};
+use Build::{Block, Board, Seat, Shell, Slab, Thing, Toilet, Tub};
 use Height::{Floor, Pivot};
 
 const fn row(
@@ -72,11 +74,11 @@ const TABLE: &[Furniture] = &[
     row("Cart", Block, &[Floor(310), Floor(800)], [570, 440], [640, 800, 450], Floor(0), 0),
     row("CoffeeMachine", Thing, &[Pivot(56)], [100, 100], [300, 400, 300], Pivot(0), 40),
     row("CoffeeTable", Block, &[Floor(450)], [900, 590], [1000, 450, 650], Floor(0), 0),
-    row("CounterTop", Block, &[Pivot(-40)], [1520, 600], [1520, 900, 600], Floor(0), 0),
+    row("CounterTop", Slab, &[Pivot(-40)], [1520, 600], [1520, 50, 600], Pivot(-90), 0),
     row("Desk", Block, &[Floor(790)], [1320, 600], [1320, 790, 600], Floor(0), 0),
     row("DeskLamp", Thing, &[], [0, 0], [230, 420, 160], Pivot(0), 0),
     row("DiningTable", Block, &[Floor(787)], [1210, 720], [1210, 787, 720], Floor(0), 0),
-    row("Drawer", Shell, &[Pivot(-40)], [370, 190], [420, 180, 350], Pivot(-90), 150),
+    row("Drawer", Shell, &[Pivot(-40)], [400, 220], [500, 150, 420], Pivot(-85), 20),
     row("Dresser", Block, &[Floor(850)], [970, 470], [1000, 850, 480], Floor(0), 0),
     row("Faucet", Thing, &[], [0, 0], [200, 280, 80], Pivot(-140), 0),
     row("FloorLamp", Thing, &[], [0, 0], [430, 1540, 390], Floor(0), 0),

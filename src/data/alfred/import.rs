@@ -14,6 +14,7 @@ use super::tasks::{self, OFFICIAL};
 use super::{parents, scenes, trajectories};
 use crate::data::dataset::{Counts, Manifest, Skipped, Writer};
 use crate::domain::{Scene, Trajectory};
+use crate::house::validate;
 
 /// What can be chosen about an import.
 #[derive(Clone, Debug, Default)]
@@ -204,10 +205,19 @@ fn parse(file: &Source) -> Result<Parsed, String> {
     let text = std::fs::read(&file.path).map_err(|error| error.to_string())?;
     // The test splits publish no plan: further states of their scenes.
     if file.split.starts_with("tests") {
-        let data: SceneOnly = serde_json::from_slice(&text).map_err(|error| error.to_string())?;
+        let data: SceneOnly = read_fields(&text)?;
         return Ok(Parsed::Setting(Setting::new(&data.scene)?));
     }
     parse_recording(&text, &file.id, &file.split).map(|recording| Parsed::Recording(Box::new(recording)))
+}
+
+/// Reads JSON; what is wrong begins with the field.
+fn read_fields<T: serde::de::DeserializeOwned>(text: &[u8]) -> Result<T, String> {
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    serde_path_to_error::deserialize(&mut reader).map_err(|error| match error.path().to_string().as_str() {
+        "." => error.inner().to_string(),
+        field => format!("{field}: {}", error.inner()),
+    })
 }
 
 /// Reads and checks one `traj_data.json`.
@@ -215,7 +225,7 @@ fn parse(file: &Source) -> Result<Parsed, String> {
 /// # Errors
 /// What is wrong with it, naming the field.
 pub fn parse_recording(text: &[u8], id: &str, split: &str) -> Result<Recording, String> {
-    let data: TrajData = serde_json::from_slice(text).map_err(|error| error.to_string())?;
+    let data: TrajData = read_fields(text)?;
     Recording::new(id.to_owned(), split.to_owned(), data)
 }
 
@@ -262,7 +272,11 @@ fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&
         reason,
     };
     let Some(room) = settings.first().map(|setting| setting.room) else { return (None, vec![], skipped) };
-    let built = match scenes::build(name, room, &layout, recordings, settings) {
+    let checked = scenes::build(name, room, &layout, recordings, settings).and_then(|built| {
+        let fits = validate::scene(&built.scene).map_err(|misfit| format!("{name} cannot be built of it: {misfit}"));
+        fits.map(|()| built)
+    });
+    let built = match checked {
         Ok(built) => built,
         Err(reason) => {
             skipped.extend(recordings.iter().map(|recording| skip(recording, reason.clone())));
@@ -272,7 +286,12 @@ fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&
     let mut resolved = Vec::new();
     for recording in recordings {
         let parents = parents::parents(recording, &built.inventory, &built.recorded, &built.scene.fixtures);
-        match trajectories::resolve(recording, &built.scene, &built.inventory, &parents) {
+        let trajectory = trajectories::resolve(recording, &built.scene, &built.inventory, &parents);
+        let checked = trajectory.and_then(|trajectory| {
+            let fits = validate::world(&built.scene, &trajectory.start).map_err(|misfit| format!("scene.{misfit}"));
+            fits.map(|()| trajectory)
+        });
+        match checked {
             Ok(trajectory) => resolved.push(trajectory),
             Err(reason) => skipped.push(skip(recording, reason)),
         }
@@ -299,4 +318,213 @@ fn counts(trajectories: &[Trajectory], held_out: &[String]) -> BTreeMap<String, 
         }
     }
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::domain::ActionType;
+    use crate::domain::world::{Instance, Parent};
+
+    /// A recording of our own in ALFRED's format: walk, take the mug from the counter, put it into the sink.
+    fn recording() -> Value {
+        let counter = json!(["CounterTop", [0.4, 0.4, 4.0, 4.0, 3.8, 3.8]]);
+        let sink = json!(["SinkBasin", [2.0, 2.0, 4.1, 4.1, 3.2, 3.2]]);
+        let mug = "Mug|+00.10|+00.95|+00.90";
+        let basin = "Sink|+00.45|+00.82|+01.00|SinkBasin";
+        let low = |high: usize, action: Value, bounds: Value| json!({"high_idx": high, "api_action": action, "discrete_action": {"args": bounds}});
+        let seen = |bounds: [i32; 4]| json!({"bbox": bounds, "mask": [[0, 3]], "point": [1, 1]});
+        json!({
+            "task_id": "trial_1",
+            "task_type": "pick_and_place_simple",
+            "images": [{"low_idx": 0}],
+            "pddl_params": {"object_target": "Mug", "parent_target": "SinkBasin", "mrecep_target": "",
+                "toggle_target": "", "object_sliced": false},
+            "scene": {"floor_plan": "FloorPlan1", "scene_num": 1, "dirty_and_empty": false,
+                "init_action": {"x": -0.25, "y": 0.9, "z": 0.25, "rotation": 90, "horizon": 30},
+                "object_toggles": [],
+                "object_poses": [
+                    {"objectName": "Mug_1", "position": {"x": 0.1, "y": 0.947, "z": 0.9},
+                        "rotation": {"x": 0.0, "y": 359.99, "z": 0.0}},
+                    {"objectName": "Gadget_1", "position": {"x": 0.1, "y": 0.947, "z": 0.9},
+                        "rotation": {"x": 0.0, "y": 0.0, "z": 0.0}}]},
+            "plan": {
+                "high_pddl": [
+                    {"high_idx": 0, "discrete_action": {"action": "GotoLocation", "args": ["countertop"]},
+                        "planner_action": {"action": "GotoLocation", "location": "loc|0|1|0|30"}},
+                    {"high_idx": "1", "discrete_action": {"action": "PickupObject"},
+                        "planner_action": {"objectId": mug, "coordinateReceptacleObjectId": counter}},
+                    {"high_idx": 2, "discrete_action": {"action": "PutObject"},
+                        "planner_action": {"objectId": mug, "receptacleObjectId": basin,
+                            "coordinateReceptacleObjectId": sink}},
+                    {"high_idx": 3, "discrete_action": {"action": "NoOp"}, "planner_action": {"value": 1}}],
+                "low_actions": [
+                    low(0, json!({"action": "MoveAhead"}), json!({})),
+                    low(0, json!({"action": "RotateLeft"}), json!({})),
+                    low(1, json!({"action": "PickupObject", "objectId": mug}), seen([100, 101, 140, 160])),
+                    low(2, json!({"action": "PutObject", "objectId": mug, "receptacleObjectId": basin}),
+                        seen([150, 101, 299, 300]))]},
+            "turk_annotations": {"anns": [{"task_desc": "Put a mug in the sink.",
+                "high_descs": ["Walk.", "Take the mug.", "Put it in the sink."]}]}
+        })
+    }
+
+    /// A checkout with these files in its train split.
+    fn checkout(files: &[(&str, String)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (trial, text) in files {
+            let trial = folder.path().join("data/json_2.1.0/train/task").join(trial);
+            std::fs::create_dir_all(&trial).unwrap();
+            std::fs::write(trial.join("traj_data.json"), text).unwrap();
+        }
+        folder
+    }
+
+    fn import_of(files: &[(&str, String)]) -> (Summary, tempfile::TempDir) {
+        let source = checkout(files);
+        let out = tempfile::tempdir().unwrap();
+        (import(source.path(), out.path(), &Options::default(), &|_| {}).unwrap(), out)
+    }
+
+    #[test]
+    fn a_published_file_with_masks_and_images_becomes_a_scene_and_a_trajectory_that_replays() {
+        let (summary, out) = import_of(&[("trial_1", recording().to_string())]);
+        assert_eq!(summary.manifest.skipped, []);
+        let counts = summary.manifest.counts["train"];
+        assert_eq!((counts.trajectories, counts.annotated_primitives, counts.spans), (1, 2, 1));
+        let dataset = crate::data::Dataset::open(out.path()).unwrap();
+        let scene = dataset.scene("FloorPlan1").unwrap();
+        let trajectory = dataset.trajectories().unwrap().next().unwrap().unwrap();
+        assert_eq!(trajectory.skill_starts, [0, 3]);
+        assert_eq!(trajectory.annotations[0].steps, ["Take the mug.", "Put it in the sink."]);
+        assert_eq!(trajectory.boxes, [[100, 100, 141, 160], [150, 100, 300, 300]]);
+        let counter = scene.fixtures.iter().position(|fixture| fixture.class.name() == "CounterTop").unwrap();
+        let mut world = trajectory.start.clone();
+        assert_eq!(world.objects.len(), 1, "things of unknown classes are left out");
+        assert_eq!(world.objects[0].parent, Parent::In(Instance::Fixture(counter as u16)));
+        for action in trajectory.actions {
+            assert!(crate::house::rules::apply(&scene, &mut world, action).is_done(), "{action:?}");
+        }
+        let sink = scene.fixtures.iter().find(|fixture| fixture.class.name() == "Sink").unwrap();
+        assert_eq!(<[i32; 3]>::from(sink.pivot), [500, 800, 1025], "the basin's own place, not its sink's");
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_used_is_named_with_its_field_and_the_rest_is_imported() {
+        let good = recording();
+        let change = |pointer: &str, value: Value| {
+            let mut data = good.clone();
+            *data.pointer_mut(pointer).unwrap() = value;
+            data.to_string()
+        };
+        let mut without_plan = good.clone();
+        without_plan.as_object_mut().unwrap().remove("plan");
+        let text = good.to_string();
+        let cases = [
+            ("truncated", text[..text.len() / 2].to_owned(), "EOF"),
+            ("without_plan", without_plan.to_string(), "plan"),
+            ("far", change("/scene/object_poses/0/position/x", json!(1e30)), "object_poses[0].position"),
+            ("off_grid", change("/scene/init_action/x", json!(0.1)), "init_action.x"),
+            ("askew", change("/scene/init_action/rotation", json!(33)), "init_action.rotation"),
+            ("plan_number", change("/scene/floor_plan", json!("FloorPlan9000")), "scene.floor_plan"),
+            ("huge", change("/plan/high_pddl/0/high_idx", json!(18_446_744_073_709_551_615_u64)), "high_idx"),
+            (
+                "action",
+                change("/plan/low_actions/0/api_action/action", json!("Fly")),
+                "low_actions[0].api_action.action",
+            ),
+            ("thing", change("/plan/low_actions/2/api_action/objectId", json!("Dragon|1|2|3")), "low_actions[2]"),
+            (
+                "gone",
+                change("/plan/low_actions/2/api_action/objectId", json!("Mug|+01.00|+01.00|+01.00")),
+                "low_actions[2]",
+            ),
+            ("type", change("/task_type", json!("dance")), "task_type"),
+        ];
+        let mut files = vec![("good", text.clone())];
+        files.extend(cases.iter().map(|(name, text, _)| (*name, text.clone())));
+        let (summary, _) = import_of(&files);
+        assert_eq!(summary.manifest.counts["train"].trajectories, 1);
+        assert_eq!(summary.manifest.skipped.len(), cases.len());
+        for (name, _, field) in cases {
+            let file = format!("data/json_2.1.0/train/task/{name}/traj_data.json");
+            let skip = summary.manifest.skipped.iter().find(|skip| skip.file == file).unwrap();
+            assert!(skip.reason.contains(field), "{name}: {}", skip.reason);
+        }
+    }
+
+    #[test]
+    fn what_is_no_checkout_or_holds_nothing_of_use_is_one_clear_error_and_writes_no_dataset() {
+        let out = tempfile::tempdir().unwrap();
+        let empty = tempfile::tempdir().unwrap();
+        let run = |source: &Path| import(source, out.path(), &Options::default(), &|_| {}).unwrap_err().to_string();
+        assert!(run(empty.path()).contains("json_2.1.0"));
+        let broken = checkout(&[("trial_1", "{".to_owned())]);
+        assert!(run(broken.path()).contains("traj_data.json"));
+        assert!(!out.path().join("dataset.json").exists());
+    }
+
+    /// Every value of a document, by pointer.
+    fn pointers(value: &Value, at: &str, all: &mut Vec<String>) {
+        all.push(at.to_owned());
+        match value {
+            Value::Object(map) => map.iter().for_each(|(key, value)| pointers(value, &format!("{at}/{key}"), all)),
+            Value::Array(items) => {
+                items.iter().enumerate().for_each(|(i, value)| pointers(value, &format!("{at}/{i}"), all));
+            }
+            _ => {}
+        }
+    }
+
+    fn oddity() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            Just(Value::Null),
+            any::<i64>().prop_map(|n| json!(n)),
+            any::<f64>().prop_map(|n| json!(n)),
+            (-400i32..400).prop_map(|n| json!(f64::from(n) / 4.0)),
+            "[ -~]{0,12}".prop_map(|text| json!(text)),
+            Just(json!("Mug|+00.10|+00.95|+00.90|MugSliced_255")),
+            Just(json!("Apple|+00.10|+00.95|+00.90|AppleSliced_0")),
+            Just(json!("SliceObject")),
+            Just(json!([])),
+            Just(json!({})),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_mutation_of_a_file_makes_the_importer_panic(
+            changes in prop::collection::vec((any::<prop::sample::Index>(), oddity()), 1..4),
+            cut in prop::option::of(any::<prop::sample::Index>()),
+        ) {
+            let mut data = recording();
+            for (index, value) in changes {
+                let mut all = Vec::new();
+                pointers(&data, "", &mut all);
+                *data.pointer_mut(&all[index.index(all.len())]).unwrap() = value;
+            }
+            let mut text = data.to_string().into_bytes();
+            if let Some(cut) = cut {
+                text.truncate(cut.index(text.len() + 1));
+            }
+            if let Ok(recording) = parse_recording(&text, "task/trial", "train") {
+                let (scene, resolved, _) = build_one(Path::new(""), "FloorPlan1", &[&recording], &[&recording.setting]);
+                for trajectory in resolved {
+                    let scene = scene.as_ref().unwrap();
+                    let mut world = trajectory.start.clone();
+                    for &action in &trajectory.actions {
+                        crate::house::rules::apply(scene, &mut world, action);
+                    }
+                    prop_assert_eq!(validate::world(scene, &world), Ok(()));
+                    prop_assert_eq!(trajectory.boxes.len(), trajectory.actions.iter()
+                        .filter(|action| action.kind >= ActionType::Pickup).count());
+                }
+            }
+        }
+    }
 }

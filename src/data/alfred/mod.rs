@@ -10,6 +10,7 @@ pub mod furniture;
 pub mod import;
 pub mod layout;
 pub mod merge;
+pub mod meshes;
 pub mod names;
 pub mod parents;
 pub mod recording;

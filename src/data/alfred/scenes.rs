@@ -1,10 +1,13 @@
 //! A floor plan put together from everything that is recorded of it.
 
+use super::cover::overlap;
 use super::fixtures::Inventory;
+use super::furniture::{self, Build};
 use super::layout::Layout;
 use super::recording::{Recording, Setting};
 use super::support::{self, Standing};
-use super::{bodies, facing, walls};
+use super::{bodies, facing, meshes, walls};
+use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Cell, Fixture, Room, Scene};
 
 /// A floor plan and what is needed to resolve recordings against it.
@@ -38,10 +41,16 @@ pub fn build(
     let floor = agent_y - 900;
     let recorded = support::recorded(recordings, &inventory);
     let assigned = support::assigned(settings, &recorded);
-    let fixture = |number: usize| {
+    let walked = support::walked(&cells);
+    let fixture = |number: usize, basins: &[Rect]| {
         let found = &inventory.found[number];
         let facing = facing::facing(found, &cells);
-        let surfaces = support::surfaces(&inventory, number as u16, &assigned, &cells, facing, floor);
+        let blocked = match furniture::of(found.name.class).build {
+            Build::Block | Build::Seat => walked.clone(),
+            Build::Slab => [&walked[..], basins].concat(),
+            _ => Vec::new(),
+        };
+        let surfaces = support::surfaces(&inventory, number as u16, &assigned, &blocked, facing, floor);
         let mut fixture = Fixture {
             id: found.name.text(),
             class: found.name.class,
@@ -54,8 +63,19 @@ pub fn build(
         bodies::furnish(&mut fixture, found, agent_y, &cells);
         fixture
     };
-    let fixtures: Vec<Fixture> = (0..inventory.found.len()).map(fixture).collect();
-    let walls = walls::around(&cells, &fixtures, floor);
+    let mut fixtures: Vec<Fixture> = (0..inventory.found.len()).map(|number| fixture(number, &[])).collect();
+    // Basins are let into counters: where they are is known only now.
+    let basins = fixtures.iter().filter(|fixture| matches!(fixture.class.name(), "Sink" | "Bathtub"));
+    let basins: Vec<Rect> = basins.flat_map(|basin| &basin.body).map(Cuboid::footprint).collect();
+    for number in 0..fixtures.len() {
+        let slab = furniture::of(fixtures[number].class).build == Build::Slab;
+        let shared = |basin: &Rect| fixtures[number].body.iter().any(|part| overlap(&part.footprint(), basin));
+        if slab && basins.iter().any(shared) {
+            fixtures[number] = fixture(number, &basins);
+        }
+    }
+    let mut walls = walls::around(&cells, &fixtures, floor);
+    walls.extend(walls::under_counters(&fixtures, floor));
     let scene = Scene {
         format_version: Scene::FORMAT,
         name: name.to_owned(),
@@ -64,7 +84,7 @@ pub fn build(
         cells,
         fixtures,
         walls,
-        meshes: Vec::new(),
+        meshes: meshes::meshes(recordings, agent_y),
     };
     Ok(Built { scene, inventory, recorded })
 }

@@ -1,6 +1,6 @@
 //! Where things stand: what each fixture holds, learned from where recorded objects lay.
 
-use super::cover::{cover, overlap};
+use super::cover::cover;
 use super::fixtures::Inventory;
 use super::furniture;
 use super::recording::{Recording, Setting};
@@ -12,6 +12,8 @@ use crate::domain::{ActionType, Cell, Class, Heading, Point, SkillKind};
 const HEIGHT_WEIGHT: f32 = 4.0;
 /// A neighbour farther than this says nothing, in millimetres.
 const LIMIT: f32 = 500.0;
+/// No fixture holds anything farther from its pivot than this, in millimetres.
+const WIDEST: f32 = 7000.0;
 /// Around the outermost contents.
 pub const MARGIN: i32 = 50;
 /// Half the side of the square around a cell's middle that no furniture fills.
@@ -109,6 +111,9 @@ pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standin
         for (object, holder) in recording.recorded_holders(inventory) {
             if let Holder::Fixture(fixture) = holder {
                 let placed = &recording.setting.objects[usize::from(object)];
+                if inventory.found[usize::from(fixture)].pivot.floor_distance(placed.at) > WIDEST {
+                    continue;
+                }
                 // Small things on a counter would otherwise claim what stands beside them.
                 let limit = match inventory.found[usize::from(fixture)].name.class.name() {
                     "CoffeeMachine" | "ToiletPaperHanger" | "HandTowelHolder" | "TowelHolder" => 100.0,
@@ -147,11 +152,12 @@ pub fn assigned(settings: &[&Setting], recorded: &[Standing]) -> Vec<Standing> {
 }
 
 /// The surfaces of one fixture, lowest first, from the points assigned to it; medians of its class where there are none.
+/// Nothing stands on what is `blocked`.
 pub fn surfaces(
     inventory: &Inventory,
     number: u16,
     assigned: &[Standing],
-    cells: &[Cell],
+    blocked: &[Rect],
     facing: Heading,
     floor: i32,
 ) -> Vec<Surface> {
@@ -168,27 +174,27 @@ pub fn surfaces(
         return row.supports.iter().map(level).collect();
     }
     let outline = extent(&mine);
-    let blocked: Vec<Rect> = match row.build {
-        furniture::Build::Block | furniture::Build::Seat => cells
-            .iter()
-            .map(|cell| Rect { min: [cell.centre(0).x, cell.centre(0).z], max: [cell.centre(0).x, cell.centre(0).z] })
-            .map(|middle| middle.grown(WALKED))
-            .filter(|square| overlap(square, &outline))
-            .collect(),
-        _ => Vec::new(),
-    };
     let storeys = if row.supports.len() > 1 { storeys(&mine) } else { vec![mine.clone()] };
     let level = |points: &Vec<Point>| {
         let flat: Vec<[i32; 2]> = points.iter().map(|p| [p.x, p.z]).collect();
         // A shelf of a closed receptacle is as large as the receptacle; a single point on it says nothing of its size.
         let outline = if points.len() < 8 { outline } else { extent(points) };
-        let mut areas = cover(outline, &flat, &blocked);
+        let mut areas = cover(outline, &flat, blocked);
         if areas.is_empty() {
             areas.push(outline);
         }
         Surface { height: median(points.iter().map(|p| p.y)), areas }
     };
     storeys.iter().map(level).collect()
+}
+
+/// Places that no furniture standing on the floor covers: around the middles of cells.
+pub fn walked(cells: &[Cell]) -> Vec<Rect> {
+    let middle = |cell: &Cell| {
+        let at = cell.centre(0);
+        Rect { min: [at.x, at.z], max: [at.x, at.z] }.grown(WALKED)
+    };
+    cells.iter().map(middle).collect()
 }
 
 /// A rectangle of that width and depth whose middle lies `ahead` of the pivot in the direction of its front.

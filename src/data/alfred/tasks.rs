@@ -208,29 +208,34 @@ pub fn span_task(id: String, trajectory: &Trajectory, scene: &Scene, span: Range
     })
 }
 
-/// The roles that a span is about, renumbered; those that the skills before it handled carry what they are bound to.
+/// The roles that a span and the skills before it are about, renumbered; those that were handled before carry what they are
+/// bound to, so that nothing else is taken for them.
 fn roles(trajectory: &Trajectory, span: Range<usize>, start: &World) -> Result<(Vec<Role>, Vec<Subtask>), String> {
     let used = |skill: &Subtask| std::iter::once(skill.object).chain(skill.receptacle);
-    let before: Vec<u8> = trajectory.skills[..span.start].iter().flat_map(used).collect();
     let mut numbers: Vec<u8> = Vec::new();
-    let mut subtasks = trajectory.skills[span].to_vec();
-    let mut renumber = |old: u8| {
-        let known = numbers.iter().position(|&number| number == old);
-        known.unwrap_or_else(|| {
-            numbers.push(old);
-            numbers.len() - 1
-        }) as u8
-    };
-    for subtask in &mut subtasks {
-        subtask.object = renumber(subtask.object);
-        subtask.receptacle = subtask.receptacle.map(&mut renumber);
+    let mut before = 0;
+    for (number, skill) in trajectory.skills[..span.end].iter().enumerate() {
+        for role in used(skill) {
+            if !numbers.contains(&role) {
+                numbers.push(role);
+            }
+        }
+        if number < span.start {
+            before = numbers.len();
+        }
     }
-    let role = |number: &u8| {
-        let role = trajectory.roles.get(usize::from(*number)).ok_or_else(|| format!("there is no role {number}"))?;
-        let bound = role.expert.filter(|_| before.contains(number)).and_then(|expert| now(expert, start));
+    let new = |old: u8| numbers.iter().position(|&number| number == old).unwrap_or_default() as u8;
+    let mut subtasks = trajectory.skills[span].to_vec();
+    for subtask in &mut subtasks {
+        subtask.object = new(subtask.object);
+        subtask.receptacle = subtask.receptacle.map(new);
+    }
+    let role = |(place, &number): (usize, &u8)| {
+        let role = trajectory.roles.get(usize::from(number)).ok_or_else(|| format!("there is no role {number}"))?;
+        let bound = role.expert.filter(|_| place < before).and_then(|expert| now(expert, start));
         Ok(Role { bound, ..role.clone() })
     };
-    let roles = numbers.iter().map(role).collect::<Result<_, String>>()?;
+    let roles = numbers.iter().enumerate().map(role).collect::<Result<_, String>>()?;
     Ok((roles, subtasks))
 }
 

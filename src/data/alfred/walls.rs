@@ -1,4 +1,4 @@
-//! Walls: not in the data. Around everything that is known, so that a room looks closed.
+//! Walls and what carries counters: not in the data. Made so that a room looks closed.
 
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Cell, Fixture, Point};
@@ -37,6 +37,70 @@ pub fn around(cells: &[Cell], fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
         wall([outer.min[0], inner.min[1]], [inner.min[0], inner.max[1]]),
         wall([inner.max[0], inner.min[1]], [outer.max[0], inner.max[1]]),
     ]
+}
+
+/// How far what carries a counter stands back from its edge, in millimetres.
+const SET_BACK: i32 = 25;
+/// What is built in is free to its front for this far.
+const FRONT: i32 = 400;
+/// Pieces thinner than this are left out.
+const SLIVER: i32 = 15;
+
+/// What carries the counters: boxes from the floor to each slab, with room left for everything that stands or is built in
+/// below.
+pub fn under_counters(fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
+    let mut all = Vec::new();
+    for (number, counter) in fixtures.iter().enumerate().filter(|(_, fixture)| fixture.class.name() == "CounterTop") {
+        let below = |slab: &Cuboid| {
+            let ground = slab.footprint().grown(-SET_BACK);
+            let min = Point::new(ground.min[0], floor, ground.min[1]);
+            Cuboid { min, max: Point::new(ground.max[0], slab.min.y, ground.max[1]) }
+        };
+        let mut pieces: Vec<Cuboid> = counter.body.iter().map(below).filter(|piece| thick(piece)).collect();
+        for (_, other) in fixtures.iter().enumerate().filter(|(other, _)| *other != number) {
+            let (dx, dz) = other.facing.step();
+            for part in &other.body {
+                let mut hole = *part;
+                let (x, z) = (i32::from(dx) * FRONT, i32::from(dz) * FRONT);
+                hole.min = Point::new(hole.min.x + x.min(0), hole.min.y, hole.min.z + z.min(0));
+                hole.max = Point::new(hole.max.x + x.max(0), hole.max.y, hole.max.z + z.max(0));
+                pieces = pieces.into_iter().flat_map(|piece| without(piece, &hole)).collect();
+            }
+        }
+        all.extend(pieces);
+    }
+    all
+}
+
+fn thick(piece: &Cuboid) -> bool {
+    let (min, max): ([i32; 3], [i32; 3]) = (piece.min.into(), piece.max.into());
+    (0..3).all(|axis| max[axis] - min[axis] >= SLIVER)
+}
+
+/// What is left of a box when another is cut out.
+fn without(piece: Cuboid, hole: &Cuboid) -> Vec<Cuboid> {
+    let (mut min, mut max): ([i32; 3], [i32; 3]) = (piece.min.into(), piece.max.into());
+    let (low, high): ([i32; 3], [i32; 3]) = (hole.min.into(), hole.max.into());
+    if (0..3).any(|axis| high[axis] <= min[axis] || max[axis] <= low[axis]) {
+        return vec![piece];
+    }
+    let mut left = Vec::new();
+    for axis in [0, 2, 1] {
+        if low[axis] > min[axis] {
+            let mut end = max;
+            end[axis] = low[axis];
+            left.push(Cuboid { min: min.into(), max: end.into() });
+            min[axis] = low[axis];
+        }
+        if high[axis] < max[axis] {
+            let mut start = min;
+            start[axis] = high[axis];
+            left.push(Cuboid { min: start.into(), max: max.into() });
+            max[axis] = high[axis];
+        }
+    }
+    left.retain(thick);
+    left
 }
 
 #[cfg(test)]

@@ -167,14 +167,15 @@ mod tests {
     #[test]
     fn heating_follows_alfreds_order_of_interactions() {
         let roles = [role("Tomato")];
-        let done = solve(&mut kitchen_house(), &roles, &[subtask(SkillKind::Pickup, 0), subtask(SkillKind::Heat, 0)]);
+        let done =
+            solve(&mut kitchen_house(), &roles, &[subtask(SkillKind::Pickup, 0), closing(subtask(SkillKind::Heat, 0))]);
         assert_eq!(interactions(&done), [Pickup, Open, Put, Close, ToggleOn, ToggleOff, Open, Pickup, Close]);
     }
 
     #[test]
     fn cooling_and_rinsing_follow_alfreds_order_of_interactions() {
         let roles = [role("Mug")];
-        let cool = [subtask(SkillKind::Pickup, 0), subtask(SkillKind::Cool, 0)];
+        let cool = [subtask(SkillKind::Pickup, 0), closing(subtask(SkillKind::Cool, 0))];
         let done = solve(&mut kitchen_house(), &roles, &cool);
         assert_eq!(interactions(&done), [Pickup, Open, Put, Close, Open, Pickup, Close]);
         let rinse = [subtask(SkillKind::Pickup, 0), subtask(SkillKind::Clean, 0)];
@@ -211,7 +212,7 @@ mod tests {
         let Instance::Fixture(oven) = named(house.scene(), &world, "Microwave") else { panic!("no microwave") };
         world.fixtures[usize::from(oven)].on = true;
         house.restore(world);
-        let done = solve(&mut house, &[role("Tomato")], &[subtask(SkillKind::Heat, 0)]);
+        let done = solve(&mut house, &[role("Tomato")], &[closing(subtask(SkillKind::Heat, 0))]);
         assert_eq!(
             interactions(&done),
             [Pickup, ToggleOff, Open, Put, Close, ToggleOn, ToggleOff, Open, Pickup, Close]
@@ -226,7 +227,7 @@ mod tests {
             subtask(SkillKind::Clean, 0),
             closing(put_subtask(0, 1)),
             subtask(SkillKind::Toggle, 2),
-            subtask(SkillKind::Heat, 3),
+            closing(subtask(SkillKind::Heat, 3)),
         ];
         for seed in 0..10 {
             let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
@@ -257,8 +258,12 @@ mod tests {
     fn every_interaction_is_the_one_that_its_class_would_choose() {
         let mut house = kitchen_house();
         let roles = [role("Apple"), role("Fridge")];
-        let mut grader =
-            Grader::new(Grading::Class, &roles, &[subtask(SkillKind::Heat, 0), closing(put_subtask(0, 1))], None);
+        let mut grader = Grader::new(
+            Grading::Class,
+            &roles,
+            &[closing(subtask(SkillKind::Heat, 0)), closing(put_subtask(0, 1))],
+            None,
+        );
         let mut expert = Expert::new();
         while !grader.is_done() {
             let action = expert.next(&mut house, &grader).unwrap();

@@ -27,6 +27,13 @@ struct Taken {
     high: i32,
 }
 
+/// The room that is left for objects.
+struct Space {
+    /// The height above which nothing may reach, for each fixture and each of its surfaces.
+    ceilings: Vec<Vec<i32>>,
+    taken: Vec<Taken>,
+}
+
 /// Makes the room's objects; adds their shapes to the scene.
 pub fn fill(plan: &RoomPlan, floor: &Floor, scene: &mut Scene, rng: &mut ChaCha8Rng) -> Vec<Object> {
     let mut wanted: Vec<Class> = Vec::new();
@@ -39,14 +46,18 @@ pub fn fill(plan: &RoomPlan, floor: &Floor, scene: &mut Scene, rng: &mut ChaCha8
     }
     // Large things first: they find no room later.
     wanted.sort_by_key(|class| std::cmp::Reverse(class.info().size[0] * class.info().size[2]));
-    let mut taken = Vec::new();
+    let levels = |holder: usize| 0..scene.fixtures[holder].surfaces.len();
+    let ceilings = (0..scene.fixtures.len())
+        .map(|holder| levels(holder).map(|level| ceiling(scene, holder, level)).collect())
+        .collect();
+    let mut space = Space { ceilings, taken: Vec::new() };
     let mut objects = Vec::new();
     for class in wanted {
         let mesh = mesh(scene, class, rng);
         let object = Object { class, mesh: Some(mesh), open: class.info().openable, ..Object::default() };
         let placed = match stays_on_floor(class) {
-            true => on_floor(floor, scene, &mut taken, object, rng),
-            false => in_receptacle(scene, &mut taken, object, rng),
+            true => on_floor(floor, scene, &mut space, object, rng),
+            false => in_receptacle(scene, &mut space, object, rng),
         };
         objects.extend(placed);
     }
@@ -109,7 +120,7 @@ fn weight(receptacle: Class, content: Class) -> u32 {
 }
 
 /// Puts an object into a receptacle that people would put it into.
-fn in_receptacle(scene: &Scene, taken: &mut Vec<Taken>, object: Object, rng: &mut ChaCha8Rng) -> Option<Object> {
+fn in_receptacle(scene: &Scene, space: &mut Space, object: Object, rng: &mut ChaCha8Rng) -> Option<Object> {
     let holders: Vec<(usize, u32)> = scene
         .fixtures
         .iter()
@@ -130,7 +141,7 @@ fn in_receptacle(scene: &Scene, taken: &mut Vec<Taken>, object: Object, rng: &mu
             here
         });
         let Some(&(holder, _)) = drawn else { continue };
-        if let Some(placed) = lay(scene, taken, &object, holder, rng) {
+        if let Some(placed) = lay(scene, space, &object, holder, rng) {
             return Some(placed);
         }
     }
@@ -138,7 +149,7 @@ fn in_receptacle(scene: &Scene, taken: &mut Vec<Taken>, object: Object, rng: &mu
 }
 
 /// Lays an object on a random free spot of one of a fixture's surfaces.
-fn lay(scene: &Scene, taken: &mut Vec<Taken>, object: &Object, holder: usize, rng: &mut ChaCha8Rng) -> Option<Object> {
+fn lay(scene: &Scene, space: &mut Space, object: &Object, holder: usize, rng: &mut ChaCha8Rng) -> Option<Object> {
     let fixture = &scene.fixtures[holder];
     let level = rng.random_range(0..fixture.surfaces.len() as u32) as usize;
     let surface = &fixture.surfaces[level];
@@ -159,20 +170,20 @@ fn lay(scene: &Scene, taken: &mut Vec<Taken>, object: &Object, holder: usize, rn
     let (_, size, offset) = scene.shape_of(&object);
     let ground = outline(scene, &object, at);
     let (low, high) = (at.y + offset[1] - size[1] / 2, at.y + offset[1] + size[1] / 2);
-    let ceiling = ceiling(scene, holder, level);
+    let ceiling = space.ceilings[holder][level];
     let edge = if is_open(fixture.class) { 90 } else { 60 };
     let stays = high < ceiling && covers(&area.grown(edge), &ground) || fixture.class.name().ends_with("Holder");
     // A spot to hang or to stand a single thing on is as large as a point.
     let is_point = area.min == area.max;
-    let blocked = taken.iter().any(|other| {
+    let blocked = space.taken.iter().any(|other| {
         overlap(&ground.grown(GAP), &other.ground) && low < other.high && other.low < high
             || is_point && other.holder == Some(holder)
     });
-    let near = scene.cells.iter().any(|cell| cell.centre(at.y).floor_distance(at) <= ARM);
-    if blocked || !near || !(stays || is_point && high < ceiling) {
+    let near = || scene.cells.iter().any(|cell| cell.centre(at.y).floor_distance(at) <= ARM);
+    if blocked || !(stays || is_point && high < ceiling) || !near() {
         return None;
     }
-    taken.push(Taken { holder: Some(holder), ground, low, high });
+    space.taken.push(Taken { holder: Some(holder), ground, low, high });
     Some(object)
 }
 
@@ -199,13 +210,7 @@ fn ceiling(scene: &Scene, holder: usize, level: usize) -> i32 {
 }
 
 /// Stands an object on the floor, by the wall where nobody walks.
-fn on_floor(
-    floor: &Floor,
-    scene: &Scene,
-    taken: &mut Vec<Taken>,
-    object: Object,
-    rng: &mut ChaCha8Rng,
-) -> Option<Object> {
+fn on_floor(floor: &Floor, scene: &Scene, space: &mut Space, object: Object, rng: &mut ChaCha8Rng) -> Option<Object> {
     for _ in 0..TRIES {
         let wall = floor.walls[rng.random_range(0..floor.walls.len() as u32) as usize];
         let turn = [0, (wall.site.facing.quarters() * 900 + 900 * rng.random_range(0..2)) as i16, 0];
@@ -226,14 +231,15 @@ fn on_floor(
             ground.grown(90).contains(centre.x, centre.z)
         });
         let near = floor.cells().iter().any(|cell| cell.centre(at.y).floor_distance(at) < 900.0);
-        let blocked = taken.iter().any(|other| overlap(&ground, &other.ground) && low < other.high && other.low < high);
+        let blocked =
+            space.taken.iter().any(|other| overlap(&ground, &other.ground) && low < other.high && other.low < high);
         let hung = scene
             .fixtures
             .iter()
             .flat_map(|fixture| &fixture.body)
             .any(|body| overlap(&ground, &body.footprint()) && body.min.y < high + 300);
         if floor.is_free(&ground) && near && !walked && !blocked && !hung {
-            taken.push(Taken { holder: None, ground, low, high });
+            space.taken.push(Taken { holder: None, ground, low, high });
             return Some(Object { at, ..object });
         }
     }

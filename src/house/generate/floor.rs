@@ -68,16 +68,8 @@ impl Floor {
             }
             notch
         });
-        let mut floor = Floor {
-            walls: walls(&bounds, notch.as_ref()),
-            bounds,
-            notch,
-            solids: vec![],
-            aprons: vec![],
-            cells: vec![],
-        };
-        floor.cells = floor.open_cells(&[]);
-        floor
+        let cells = open_cells(&bounds, notch.as_ref());
+        Floor { walls: walls(&bounds, notch.as_ref()), bounds, notch, solids: vec![], aprons: vec![], cells }
     }
 
     /// The cells where somebody can stand, sorted; all connected.
@@ -136,7 +128,7 @@ impl Floor {
         if fronts.iter().any(|front| self.solids.iter().any(|solid| overlap(front, solid))) {
             return false;
         }
-        let cells = self.open_cells(&[*footprint]);
+        let cells = largest(self.cells.clone(), footprint);
         if cells.len() * 2 < self.cells.len() || !self.aprons.iter().chain(fronts).all(|front| stands(&cells, front)) {
             return false;
         }
@@ -145,32 +137,38 @@ impl Floor {
         self.aprons.extend_from_slice(fronts);
         true
     }
+}
 
-    /// The largest connected set of cells that are clear of walls and furniture.
-    fn open_cells(&self, more: &[Rect]) -> Vec<Cell> {
-        let low = |v: i32| ((v + CLEARANCE) as f32 / Cell::SIDE as f32).ceil() as i16;
-        let high = |v: i32| ((v - CLEARANCE) as f32 / Cell::SIDE as f32).floor() as i16;
-        let (x0, x1) = (low(self.bounds.min[0]), high(self.bounds.max[0]));
-        let (z0, z1) = (low(self.bounds.min[1]), high(self.bounds.max[1]));
-        let blocked: Vec<Rect> =
-            self.solids.iter().chain(more).chain(&self.notch).map(|solid| solid.grown(CLEARANCE - 1)).collect();
-        let mut open: Vec<Cell> = (x0..=x1)
-            .flat_map(|x| (z0..=z1).map(move |z| Cell::new(x, z)))
-            .filter(|cell| {
-                let centre = cell.centre(0);
-                !blocked.iter().any(|rect| rect.contains(centre.x, centre.z))
-            })
-            .collect();
-        let mut largest = Vec::new();
-        while let Some(&start) = open.first() {
-            let component = flood(&open, start);
-            open.retain(|cell| component.binary_search(cell).is_err());
-            if component.len() > largest.len() {
-                largest = component;
-            }
+/// The cells of an empty room, sorted.
+fn open_cells(bounds: &Rect, notch: Option<&Rect>) -> Vec<Cell> {
+    let low = |v: i32| ((v + CLEARANCE) as f32 / Cell::SIDE as f32).ceil() as i16;
+    let high = |v: i32| ((v - CLEARANCE) as f32 / Cell::SIDE as f32).floor() as i16;
+    let [xs, zs] = [0, 1].map(|axis| low(bounds.min[axis])..=high(bounds.max[axis]));
+    let all = xs.flat_map(|x| zs.clone().map(move |z| Cell::new(x, z)));
+    all.filter(|cell| notch.is_none_or(|notch| is_clear(*cell, notch))).collect()
+}
+
+/// Whether a cell is clear of something that stands there.
+fn is_clear(cell: Cell, solid: &Rect) -> bool {
+    let centre = cell.centre(0);
+    !solid.grown(CLEARANCE - 1).contains(centre.x, centre.z)
+}
+
+/// The largest connected set of the cells that are clear of a new piece, sorted.
+fn largest(mut open: Vec<Cell>, piece: &Rect) -> Vec<Cell> {
+    open.retain(|&cell| is_clear(cell, piece));
+    let mut largest = Vec::new();
+    while let Some(&start) = open.first().filter(|_| open.len() > largest.len()) {
+        let component = flood(&open, start);
+        if component.len() == open.len() && largest.is_empty() {
+            return open;
         }
-        largest
+        open.retain(|cell| component.binary_search(cell).is_err());
+        if component.len() > largest.len() {
+            largest = component;
+        }
     }
+    largest
 }
 
 /// Whether somebody can stand in a strip of floor, or at its very edge.

@@ -89,9 +89,10 @@ mod tests {
     use crate::domain::class::Class;
     use crate::domain::place::Rect;
     use crate::domain::world::{Instance, Parent};
-    use crate::domain::{Cell, Object, Point};
+    use crate::domain::{Action, ActionType, Cell, Object, Point};
     use crate::house::placing::outline;
-    use crate::house::view::{REACH, distance};
+    use crate::house::render::Renderer;
+    use crate::house::view::{REACH, View, distance, reachable};
 
     fn houses(count: u64) -> impl Iterator<Item = (Scene, World)> {
         (0..count).flat_map(|seed| Room::ALL.map(|room| house(room, seed)))
@@ -168,6 +169,56 @@ mod tests {
                 assert!(scene.cells.iter().any(near), "{name} is out of reach");
             }
         }
+    }
+
+    /// Whether something is seen and in reach from some cell.
+    fn is_usable(scene: &Scene, world: &World, instance: Instance, renderer: &mut Renderer) -> bool {
+        let mut world = world.clone();
+        let target = world.position(scene, instance).unwrap();
+        let mut cells = scene.cells.clone();
+        cells.sort_by_key(|cell| (cell.centre(0).floor_distance(target) - 750.0).abs() as i32);
+        let headings = |cell: Cell| {
+            let (dx, dz) = (target.x - cell.centre(0).x, target.z - cell.centre(0).z);
+            let mut headings = Heading::ALL;
+            headings.sort_by_key(|heading| -i32::from(heading.step().0) * dx - i32::from(heading.step().1) * dz);
+            headings
+        };
+        cells.truncate(24);
+        cells.into_iter().any(|cell| {
+            headings(cell)[..2].iter().any(|&heading| {
+                (Pose::UP / 15..=Pose::DOWN / 15).any(|look| {
+                    world.agent = Pose { cell, heading, horizon: 15 * look };
+                    reachable(scene, &world, &View::of(renderer.draw(scene, &world)), instance).is_ok()
+                })
+            })
+        })
+    }
+
+    #[test]
+    fn everything_that_an_action_can_name_is_seen_and_reached_from_somewhere() {
+        let mut renderer = Renderer::new(150);
+        let mut unseen = Vec::new();
+        let mut count = 0;
+        for (scene, world) in houses(3) {
+            for index in 0..scene.fixtures.len() as u16 {
+                if scene.fixtures[usize::from(index)].class.in_vocabulary() {
+                    let usable = is_usable(&scene, &world, Instance::Fixture(index), &mut renderer);
+                    assert!(usable, "{} {}", scene.name, scene.fixtures[usize::from(index)].id);
+                }
+            }
+            for (index, object) in (0u16..).zip(&world.objects).filter(|(_, object)| object.class.in_vocabulary()) {
+                let mut world = world.clone();
+                for holder in world.clone().containers_of(Instance::Object(index)) {
+                    crate::house::rules::apply(&scene, &mut world, Action::interact(ActionType::Open, holder));
+                }
+                count += 1;
+                if !is_usable(&scene, &world, Instance::Object(index), &mut renderer) {
+                    unseen.push(format!("{} {} {:?} {:?}", scene.name, object.class, object.at, object.parent));
+                }
+            }
+        }
+        // A thing may lie behind a larger one.
+        assert!(unseen.len() * 50 <= count, "{} of {count}: {unseen:#?}", unseen.len());
     }
 
     #[test]

@@ -52,7 +52,11 @@ pub(super) fn grade(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> V
         SkillKind::Slice => slice(grader, subtask, step),
         SkillKind::Toggle => toggle(grader, subtask, step),
         SkillKind::Clean if step.did(ActionType::Pickup) => holds_changed(grader, subtask, step),
-        SkillKind::Heat | SkillKind::Cool if step.did(ActionType::Close) => holds_changed(grader, subtask, step),
+        SkillKind::Heat | SkillKind::Cool
+            if step.did(ActionType::Close) || !subtask.closes && step.did(ActionType::Pickup) =>
+        {
+            holds_changed(grader, subtask, step)
+        }
         SkillKind::Clean | SkillKind::Heat | SkillKind::Cool => Verdict::Unchanged,
     }
 }
@@ -168,7 +172,7 @@ fn holds_changed(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verd
     let changed = match subtask.skill {
         SkillKind::Clean => object.clean,
         SkillKind::Heat => object.hot,
-        _ => object.cold && !a_fridge_is_open(step),
+        _ => object.cold && !(subtask.closes && a_fridge_is_open(step)),
     };
     if !changed {
         return Verdict::Unchanged;

@@ -379,7 +379,7 @@ mod tests {
 
     #[test]
     fn heating_is_complete_with_the_close_and_the_hot_thing_in_the_hand() {
-        let mut grader = by_class(&[role("Tomato")], &[subtask(SkillKind::Heat, 0)]);
+        let mut grader = by_class(&[role("Tomato")], &[closing(subtask(SkillKind::Heat, 0))]);
         let script = [
             (Pickup, "Tomato"),
             (Open, "Microwave"),

@@ -59,6 +59,10 @@ fn remaining(grader: &Grader, subtask: &Subtask, scene: &Scene, world: &World) -
     let object = thing(&grader.roles, subtask.object);
     let held = world.held.is_some_and(|held| grader.fits(scene, world, subtask.object, Instance::Object(held)));
     let state = world.held.filter(|_| held).and_then(|index| world.object(index));
+    let machine = |machine: &str, changed: String| {
+        let last = closes.then(|| format!("the {machine} closed"));
+        [changed, "in the hand again".into()].into_iter().chain(last).collect()
+    };
     let mut steps = match subtask.skill {
         SkillKind::Pickup => vec![format!("{object} in the hand")],
         SkillKind::Put => vec![format!("{object} {}", place(&grader.roles, subtask.receptacle))],
@@ -67,11 +71,7 @@ fn remaining(grader: &Grader, subtask: &Subtask, scene: &Scene, world: &World) -
         SkillKind::Clean => vec![format!("{object} under the running faucet"), "in the hand again".into()],
         SkillKind::Heat => match state {
             Some(object) if object.hot => vec!["the microwave closed".into()],
-            _ => vec![
-                format!("{object} in the closed microwave while it runs"),
-                "in the hand again".into(),
-                "the microwave closed".into(),
-            ],
+            _ => machine("microwave", format!("{object} in the closed microwave while it runs")),
         },
         SkillKind::Cool => match state {
             Some(object) if object.cold => vec!["the fridge closed".into()],

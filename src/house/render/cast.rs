@@ -7,7 +7,7 @@ use super::objects;
 use super::solid::Solid;
 use crate::domain::place::Cuboid;
 use crate::domain::scene::{Fixture, Mesh, Scene};
-use crate::domain::world::{FixtureState, Object, World};
+use crate::domain::world::{FixtureState, Instance, Object, Parent, World};
 use crate::domain::{Point, Room};
 use crate::house::bounds::Extent;
 
@@ -23,20 +23,16 @@ pub struct Figure {
     pub centre: Vec3,
     /// Its radius.
     pub radius: f32,
-    /// How high the bodies are together.
-    height: f32,
+    /// How far it comes forward where it meets others, in metres.
+    pub forward: f32,
 }
 
 impl Figure {
-    /// How far it comes forward where it meets others. Measured heights of supports and of flat things are off by some
-    /// millimetres, which would bury a key in a table top.
-    pub fn forward(&self) -> f32 {
+    /// Measured heights of supports and of flat things are off by some millimetres, which would bury a key in a table top:
+    /// flat figures come forward a little.
+    fn of(solids: Vec<Solid>) -> Figure {
         const FLAT: f32 = 0.06;
         const FORWARD: f32 = 0.025;
-        if self.height < FLAT { FORWARD } else { 0.0 }
-    }
-
-    fn of(solids: Vec<Solid>) -> Figure {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for solid in &solids {
             // How far a body of these axes reaches along x, y and z at most.
@@ -47,7 +43,12 @@ impl Figure {
         if solids.is_empty() {
             return Figure::default();
         }
-        Figure { solids, centre: (low + high) / 2.0, radius: (high - low).length() / 2.0, height: high.y - low.y }
+        Figure {
+            solids,
+            centre: (low + high) / 2.0,
+            radius: (high - low).length() / 2.0,
+            forward: if high.y - low.y < FLAT { FORWARD } else { 0.0 },
+        }
     }
 }
 
@@ -139,9 +140,32 @@ impl Cast {
                 Some(known) => known.clone_from(object),
                 None => self.objects.push(object.clone()),
             }
-            self.things[index] = Figure::of(objects::build(scene, index as u16, object));
+            let mut figure = Figure::of(objects::build(scene, index as u16, object));
+            figure.forward = figure.forward.max(buried(scene, object));
+            self.things[index] = figure;
         }
     }
+}
+
+/// How far a thing must come forward because furniture that does not hold it fills the space around its middle, in metres.
+/// Boxes that stand for recorded furniture overlap here and there; what lies on one must not vanish in another.
+fn buried(scene: &Scene, object: &Object) -> f32 {
+    /// How far sight comes from, per height that it has to pass.
+    const SLANT: f32 = 1.5;
+    let at = Extent::of_object(scene, object).centre;
+    let around = |part: &&Cuboid| {
+        let (min, max) = (part.min.metres(), part.max.metres());
+        at.cmpgt(min).all() && at.cmplt(max).all()
+    };
+    let holder = match object.parent {
+        Parent::In(Instance::Fixture(index)) => usize::from(index),
+        Parent::Floor => usize::MAX,
+        // What holds the holder is not known here.
+        Parent::In(Instance::Object(_)) | Parent::Hand => return 0.0,
+    };
+    let others = scene.fixtures.iter().enumerate().filter(|(index, _)| *index != holder);
+    let parts = others.flat_map(|(_, other)| &other.body).filter(around);
+    parts.map(|part| (part.max.metres().y - at.y) * SLANT).fold(0.0, f32::max).min(0.5)
 }
 
 fn walls(scene: &Scene) -> Vec<Solid> {

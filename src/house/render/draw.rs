@@ -8,7 +8,7 @@ use crate::house::bounds;
 use crate::house::camera::Camera;
 
 /// Tones of a round body's shading.
-const TONES: u16 = 12;
+const TONES: u16 = 20;
 /// The most corners of a face: a lathe's ring.
 const MOST_SIDES: usize = 20;
 
@@ -54,7 +54,7 @@ impl<'a> Brush<'a> {
     /// From here on, bodies around `centre` come forward by so many metres where they meet others; their outlines stay.
     pub fn bring_forward(&mut self, centre: Vec3, metres: f32) {
         let depth = self.camera.local(centre).z.max(0.3);
-        self.forward = depth / (depth - metres);
+        self.forward = depth / (depth - metres.min(0.7 * depth));
     }
 
     /// Draws a body as part of instance `id`.

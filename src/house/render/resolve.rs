@@ -1,7 +1,9 @@
 //! From the visibility buffer to the frame: the floor and ceiling behind everything, then colours, depths and instances.
 
+use glam::Vec4;
+
 use super::draw::{dimming, pack};
-use super::raster::{BLOCK, Material, Raster};
+use super::raster::{GROUP, Material, Raster, mark, unmark};
 use super::solid::Colour;
 use crate::domain::Room;
 use crate::house::camera::Camera;
@@ -41,53 +43,49 @@ pub fn backdrop(raster: &mut Raster, camera: &Camera, room: Room, floor: f32, ce
         let depth = plane.map(|height| (height - eye.y) / ray.y).filter(|depth| *depth > 0.0 && *depth < 60.0);
         let Some(depth) = depth else {
             let (near, shows) = raster.row_mut(row);
-            near.fill(0.0);
-            shows.fill(sky);
+            near.fill(Vec4::ZERO);
+            shows.fill(Vec4::splat(mark(sky)));
             continue;
         };
         let shade = dimming(depth);
-        if ray.y >= 0.0 {
-            let material = raster.material(Material { rgb: pack([0.93, 0.92, 0.88], shade), id: 0 });
-            let (near, shows) = raster.row_mut(row);
-            near.fill(1.0 / depth);
-            shows.fill(material);
-            continue;
-        }
-        let pair = ground.colours.map(|colour| raster.material(Material { rgb: pack(colour, shade), id: 0 }));
-        let mixed = std::array::from_fn(|i| (ground.colours[0][i] + ground.colours[1][i]) / 2.0);
-        let blend = raster.material(Material { rgb: pack(mixed, shade), id: 0 });
-        let (near, shows) = raster.row_mut(row);
-        near.fill(1.0 / depth);
+        // Tiles narrower than some pixels blend.
         let step = depth * slope / ground.side;
-        if step > 0.5 {
-            shows.fill(blend);
-            continue;
-        }
-        // Where on the floor the row's left end is, in tiles; `right` runs along x or z.
-        let start = (eye + (ray - right * (middle * slope)) * depth) / ground.side;
+        let mixed = std::array::from_fn(|i| (ground.colours[0][i] + ground.colours[1][i]) / 2.0);
+        let colours = match (ray.y >= 0.0, step > 0.16) {
+            (true, _) => [[0.93, 0.92, 0.88]; 2],
+            (false, true) => [mixed; 2],
+            (false, false) => ground.colours,
+        };
+        let marks =
+            colours.map(|colour| Vec4::splat(mark(raster.material(Material { rgb: pack(colour, shade), id: 0 }))));
+        let (near, shows) = raster.row_mut(row);
+        near.fill(Vec4::splat(1.0 / depth));
+        // Where on the floor the middle of the row's first pixel is, in tiles; `right` runs along x or z.
+        let start = (eye + (ray - right * ((middle - 0.5) * slope)) * depth) / ground.side;
         let (along, across, towards) =
             if right.x != 0.0 { (start.x, start.z, right.x) } else { (start.z, start.x, right.z) };
-        // Planks lie along the scene's x axis.
-        let (striped, shift) = match (ground.planks, right.x != 0.0) {
-            (false, _) => (true, across.floor() as i64),
-            (true, true) => (false, across.floor() as i64),
-            (true, false) => (true, 0),
+        let odd = across.floor().rem_euclid(2.0);
+        // Planks lie along the scene's x axis: rows cross them when they run along z, and lie in one when along x.
+        let shift = match (ground.planks, right.x != 0.0) {
+            (false, _) => odd,
+            (true, true) => {
+                shows.fill(marks[odd as usize]);
+                continue;
+            }
+            (true, false) => 0.0,
         };
-        if !striped {
-            shows.fill(pair[shift.rem_euclid(2) as usize]);
+        if colours[0] == colours[1] {
+            shows.fill(marks[0]);
             continue;
         }
-        let mut from = 0;
-        let mut tile = along.floor();
-        while from < size {
-            let edge = if towards > 0.0 { (tile + 1.0 - along) / step } else { (along - tile) / step };
-            let end = ((edge + 0.5) as usize).clamp(from, size);
-            shows[from..end].fill(pair[(tile as i64 + shift).rem_euclid(2) as usize]);
-            from = end;
-            tile += towards;
+        // Half tiles, so that a whole number is a pair of them.
+        let mut half = (Vec4::new(0.0, 1.0, 2.0, 3.0) * (towards * step) + along + shift) / 2.0;
+        let stride = Vec4::splat(towards * step * GROUP as f32 / 2.0);
+        for shows in shows {
+            let first = (half - half.floor()).cmplt(Vec4::splat(0.5));
+            *shows = Vec4::select(first, marks[0], marks[1]);
+            half += stride;
         }
-        let last = shows[size - 1];
-        shows[size..].fill(last);
     }
 }
 
@@ -98,22 +96,57 @@ pub fn resolve(raster: &Raster, frame: &mut Frame) {
     let rows = frame.rgb.chunks_exact_mut(3 * size).zip(frame.depth.chunks_exact_mut(size));
     for (row, ((rgb, depth), ids)) in rows.zip(frame.ids.chunks_exact_mut(size)).enumerate() {
         let (near, shows) = raster.row(row);
+        let (depth, depth_rest) = depth.as_chunks_mut::<GROUP>();
         for (depth, near) in depth.iter_mut().zip(near) {
-            *depth = 1.0 / near;
+            *depth = near.recip().to_array();
         }
-        let whole = size / BLOCK * BLOCK;
-        let blocks = rgb.chunks_exact_mut(3 * BLOCK).zip(ids.chunks_exact_mut(BLOCK));
-        for ((rgb, ids), shows) in blocks.zip(shows.chunks_exact(BLOCK)) {
-            paint(rgb, ids, shows, materials);
+        let (rgb, rgb_rest) = rgb.as_chunks_mut::<{ 3 * GROUP }>();
+        let (ids, ids_rest) = ids.as_chunks_mut::<GROUP>();
+        let mut paint = Paint::of(0, materials[0]);
+        for ((rgb, ids), shows) in rgb.iter_mut().zip(ids).zip(shows) {
+            if shows.cmpeq(Vec4::splat(shows.x)).all() {
+                let number = unmark(shows.x);
+                if number != paint.number {
+                    paint = Paint::of(number, materials[number]);
+                }
+                (*rgb, *ids) = (paint.rgb, paint.ids);
+            } else {
+                let four = shows.to_array().map(|show| materials[unmark(show)]);
+                *ids = four.map(|material| material.id);
+                *rgb = packed(four.map(|material| material.rgb));
+            }
         }
-        paint(&mut rgb[3 * whole..], &mut ids[whole..], &shows[whole..size], materials);
+        // What is left of a row whose length is no multiple of four.
+        if let (Some(near), Some(shows)) = (near.last(), shows.last()) {
+            for (lane, ((rgb, id), depth)) in rgb_rest.chunks_exact_mut(3).zip(ids_rest).zip(depth_rest).enumerate() {
+                let material = materials[unmark(shows[lane])];
+                *depth = 1.0 / near[lane];
+                *id = material.id;
+                rgb.copy_from_slice(&material.rgb.to_le_bytes()[..3]);
+            }
+        }
     }
 }
 
-fn paint(rgb: &mut [u8], ids: &mut [u16], shows: &[u16], materials: &[Material]) {
-    for ((rgb, id), &number) in rgb.chunks_exact_mut(3).zip(ids).zip(shows) {
-        let material = materials[usize::from(number)];
-        *id = material.id;
-        rgb.copy_from_slice(&material.rgb.to_le_bytes()[..3]);
+/// Four colours in twelve bytes: three whole words.
+fn packed([a, b, c, d]: [u32; GROUP]) -> [u8; 3 * GROUP] {
+    let low = u64::from(a) | u64::from(b) << 24 | u64::from(c) << 48;
+    let high = c >> 16 | d << 8;
+    let mut bytes = [0; 3 * GROUP];
+    bytes[..8].copy_from_slice(&low.to_le_bytes());
+    bytes[8..].copy_from_slice(&high.to_le_bytes());
+    bytes
+}
+
+/// Four pixels of one material, ready to be copied.
+struct Paint {
+    number: usize,
+    rgb: [u8; 3 * GROUP],
+    ids: [u16; GROUP],
+}
+
+impl Paint {
+    fn of(number: usize, material: Material) -> Paint {
+        Paint { number, rgb: packed([material.rgb; GROUP]), ids: [material.id; GROUP] }
     }
 }

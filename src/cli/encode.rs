@@ -1,0 +1,77 @@
+//! `sprint encode`: draws and encodes every frame of datasets ahead of a training.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Ending;
+use super::bar::Bars;
+use super::stop;
+use crate::agent::checkpoint::{Config, Networks};
+use crate::data::Dataset;
+use crate::nets::device::best_device;
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::resnet18::ResNet18;
+use crate::run::encoding::features;
+use crate::run::footage::Footage;
+
+/// Encodes datasets.
+#[derive(Args)]
+pub struct Encode {
+    /// Dataset folders
+    #[arg(required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    #[command(flatten)]
+    encoder: Encoder,
+}
+
+#[derive(Args)]
+#[group(required = true, multiple = false)]
+struct Encoder {
+    /// Use this checkpoint's visual encoder
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Use torchvision's ResNet-18: its weights as a safetensors file
+    #[arg(long, value_name = "FILE")]
+    resnet18: Option<PathBuf>,
+}
+
+impl Encode {
+    /// Writes the feature maps that are missing into each dataset's cache folder.
+    ///
+    /// # Errors
+    /// When the datasets or the encoder cannot be read, or a cache not be written.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let encoder = self.encoder.load()?;
+        let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+        let footage = Footage::open(&datasets)?;
+        let stop = stop::on_signals()?;
+        let mut bars = Bars::new();
+        let begun = std::time::Instant::now();
+        let features = features(&*encoder, &datasets, &footage, &mut bars, &stop)?;
+        bars.end();
+        let Some(features) = features else {
+            eprintln!("stopped; the same command goes on from here");
+            return Ok(Ending::Interrupted);
+        };
+        let size = (features.len() as f64 * features.width() as f64) / 1e9;
+        let seconds = begun.elapsed().as_secs_f64();
+        eprintln!("{} frames, {size:.2} GB of features, in {seconds:.0} s", features.len());
+        Ok(Ending::Ok)
+    }
+}
+
+impl Encoder {
+    fn load(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
+        let device = best_device();
+        match (&self.checkpoint, &self.resnet18) {
+            (Some(folder), _) => {
+                let networks = Networks::load(folder, &Config::read(folder)?, device)?;
+                Ok(Box::new(networks.visual.frozen(&networks.visual_store)?))
+            }
+            (None, Some(file)) => Ok(Box::new(ResNet18::read(file, device)?)),
+            (None, None) => anyhow::bail!("name --checkpoint or --resnet18"),
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! `sprint relabel`: what runs of skills are called.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::Ending;
+use super::bar::Bars;
+use super::stop;
+use crate::language::passage::{Concatenation, Summarizer};
+use crate::language::rules::Rules;
+use crate::run::relabel::relabel;
+
+/// Labels runs of skills.
+#[derive(Args)]
+pub struct Relabel {
+    /// The dataset folder
+    data: PathBuf,
+    /// Who writes the labels
+    #[arg(long)]
+    with: With,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum With {
+    /// A short summary, from the skills and the annotator's own words
+    Rules,
+    /// The annotator's sentences one after the other
+    Concat,
+}
+
+impl Relabel {
+    /// Writes the labels that are missing in the dataset's labels.jsonl.
+    ///
+    /// # Errors
+    /// When the dataset cannot be read or its folder not be written to.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let summarizer: &dyn Summarizer = match self.with {
+            With::Rules => &Rules,
+            With::Concat => &Concatenation,
+        };
+        let stop = stop::on_signals()?;
+        let mut bars = Bars::new();
+        let found = relabel(&self.data, summarizer, &mut bars, &stop)?;
+        bars.end();
+        if found.stopped {
+            eprintln!("stopped; the same command goes on from here");
+            return Ok(Ending::Interrupted);
+        }
+        let (source, version) = (summarizer.source(), summarizer.version());
+        eprintln!(
+            "{}: {} spans, {} labelled before, {} texts written by {source} {version}",
+            self.data.join("labels.jsonl").display(),
+            found.spans,
+            found.known,
+            found.asked
+        );
+        Ok(Ending::Ok)
+    }
+}

@@ -1,0 +1,227 @@
+//! `labels.jsonl`: what composite spans are called, a line a label with where it comes from, appended as they are made.
+
+use std::collections::{BTreeSet, HashMap};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use serde::{Deserialize, Serialize};
+
+use crate::language::passage::Passage;
+
+/// A line: the label of one span of one annotator.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Summary {
+    /// The trajectory's name.
+    pub trajectory: String,
+    /// Which of its annotations.
+    pub annotator: u32,
+    /// The span's first skill, and the one after its last.
+    pub skills: [u8; 2],
+    /// The label.
+    pub text: String,
+    /// Who made it: `rules`, `concat`, a model.
+    pub source: String,
+    /// The version of that source.
+    pub version: u32,
+    /// The digest of what it was made of; see [`Passage::digest`].
+    pub input: String,
+}
+
+/// The file's first line.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    format_version: u32,
+}
+
+/// The format version this program reads and writes.
+const FORMAT: u32 = 1;
+
+/// The file's name in a dataset's folder.
+const NAME: &str = "labels.jsonl";
+
+/// The lines of a dataset's file and the length in bytes of its whole lines. A torn last line is left out.
+fn read(folder: &Path) -> anyhow::Result<(Vec<Summary>, usize)> {
+    let path = folder.join(NAME);
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok((Vec::new(), 0)),
+        Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
+    };
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
+    let mut lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
+    if let Some(first) = lines.next() {
+        let header: Header = serde_json::from_slice(first).with_context(|| format!("{}, line 1", path.display()))?;
+        ensure!(
+            header.format_version == FORMAT,
+            "{}: format_version: {}, but this program reads {FORMAT}",
+            path.display(),
+            header.format_version
+        );
+    }
+    let parse = |(number, line): (usize, &[u8])| {
+        serde_json::from_slice(line).with_context(|| format!("{}, line {}", path.display(), number + 2))
+    };
+    Ok((lines.enumerate().map(parse).collect::<anyhow::Result<_>>()?, whole))
+}
+
+/// The labels of datasets, to be looked up.
+#[derive(Clone, Debug, Default)]
+pub struct Summaries {
+    by_input: HashMap<String, String>,
+}
+
+impl Summaries {
+    /// Reads the labels of some datasets' folders: those of one source, which has to be named when a file has several. The last
+    /// line counts where one source labelled the same twice.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or it is not clear whose labels are meant.
+    pub fn read(folders: &[&Path], source: Option<&str>) -> anyhow::Result<Summaries> {
+        let mut by_input = HashMap::new();
+        for folder in folders {
+            let path = folder.join(NAME);
+            let lines = read(folder)?.0;
+            let sources: BTreeSet<&str> = lines.iter().map(|line| line.source.as_str()).collect();
+            let listed = || sources.iter().copied().collect::<Vec<_>>().join(", ");
+            let wanted = match (source, sources.first()) {
+                (_, None) => bail!("{} has no labels: `sprint relabel` writes them", path.display()),
+                (Some(source), _) if !sources.contains(source) => {
+                    bail!("{} has labels of {}, none of {source}", path.display(), listed())
+                }
+                (Some(source), _) => source,
+                (None, Some(only)) if sources.len() == 1 => only,
+                (None, _) => bail!("{} has labels of {}: name one as labels_of", path.display(), listed()),
+            };
+            let wanted = wanted.to_string();
+            by_input.extend(lines.into_iter().filter(|line| line.source == wanted).map(|line| (line.input, line.text)));
+        }
+        Ok(Summaries { by_input })
+    }
+
+    /// The label of a passage.
+    pub fn find(&self, passage: &Passage<'_>) -> Option<&str> {
+        self.by_input.get(&passage.digest()).map(String::as_str)
+    }
+
+    /// How many different passages have a label.
+    pub fn len(&self) -> usize {
+        self.by_input.len()
+    }
+
+    /// Whether none has.
+    pub fn is_empty(&self) -> bool {
+        self.by_input.is_empty()
+    }
+}
+
+/// A dataset's label file, opened to be added to. One process at a time.
+pub struct Ledger {
+    path: PathBuf,
+    file: File,
+}
+
+impl Ledger {
+    /// Opens or begins the file, mends a torn last line, and returns what it holds.
+    ///
+    /// # Errors
+    /// When it is malformed, in use, or cannot be written to.
+    pub fn open(folder: &Path) -> anyhow::Result<(Ledger, Vec<Summary>)> {
+        let path = folder.join(NAME);
+        let context = || format!("{} cannot be written", path.display());
+        let mut file = OpenOptions::new().create(true).append(true).open(&path).with_context(context)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
+            Err(TryLockError::Error(error)) => return Err(error).with_context(context),
+            Ok(()) => {}
+        }
+        let (lines, whole) = read(folder)?;
+        file.set_len(whole as u64).with_context(context)?;
+        if whole == 0 {
+            file.write_all(&line(&Header { format_version: FORMAT })?).with_context(context)?;
+        }
+        Ok((Ledger { path, file }, lines))
+    }
+
+    /// Adds labels in one write.
+    ///
+    /// # Errors
+    /// When the disk is full.
+    pub fn append(&mut self, labels: &[Summary]) -> anyhow::Result<()> {
+        let mut bytes = Vec::new();
+        for label in labels {
+            bytes.extend(line(label)?);
+        }
+        self.file.write_all(&bytes).with_context(|| format!("{} cannot be written", self.path.display()))
+    }
+}
+
+fn line(value: &impl Serialize) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(input: &str, text: &str, source: &str) -> Summary {
+        Summary {
+            trajectory: "t".into(),
+            annotator: 0,
+            skills: [0, 2],
+            text: text.into(),
+            source: source.into(),
+            version: 1,
+            input: input.into(),
+        }
+    }
+
+    #[test]
+    fn labels_are_added_and_a_torn_line_is_mended() {
+        let folder = tempfile::tempdir().unwrap();
+        Ledger::open(folder.path()).unwrap().0.append(&[summary("a", "One.", "rules")]).unwrap();
+        let path = folder.path().join(NAME);
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes.extend(b"{\"trajectory\":\"t\",\"annot");
+        std::fs::write(&path, bytes).unwrap();
+        let (mut ledger, lines) = Ledger::open(folder.path()).unwrap();
+        assert_eq!(lines, [summary("a", "One.", "rules")]);
+        ledger.append(&[summary("b", "Two.", "rules")]).unwrap();
+        assert_eq!(read(folder.path()).unwrap().0.len(), 2);
+        let summaries = Summaries::read(&[folder.path()], None).unwrap();
+        assert_eq!((summaries.len(), summaries.by_input["b"].as_str()), (2, "Two."));
+    }
+
+    #[test]
+    fn one_process_writes_at_a_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let _held = Ledger::open(folder.path()).unwrap();
+        assert!(Ledger::open(folder.path()).err().unwrap().to_string().contains("another process"));
+    }
+
+    #[test]
+    fn of_several_sources_one_has_to_be_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = |source| Summaries::read(&[folder.path()], source).unwrap_err().to_string();
+        assert!(error(None).contains("sprint relabel"));
+        let labels = [summary("a", "One.", "rules"), summary("a", "Eins.", "concat"), summary("a", "Uno.", "rules")];
+        Ledger::open(folder.path()).unwrap().0.append(&labels).unwrap();
+        assert!(error(None).contains("concat, rules"));
+        assert!(error(Some("lm")).contains("none of lm"));
+        let found = |source| Summaries::read(&[folder.path()], Some(source)).unwrap().by_input["a"].clone();
+        assert_eq!([found("rules"), found("concat")], ["Uno.", "Eins."]);
+    }
+
+    #[test]
+    fn a_damaged_line_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(NAME), "{\"format_version\":1}\n{\"colour\":3}\n").unwrap();
+        let error = format!("{:#}", Ledger::open(folder.path()).err().unwrap());
+        assert!(error.contains("line 2") && error.contains("colour"), "{error}");
+    }
+}
