@@ -70,9 +70,9 @@ export SPRINT_HOME=${SPRINT_HOME:-$work/home}
 "$program" tasks sample tasks.json --scenes generated --length 1-2 --count 12 --seed 3
 echo "$(RUN=$work/run/array SHARDS=4 SPRINT=$program SBATCH_FLAGS="--cpus-per-task=1" "$script" --tasks "$work/tasks.json" --policy expert --seeds 2)"
 for _ in $(seq 600); do [ -z "$(squeue -h)" ] && break; sleep 0.2; done
-cat run/array/log/merge.txt | head -9
+cat run/array-log/merge.txt | head -9
 "$program" eval --tasks tasks.json --policy expert --seeds 2 --out run/alone > /dev/null 2>&1
 for file in manifest.json episodes.jsonl summary.json summary.md summary.csv; do
-    cmp "run/array/$file" "run/alone/$file" || { cat run/array/log/*.txt; exit 1; }
+    cmp "run/array/$file" "run/alone/$file" || { cat run/array-log/*.txt; exit 1; }
 done
 echo "the merged run equals the one of a single process: $(wc -l < run/array/episodes.jsonl) episodes, byte for byte"
