@@ -1,69 +1,10 @@
 //! `sprint tasks` and `sprint eval` from the command line: what they write, and how they end.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use assert_cmd::Command;
 use serde_json::Value;
-use tempfile::TempDir;
 
-/// The program, in an empty folder of its own.
-struct Sprint {
-    folder: TempDir,
-}
-
-/// How a command ended.
-struct Ended {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
-impl Sprint {
-    fn new() -> Sprint {
-        Sprint { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Ended {
-        let mut command = Command::cargo_bin("sprint").unwrap();
-        let command = command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
-        let output = command.args(line.split_whitespace()).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).unwrap()
-    }
-
-    /// Samples a set of tasks in generated houses.
-    fn sample(&self, name: &str, length: usize, count: usize) {
-        let ended =
-            self.run(&format!("tasks sample {name} --scenes generated --length {length} --count {count} --seed 7"));
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    }
-
-    /// Changes a file, and gives what `sprint eval` says of it.
-    fn complaint(&self, name: &str, change: impl FnOnce(&mut Value)) -> String {
-        let mut value: Value = serde_json::from_str(&self.read(name)).unwrap();
-        change(&mut value);
-        std::fs::write(self.path("changed.json"), value.to_string()).unwrap();
-        self.refused("changed.json")
-    }
-
-    /// What `sprint eval` says of a file that it must refuse without writing anything.
-    fn refused(&self, name: &str) -> String {
-        let ended = self.run(&format!("eval --tasks {name} --policy random --out refused"));
-        assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-        assert!(ended.stderr.contains(name), "the file is named: {}", ended.stderr);
-        assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
-        assert!(!self.path("refused").exists(), "nothing is half-written");
-        ended.stderr
-    }
-}
+use crate::program::Sprint;
 
 #[test]
 fn the_expert_completes_every_sampled_task() {
@@ -141,7 +82,7 @@ fn an_interrupted_run_ends_with_130_and_a_partial_summary() {
     let sprint = Sprint::new();
     sprint.sample("tasks.json", 1, 3);
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("sprint"));
-    command.current_dir(sprint.folder.path()).env("SPRINT_HOME", sprint.path("home"));
+    command.current_dir(sprint.path(".")).env("SPRINT_HOME", sprint.path("home"));
     command.args("eval --tasks tasks.json --policy random --seeds 100000 --out run".split_whitespace());
     let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
     let begun = || std::fs::metadata(sprint.path("run/episodes.jsonl")).is_ok_and(|file| file.len() > 0);

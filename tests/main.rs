@@ -10,4 +10,7 @@ mod floors;
 mod command_line;
 mod generated;
 mod properties;
+mod program;
+mod evaluator;
+mod faults;
 mod scenarios;

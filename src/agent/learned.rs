@@ -1,44 +1,25 @@
 //! A trained agent: sees the last frames, reads the instruction, decides.
 
-use std::collections::VecDeque;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use tch::{Device, Kind, Tensor};
+use tch::{Device, Tensor};
 
 use super::checkpoint::{Config, Networks};
-use super::goal;
+use super::memory::Memory;
+pub use super::memory::SharedEmbedder;
 use super::policy::{Decision, Policy, Situation, Values};
-use super::select::{self, Selection};
+use super::told;
 use crate::domain::{ActionType, Class};
-use crate::house::House;
-use crate::language::instruction::normalise;
-use crate::language::vocabulary::Vocabulary;
-use crate::nets::embedding_cache::Embedder;
-
-/// A sentence encoder with its cache, which several policies may share.
-pub type SharedEmbedder = Arc<Mutex<Embedder>>;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
-    name: String,
-    config: Config,
-    networks: Networks,
-    sentences: SharedEmbedder,
-    device: Device,
-    /// The maps of the last frames, oldest first, and the step that the last one belongs to.
-    seen: VecDeque<Tensor>,
-    seen_at: Option<u32>,
-    /// The last image, and the actions that were chosen at it and left it as it was.
-    last_image: Vec<u8>,
-    blocked: Vec<ActionType>,
-    last_choice: Option<ActionType>,
-    /// The instruction that was read last, with its embedding or the frames of its goal.
-    read: Option<(String, Tensor)>,
-    samples: bool,
-    rng: ChaCha8Rng,
+    pub(super) name: String,
+    pub(super) config: Config,
+    pub(super) networks: Networks,
+    pub(super) sentences: SharedEmbedder,
+    pub(super) device: Device,
+    pub(super) samples: bool,
+    pub(super) memory: Memory,
 }
 
 impl LearnedPolicy {
@@ -78,21 +59,7 @@ impl LearnedPolicy {
         sentences: SharedEmbedder,
         device: Device,
     ) -> LearnedPolicy {
-        LearnedPolicy {
-            name,
-            config,
-            networks,
-            sentences,
-            device,
-            seen: VecDeque::new(),
-            seen_at: None,
-            last_image: Vec::new(),
-            blocked: Vec::new(),
-            last_choice: None,
-            read: None,
-            samples: false,
-            rng: ChaCha8Rng::seed_from_u64(0),
-        }
+        LearnedPolicy { name, config, networks, sentences, device, samples: false, memory: Memory::default() }
     }
 
     /// The checkpoint's configuration.
@@ -105,67 +72,14 @@ impl LearnedPolicy {
         self.samples = samples;
     }
 
-    /// The last frames' maps as one observation. Before the first frames there was the first one.
-    fn observe(&mut self, situation: &mut Situation<'_>) -> Tensor {
+    /// The last frames' maps as one observation, and what the agent is told.
+    fn perceive(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
         let image = self.networks.visual.spec().image(situation.house.frame());
-        self.notice(&image, self.seen_at != Some(situation.step));
+        self.memory.look(&image, situation.step);
         let map = self.networks.visual.encode(std::slice::from_ref(&image));
-        self.last_image = image;
-        let history = self.config.policy.history as usize;
-        if self.seen_at == Some(situation.step) {
-            self.seen.pop_back();
-        }
-        self.seen_at = Some(situation.step);
-        self.seen.push_back(map);
-        while self.seen.len() > history {
-            self.seen.pop_front();
-        }
-        let first = history - self.seen.len();
-        let maps: Vec<&Tensor> = (0..history).map(|i| &self.seen[i.saturating_sub(first)]).collect();
-        Tensor::cat(&maps, 1)
-    }
-
-    /// Notices when the last choice changed nothing: a wall, or the camera's limit. Until the view changes it is not tried again.
-    fn notice(&mut self, image: &[u8], stepped: bool) {
-        if self.last_image != image {
-            self.blocked.clear();
-        } else if stepped && let Some(choice) = self.last_choice.filter(|choice| !choice.is_interaction()) {
-            self.blocked.push(choice);
-        }
-    }
-
-    /// What the agent is told: the instruction's embedding or its words, or the maps of the goal's last frames.
-    fn told(&mut self, situation: &Situation<'_>) -> anyhow::Result<Tensor> {
-        if let Some((text, told)) = &self.read
-            && text == situation.instruction
-        {
-            return Ok(told.shallow_clone());
-        }
-        let told = match self.config.policy.goal {
-            Some(_) => self.goal(situation)?,
-            None if self.config.policy.attention.is_some() => {
-                let words = Vocabulary::new(self.config.words.clone().unwrap_or_default());
-                let numbers = words.numbers(&normalise(situation.instruction));
-                Tensor::from_slice(&numbers).unsqueeze(0).to_device(self.device)
-            }
-            None => {
-                let embedder = self.sentences.lock();
-                let mut embedder = embedder.map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-                embedder.embed(&[&normalise(situation.instruction)])?.to_device(self.device).to_kind(Kind::Float)
-            }
-        };
-        self.read = Some((situation.instruction.to_string(), told.shallow_clone()));
-        Ok(told)
-    }
-
-    fn goal(&self, situation: &Situation<'_>) -> anyhow::Result<Tensor> {
-        let history = self.config.policy.history as usize;
-        let visual = &self.networks.visual;
-        let see = |world| visual.spec().image(House::new(Arc::clone(situation.house.scene()), world).frame());
-        let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
-        let missing = history - images.len();
-        let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();
-        Ok(visual.encode(&stacked).flatten(0, 1).unsqueeze(0))
+        let observation = self.memory.observe(map, situation.step, self.config.policy.history as usize);
+        let hear = || told::told(situation, &self.config, &self.networks.visual, &self.sentences, self.device);
+        Ok((observation, self.memory.told(situation.instruction, hear)?))
     }
 }
 
@@ -175,36 +89,22 @@ impl Policy for LearnedPolicy {
     }
 
     fn begin(&mut self, seed: u64) {
-        self.seen.clear();
-        self.last_image.clear();
-        self.blocked.clear();
-        self.last_choice = None;
-        self.seen_at = None;
-        if self.config.policy.goal.is_some() {
-            // The next episode's goal looks different, whatever its instruction.
-            self.read = None;
-        }
-        self.rng = ChaCha8Rng::seed_from_u64(seed);
+        self.memory.begin(seed);
     }
 
     fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
-        let observation = self.observe(situation);
-        let told = self.told(situation)?;
+        let (observation, told) = self.perceive(situation)?;
         let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &told, false));
         let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
         let (actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
-        let candidates = situation.house.candidates();
-        let selection = if self.samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        let decision = select::decide(&actions, &objects, &candidates, &self.blocked, selection);
-        self.last_choice = Some(decision.action.kind);
-        Ok(decision)
+        Ok(self.memory.decide(&actions, &objects, &situation.house.candidates(), self.samples))
     }
 
     fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
         if self.networks.critic.is_none() {
             return Ok(None);
         }
-        let (observation, told) = (self.observe(situation), self.told(situation)?);
+        let (observation, told) = self.perceive(situation)?;
         let Some(critic) = &self.networks.critic else { return Ok(None) };
         let mut possible: Vec<(ActionType, Option<Class>)> =
             ActionType::ALL.into_iter().filter(|kind| !kind.is_interaction()).map(|kind| (kind, None)).collect();
@@ -227,6 +127,8 @@ impl Policy for LearnedPolicy {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Arc, Mutex};
+
     use super::*;
     use crate::agent::checkpoint::{Ontology, Provenance, SentenceSpec};
     use crate::domain::SkillKind;

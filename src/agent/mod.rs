@@ -1,15 +1,21 @@
 //! Agents: what decides the next action.
 
+pub mod batch;
 pub mod checkpoint;
 pub mod expert;
 pub mod goal;
 pub mod learned;
+pub mod memory;
 pub mod policy;
 pub mod random;
 pub mod seeker;
 pub mod select;
+pub mod team;
+pub mod told;
 
+pub use batch::LearnedTeam;
 pub use expert::ExpertPolicy;
 pub use learned::LearnedPolicy;
 pub use policy::{Decision, Mind, Policy, Situation, Values};
 pub use random::RandomPolicy;
+pub use team::{Solo, Team};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Ending;
@@ -14,7 +14,10 @@ use crate::data::taskset;
 use crate::house::grading::Grading;
 use crate::run::evaluate::{Evaluation, Options, Progress};
 use crate::run::folder::{self, RunFolder};
+use crate::run::report::Summary;
 use crate::run::scenes::Scenes;
+use crate::run::shard::Shard;
+use crate::run::tasks;
 use crate::run::threshold::Threshold;
 
 /// Plays a task set and writes a run folder.
@@ -37,18 +40,43 @@ pub struct Eval {
     /// Only the first N tasks
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     limit: Option<u32>,
-    /// Print the summary as one JSON object, on the last line
+    /// Print the summary as one JSON object, on the last line; progress, on standard error, is a JSON object a line too
     #[arg(long)]
     json: bool,
     /// Tell the agent all steps instead of the task's instruction
     #[arg(long)]
     step_by_step: bool,
+    /// Draw the agent's actions by chance instead of taking the likeliest
+    #[arg(long)]
+    sample: bool,
+    /// Also play each task told in other words: another task's, none, its own shuffled, and a paraphrase
+    #[arg(long)]
+    language: bool,
+    /// `all`: also play each task from each of its subtasks on; the expert does those before
+    #[arg(long, value_name = "all")]
+    from_subtask: Option<Starts>,
     /// How subtasks are graded: class, or strict as the released code does
     #[arg(long, value_name = "class|strict", default_value_t = Grading::Class)]
     grader: Grading,
+    /// Begin an episode that ends with an error anew, at most so often; episodes of an earlier run in --out too
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    retries: u32,
+    /// End an episode with an error when it takes longer
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000), default_value_t = 3600)]
+    timeout: u64,
+    /// Play one share of the episodes, into RUN/shards; `slurm` reads which from the environment of an array's job
+    #[arg(long, value_name = "I/N|slurm")]
+    shard: Option<Shard>,
     /// Exit with 2 when a figure falls short, for example success=0.8 or progress_by_length.3=0.5; may be repeated
     #[arg(long, value_name = "METRIC=X")]
     fail_below: Vec<Threshold>,
+}
+
+/// From where each task is played besides its start.
+#[derive(Clone, Copy, ValueEnum)]
+enum Starts {
+    /// From each of its subtasks
+    All,
 }
 
 impl Eval {
@@ -59,26 +87,17 @@ impl Eval {
     pub fn run(self) -> anyhow::Result<Ending> {
         let set = taskset::read(&self.tasks)?;
         let scenes = Scenes::of(&self.tasks, &set.value);
-        let chosen = self.policy.open()?;
-        let options = Options {
-            grading: self.grader,
-            seeds: self.seeds,
-            limit: self.limit.map(|limit| limit as usize),
-            jobs: super::threads(self.jobs),
-            step_by_step: self.step_by_step,
-        };
-        let name = self.tasks.display();
-        let evaluation = Evaluation::prepare(&set, scenes, options, &chosen.name, chosen.checkpoint_hash)
-            .with_context(|| format!("{name}"))?;
-        let path = self.out.clone().unwrap_or_else(|| {
-            let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-            folder::default_path(&format!("{}-{}", set.value.name, chosen.name), now.as_secs())
-        });
+        let chosen = self.policy.open(self.sample)?;
+        let evaluation =
+            Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
+                .with_context(|| format!("{}", self.tasks.display()))?;
+        let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunFolder::open(&path, evaluation.manifest())?;
+        run.write_tasks(&tasks::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
         let stop = super::stop::on_signals()?;
-        let mut meter = Meter::new();
+        let mut meter = Meter::new(self.json);
         let summary =
-            crate::run::evaluate(&evaluation, &*chosen.make, &mut run, &stop, &mut |progress| meter.show(progress))?;
+            crate::run::evaluate(&evaluation, &*chosen.team, &mut run, &stop, &mut |progress| meter.show(progress))?;
         meter.finish();
         let mut out = std::io::stdout().lock();
         if self.json {
@@ -88,13 +107,43 @@ impl Eval {
         }
         out.flush()?;
         say(&format!("wrote {}", path.display()));
+        chosen.check_unchanged()?;
+        self.ending(&summary)
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            grading: self.grader,
+            seeds: self.seeds,
+            limit: self.limit.map(|limit| limit as usize),
+            jobs: super::threads(self.jobs),
+            step_by_step: self.step_by_step,
+            sampling: self.sample,
+            language: self.language,
+            every_start: self.from_subtask.is_some(),
+            retries: self.retries,
+            timeout: Some(Duration::from_secs(self.timeout)),
+            shard: self.shard,
+        }
+    }
+
+    /// The run's folder, or that of its share.
+    fn folder(&self, set: &str, policy: &str) -> PathBuf {
+        let run = self.out.clone().unwrap_or_else(|| {
+            let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+            folder::default_path(&format!("{set}-{policy}"), now.as_secs(), &|path| path.exists())
+        });
+        self.shard.map_or_else(|| run.clone(), |shard| run.join(shard.folder()))
+    }
+
+    fn ending(&self, summary: &Summary) -> anyhow::Result<Ending> {
         if summary.partial {
             say("interrupted: the summary is partial; the same command with this folder as --out continues it");
             return Ok(Ending::Interrupted);
         }
         let mut ending = if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed };
         for threshold in &self.fail_below {
-            if let Some(measured) = threshold.missed_by(&summary)? {
+            if let Some(measured) = threshold.missed_by(summary)? {
                 say(&format!("{threshold} was missed: {measured:.4}"));
                 ending = Ending::BelowThreshold;
             }
@@ -106,6 +155,7 @@ impl Eval {
 /// Progress on standard error: a bar in a terminal, else a plain line now and then.
 struct Meter {
     bar: Option<ProgressBar>,
+    json: bool,
     started: Instant,
     last: Option<Instant>,
 }
@@ -114,13 +164,13 @@ impl Meter {
     /// At most one plain line in this time.
     const EVERY: Duration = Duration::from_secs(5);
 
-    fn new() -> Meter {
+    fn new(json: bool) -> Meter {
         let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {elapsed}, {eta} left");
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = (!json && std::io::stderr().is_terminal()).then(|| {
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
                 .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
-        Meter { bar, started: Instant::now(), last: None }
+        Meter { bar, json, started: Instant::now(), last: None }
     }
 
     fn show(&mut self, progress: Progress) {
@@ -135,6 +185,10 @@ impl Meter {
                 bar.set_length(of as u64);
                 bar.set_position(done as u64);
                 bar.set_message(words);
+            }
+            None if self.json => {
+                let seconds = self.started.elapsed().as_secs_f64();
+                say(&serde_json::json!({"event": "progress", "progress": progress, "seconds": seconds}).to_string());
             }
             None if done == of || self.last.is_none_or(|last| last.elapsed() >= Meter::EVERY) => {
                 say(&format!("{done}/{of} episodes, {words}, {:.0} s", self.started.elapsed().as_secs_f64()));

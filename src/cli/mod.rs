@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod bar;
 mod collect;
+mod compare;
 mod doctor;
 mod embed;
 mod encode;
@@ -14,10 +15,13 @@ mod eval;
 mod import;
 mod logging;
 mod plot;
+mod merge;
 mod policies;
 mod pretrain;
 mod relabel;
 mod replay;
+mod report;
+mod schema;
 mod shell;
 mod stop;
 mod tasks;
@@ -39,6 +43,14 @@ enum Command {
     Doctor(doctor::Doctor),
     /// Play a task set, and write a run folder with every episode and a summary
     Eval(eval::Eval),
+    /// Compare runs of the same tasks, episode by episode
+    Compare(compare::Compare),
+    /// Join the shares of a run that several machines played
+    Merge(merge::Merge),
+    /// Draw a run's plots and write it as one HTML page; draw a training's curves
+    Report(report::Report),
+    /// Print the JSON Schema of a file that the program reads or writes
+    Schema(schema::Schema),
     /// Sample, check and show task sets
     Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
@@ -107,6 +119,10 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
         Command::Eval(eval) => eval.run(),
+        Command::Compare(compare) => compare.run(),
+        Command::Merge(merge) => merge.run(),
+        Command::Report(report) => report.run(),
+        Command::Schema(schema) => schema.run(),
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),

@@ -7,12 +7,15 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
-use crate::agent::{ExpertPolicy, LearnedPolicy, Policy, RandomPolicy};
+use crate::agent::{ExpertPolicy, LearnedPolicy, LearnedTeam, Policy, RandomPolicy, Solo, Team};
 use crate::data::json;
-use crate::nets::device::{self, Device};
+use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::evaluate::MakePolicy;
+use crate::run::player::MakeTeam;
+
+/// Makes a policy.
+pub type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Sync;
 
 /// Which policy acts.
 #[derive(Args)]
@@ -43,7 +46,43 @@ pub struct Chosen {
     /// SHA-256 over its checkpoint's configuration and weights.
     pub checkpoint_hash: Option<String>,
     /// Makes one.
-    pub make: Box<MakePolicy<'static>>,
+    pub make: Box<MakePolicy>,
+    /// Makes one that acts in several episodes at once.
+    pub team: Box<MakeTeam<'static>>,
+    /// The checkpoint's folder.
+    pub folder: Option<PathBuf>,
+}
+
+impl Chosen {
+    /// Notices when the checkpoint is no longer the one that was chosen.
+    ///
+    /// # Errors
+    /// When its files changed or are gone.
+    pub fn check_unchanged(&self) -> anyhow::Result<()> {
+        let (Some(folder), Some(chosen)) = (&self.folder, &self.checkpoint_hash) else { return Ok(()) };
+        unchanged(folder, chosen)
+    }
+}
+
+fn unchanged(folder: &Path, chosen: &str) -> anyhow::Result<()> {
+    let now = hash(folder)?;
+    anyhow::ensure!(
+        now == chosen,
+        "{}: the checkpoint was replaced while the run was under way (its hash was {chosen}, now it is {now}); what is \
+         recorded is of the first one: put that back, or evaluate the new one with another --out",
+        folder.display()
+    );
+    Ok(())
+}
+
+/// SHA-256 over a checkpoint's configuration and weights.
+fn hash(folder: &Path) -> anyhow::Result<String> {
+    let mut digest = Sha256::new();
+    for file in ["config.json", "model.safetensors"] {
+        let path = folder.join(file);
+        digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
+    }
+    Ok(json::hex(&digest.finalize()))
 }
 
 impl PolicyChoice {
@@ -51,38 +90,63 @@ impl PolicyChoice {
     ///
     /// # Errors
     /// When the checkpoint or its sentence encoder cannot be used.
-    pub fn open(&self) -> anyhow::Result<Chosen> {
+    pub fn open(&self, sampling: bool) -> anyhow::Result<Chosen> {
         let plain = |name: &str, make: fn() -> Box<dyn Policy>| Chosen {
             name: name.into(),
             checkpoint_hash: None,
             make: Box::new(move || Ok(make())),
+            team: Box::new(move || Ok(Box::new(Solo(make())))),
+            folder: None,
         };
         if self.policy != Kind::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
         }
+        if sampling && self.policy != Kind::Agent {
+            anyhow::bail!("--sample draws the actions of a trained agent; leave it out with --policy expert or random");
+        }
         match self.policy {
             Kind::Expert => Ok(plain("expert", || Box::new(ExpertPolicy::new()))),
             Kind::Random => Ok(plain("random", || Box::new(RandomPolicy::new()))),
-            Kind::Agent => learned(self.checkpoint.clone().map_or_else(shipped, Ok)?),
+            Kind::Agent => sampled(self.checkpoint.clone().map_or_else(shipped, Ok)?, sampling),
         }
     }
 }
 
-/// A trained agent, several of which share one sentence encoder.
+/// A trained agent, several of which share one sentence encoder; it takes the likeliest action.
+///
+/// # Errors
+/// When the checkpoint or its sentence encoder cannot be used.
 pub fn learned(folder: PathBuf) -> anyhow::Result<Chosen> {
+    sampled(folder, false)
+}
+
+fn sampled(folder: PathBuf, sampling: bool) -> anyhow::Result<Chosen> {
     // More threads than one would make sums depend on how many there are, and workers get in each other's way.
     device::set_threads(1);
-    let mut digest = Sha256::new();
-    for file in ["config.json", "model.safetensors"] {
-        let path = folder.join(file);
-        digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
-    }
-    let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), Device::Cpu)?));
-    let make = move || -> anyhow::Result<Box<dyn Policy>> {
-        Ok(Box::new(LearnedPolicy::load(&folder, sentences.clone(), Device::Cpu)?))
+    let checkpoint_hash = hash(&folder)?;
+    let computes = device::best_device();
+    let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), computes)?));
+    let load = {
+        let (folder, chosen) = (folder.clone(), checkpoint_hash.clone());
+        Arc::new(move || -> anyhow::Result<LearnedPolicy> {
+            let mut agent = LearnedPolicy::load(&folder, sentences.clone(), computes)?;
+            // What was loaded is what the run's manifest names.
+            unchanged(&folder, &chosen)?;
+            agent.set_sampling(sampling);
+            Ok(agent)
+        })
     };
-    let name = make()?.name().to_owned();
-    Ok(Chosen { name, checkpoint_hash: Some(json::hex(&digest.finalize())), make: Box::new(make) })
+    let name = load()?.name().to_owned();
+    let (one, several) = (load.clone(), load);
+    Ok(Chosen {
+        name,
+        checkpoint_hash: Some(checkpoint_hash),
+        make: Box::new(move || Ok(Box::new(one()?))),
+        team: Box::new(move || -> anyhow::Result<Box<dyn Team>> {
+            Ok(Box::new(LearnedTeam::new(several()?, LearnedTeam::SEATS)))
+        }),
+        folder: Some(folder),
+    })
 }
 
 /// The agent that acts when none is named: the first that is found.

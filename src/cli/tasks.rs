@@ -9,13 +9,15 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::ProgressBar;
 
 use super::Ending;
-use crate::agent::ExpertPolicy;
+use crate::agent::{ExpertPolicy, Solo};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
 use crate::house::grading::{Grading, describe};
-use crate::run::evaluate::{Evaluation, Options, told};
+use crate::run::evaluate::{Evaluation, Options};
 use crate::run::scenes::Scenes;
+use crate::run::taskcheck;
 use crate::run::tasks::{self, Phrasing, Wish};
+use crate::run::wording::told;
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
@@ -42,9 +44,9 @@ struct Sample {
     /// Where the tasks play: `generated` houses, or the folder of a dataset
     #[arg(long, value_name = "generated|DATA")]
     scenes: PathBuf,
-    /// Subtasks of each task
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=50))]
-    length: u8,
+    /// Subtasks of each task; of several lengths (1,2,3 or 1-5) there are as many tasks each, as far as there are any
+    #[arg(long, value_name = "N|N,N|N-N", default_value = "1")]
+    length: Lengths,
     /// Tasks
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
@@ -63,6 +65,31 @@ struct Sample {
     /// Replace a file that is there
     #[arg(long)]
     force: bool,
+}
+
+/// Lengths of tasks.
+#[derive(Clone)]
+struct Lengths(Vec<usize>);
+
+impl std::str::FromStr for Lengths {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Lengths, String> {
+        let number = |text: &str| match text.trim().parse::<usize>() {
+            Ok(length) if (1..=50).contains(&length) => Ok(length),
+            _ => Err(format!("{text:?} is not a number of subtasks, 1 to 50")),
+        };
+        let mut lengths = Vec::new();
+        for part in text.split(',') {
+            match part.split_once('-') {
+                Some((first, last)) => lengths.extend(number(first)?..=number(last)?),
+                None => lengths.push(number(part)?),
+            }
+        }
+        lengths.sort_unstable();
+        lengths.dedup();
+        if lengths.is_empty() { Err(format!("{text:?} names no length")) } else { Ok(Lengths(lengths)) }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -121,11 +148,12 @@ impl Sample {
             false => self.rooms.iter().map(|&room| room.into()).collect(),
         };
         let name = self.out.file_stem().map_or_else(|| "tasks".into(), |stem| stem.to_string_lossy().into_owned());
-        let wish = Wish { name, length: self.length.into(), count: self.count as usize, seed: self.seed, rooms };
+        let lengths = self.length.0;
+        let wish = Wish { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
         let set = if self.scenes == Path::new("generated") {
             let bar =
                 ProgressBar::new(u64::from(self.count)).with_style(super::import::style()).with_message("sampling");
-            let set = tasks::sample_generated(&wish, &|| bar.inc(1));
+            let set = tasks::balanced(&wish, &lengths, &|wish| tasks::sample_generated(wish, &|| bar.inc(1)));
             bar.finish_and_clear();
             set?
         } else {
@@ -136,7 +164,8 @@ impl Sample {
                 PhrasingName::Own => Phrasing::Own,
                 PhrasingName::Annotators => Phrasing::Annotators,
             };
-            tasks::sample_dataset(&wish, &dataset, self.split.as_deref(), phrasing, folder)?
+            let split = self.split.as_deref();
+            tasks::balanced(&wish, &lengths, &|wish| tasks::sample_dataset(wish, &dataset, split, phrasing, folder))?
         };
         taskset::write(&self.out, &set)?;
         Ok(Ending::Ok)
@@ -156,22 +185,21 @@ impl From<RoomName> for Room {
 
 impl Check {
     fn run(self) -> anyhow::Result<Ending> {
+        let mistakes = taskcheck::mistakes(&self.file)?;
+        let mut out = std::io::stdout().lock();
+        for mistake in &mistakes {
+            writeln!(out, "{}:{mistake}", self.file.display())?;
+        }
+        taskcheck::none(&mistakes, &self.file)?;
         let set = taskset::read(&self.file)?;
         let scenes = Scenes::of(&self.file, &set.value);
-        let options = Options {
-            grading: Grading::Class,
-            seeds: 1,
-            limit: None,
-            jobs: super::threads(self.jobs),
-            step_by_step: false,
-        };
+        let options = Options { jobs: super::threads(self.jobs), ..Options::plain(Grading::Class) };
         let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
             .with_context(|| self.file.display().to_string())?;
-        let mut out = std::io::stdout().lock();
         let mut unsolved = 0;
         evaluation.play(
             &evaluation.all(),
-            &|| Ok(Box::new(ExpertPolicy::default())),
+            &|| Ok(Box::new(Solo(Box::new(ExpertPolicy::new())))),
             &AtomicBool::new(false),
             &mut |episode| {
                 if !episode.success {

@@ -24,15 +24,26 @@ pub struct Document<T> {
 /// # Errors
 /// Each names the file: when it cannot be read, is no JSON, has another version, or departs from the format (then with the field).
 pub fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<Document<T>> {
+    let bytes = read_bytes(path)?;
+    let value = parse(&bytes, version).with_context(|| format!("{}", path.display()))?;
+    Ok(Document { value, digest: hex(&Sha256::digest(&bytes)) })
+}
+
+/// Reads a file of a size that a file of ours may have.
+///
+/// # Errors
+/// When it cannot be read, or is larger.
+pub fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     let name = path.display();
     let file = std::fs::File::open(path).with_context(|| format!("cannot read {name}"))?;
+    let too_large = || anyhow::anyhow!("{name}: larger than {} MiB, which no such file is", LARGEST >> 20);
+    let length = file.metadata().with_context(|| format!("cannot read {name}"))?.len();
+    anyhow::ensure!(length <= LARGEST, too_large());
     let mut bytes = Vec::new();
+    // A device or a pipe says nothing of its length.
     file.take(LARGEST + 1).read_to_end(&mut bytes).with_context(|| format!("cannot read {name}"))?;
-    if bytes.len() as u64 > LARGEST {
-        bail!("{name}: larger than {} MiB, which no such file is", LARGEST >> 20);
-    }
-    let value = parse(&bytes, version).with_context(|| format!("{name}"))?;
-    Ok(Document { value, digest: hex(&Sha256::digest(&bytes)) })
+    anyhow::ensure!(bytes.len() as u64 <= LARGEST, too_large());
+    Ok(bytes)
 }
 
 /// Parses JSON that carries `format_version`: the version first, so that a later format is not reported as a misspelt field.

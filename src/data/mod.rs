@@ -5,6 +5,8 @@ pub mod dataset;
 pub mod features;
 pub mod items;
 pub mod json;
+pub mod lines;
+pub mod schema;
 pub mod summaries;
 pub mod taskset;
 

@@ -85,38 +85,45 @@ fn shortened(text: &str) -> String {
 /// # Errors
 /// Names the first field that is wrong.
 pub fn check_task(task: &Task) -> Result<(), Misfit> {
+    misfits(task).into_iter().next().map_or(Ok(()), Err)
+}
+
+/// Everything that is wrong with a task by itself.
+pub fn misfits(task: &Task) -> Vec<Misfit> {
+    let mut found = Vec::new();
     if task.id.trim().is_empty() || task.id.chars().any(char::is_control) || task.id.chars().count() > 200 {
-        return Err(Misfit::new("id", "empty, too long, or with control characters"));
+        found.push(Misfit::new("id", "empty, too long, or with control characters"));
     }
     if let SceneRef::Named(name) = &task.scene
         && (name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', '\0']))
     {
-        return Err(Misfit::new("scene", format!("{name:?} is a path, not the name of a scene")));
+        found.push(Misfit::new("scene", format!("{name:?} is a path, not the name of a scene")));
     }
-    text("instruction", &task.instruction)?;
+    found.extend(text("instruction", &task.instruction).err());
     for (i, sentence) in task.sentences.iter().enumerate() {
-        text(&format!("sentences[{i}]"), sentence)?;
+        found.extend(text(&format!("sentences[{i}]"), sentence).err());
     }
     let (sentences, subtasks) = (task.sentences.len(), task.subtasks.len());
     if sentences != 0 && sentences != subtasks {
-        return Err(Misfit::new("sentences", format!("{sentences} sentences for {subtasks} subtasks")));
+        found.push(Misfit::new("sentences", format!("{sentences} sentences for {subtasks} subtasks")));
     }
     if !(1..=MOST_SUBTASKS).contains(&subtasks) {
-        return Err(Misfit::new("subtasks", format!("{subtasks} are not 1 to {MOST_SUBTASKS}")));
+        found.push(Misfit::new("subtasks", format!("{subtasks} are not 1 to {MOST_SUBTASKS}")));
     }
     if task.roles.len() > MOST_SUBTASKS {
-        return Err(Misfit::new("roles", format!("{} are more than {MOST_SUBTASKS}", task.roles.len())));
+        found.push(Misfit::new("roles", format!("{} are more than {MOST_SUBTASKS}", task.roles.len())));
     }
     for (i, role) in task.roles.iter().enumerate() {
-        check_role(role).map_err(|misfit| misfit.under(&format!("roles[{i}]")))?;
+        found.extend(check_role(role).err().map(|misfit| misfit.under(&format!("roles[{i}]"))));
     }
     for (i, subtask) in task.subtasks.iter().enumerate() {
-        check_subtask(&task.roles, subtask).map_err(|misfit| misfit.under(&format!("subtasks[{i}]")))?;
+        let misfit = check_subtask(&task.roles, subtask).err();
+        found.extend(misfit.map(|misfit| misfit.under(&format!("subtasks[{i}]"))));
     }
     if !(1..=LONGEST_HORIZON).contains(&task.horizon) {
-        return Err(Misfit::new("horizon", format!("{} is not 1 to {LONGEST_HORIZON}", task.horizon)));
+        found.push(Misfit::new("horizon", format!("{} is not 1 to {LONGEST_HORIZON}", task.horizon)));
     }
-    Ok(())
+    found
 }
 
 fn text(field: &str, text: &str) -> Result<(), Misfit> {

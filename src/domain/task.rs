@@ -41,7 +41,8 @@ pub struct Task {
     pub roles: Vec<Role>,
     /// The steps, in order.
     pub subtasks: Vec<Subtask>,
-    /// How many actions the expert takes.
+    /// How many actions the expert takes; 0 where that is not known.
+    #[serde(default)]
     pub expert_steps: u32,
     /// After how many actions the episode ends: twice the expert's.
     pub horizon: u32,

@@ -10,6 +10,8 @@ pub struct Vocabulary {
 }
 
 impl Vocabulary {
+    /// What fills a text up to a length.
+    pub const PADDING: i64 = 0;
     /// The number of an unknown word.
     pub const UNKNOWN: i64 = 1;
     const FIRST: usize = 2;

@@ -2,36 +2,104 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::failure::Failure;
 use super::rollout::{Rollout, Tick};
-use crate::agent::Policy;
+use super::wording::Wording;
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Class};
 use crate::house::Outcome;
 
 /// One line of a run's `episodes.jsonl`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Episode {
     /// The task's id.
     pub task: String,
     /// Which of the run's seeds.
     pub seed: u64,
+    /// Whose words the agent heard.
+    #[serde(default, skip_serializing_if = "Wording::is_own")]
+    pub wording: Wording,
+    /// The subtask from which the agent acted; the expert did those before.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub from: u32,
     /// Fingerprint of the world at the start.
     pub start_hash: String,
     /// What the agent was told.
     pub instruction: String,
-    /// How many subtasks were completed.
+    /// How many subtasks the agent completed.
     pub completed: u32,
     /// Of how many.
     pub of: u32,
     /// All were.
     pub success: bool,
-    /// How many actions were taken.
+    /// How many actions the agent took.
     pub steps: u32,
     /// Why it ended before its time, if it did: what the policy or the environment reported.
     pub error: Option<String>,
+    /// What kept it from success, where it ended in its time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<Failure>,
+    /// How often it was begun; more than once where an error made it begin anew.
+    #[serde(default = "once", skip_serializing_if = "is_one")]
+    pub attempts: u32,
+    /// How many of the trace's steps the expert took first.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prefix: u32,
     /// What was done, step by step.
     pub trace: Vec<Step>,
+}
+
+/// What tells the episodes of a run apart.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// The task's id.
+    pub task: String,
+    /// Which seed.
+    pub seed: u64,
+    /// Whose words.
+    pub wording: Wording,
+    /// From which subtask.
+    pub from: u32,
+}
+
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "task {:?} and seed {}", self.task, self.seed)?;
+        if !self.wording.is_own() {
+            write!(f, " ({})", self.wording.name())?;
+        }
+        if self.from > 0 {
+            write!(f, " from subtask {}", self.from)?;
+        }
+        Ok(())
+    }
+}
+
+impl Episode {
+    /// What tells it apart from others of its run.
+    pub fn key(&self) -> Key {
+        Key { task: self.task.clone(), seed: self.seed, wording: self.wording, from: self.from }
+    }
+
+    /// Completed subtasks as a share of those that were asked.
+    pub fn progress(&self) -> f64 {
+        f64::from(self.completed) / f64::from(self.of.max(1))
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one(number: &u32) -> bool {
+    *number == 1
+}
+
+fn once() -> u32 {
+    1
 }
 
 /// One action of an episode.
@@ -67,16 +135,4 @@ impl Step {
             subtask: tick.completed_one.then(|| completed.saturating_sub(1)),
         }
     }
-}
-
-/// Lets `policy` act until the episode is over; `trace` grows as it goes, so that it survives a panic.
-///
-/// # Errors
-/// Whatever the policy reports.
-pub fn play(rollout: &mut Rollout, policy: &mut dyn Policy, trace: &mut Vec<Step>) -> anyhow::Result<()> {
-    while rollout.end().is_none() {
-        let tick = rollout.step(policy)?;
-        trace.push(Step::of(&tick, rollout));
-    }
-    Ok(())
 }

@@ -1,26 +1,20 @@
 //! Evaluation: every task with every seed, on several threads, with the same result for any number of them.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
-use anyhow::Context;
-
-use super::episode::{self, Episode};
+use super::chance;
+use super::episode::{Episode, Key};
 use super::folder::{Manifest, RunFolder};
+use super::player::{Booking, MakeTeam, Player};
 use super::report::Summary;
-use super::rollout::Rollout;
 use super::scenes::Scenes;
-use crate::agent::Policy;
+use super::shard::Shard;
+use super::wording::{self, Wording};
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
-use crate::house::House;
-use crate::house::grading::{Grader, Grading};
-use crate::language::instruction;
-
-/// Makes a policy; every worker thread calls it for one of its own.
-pub type MakePolicy<'a> = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Sync + 'a;
+use crate::house::grading::Grading;
 
 /// How to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,18 +29,49 @@ pub struct Options {
     pub jobs: usize,
     /// The agent is told all steps instead of the task's instruction.
     pub step_by_step: bool,
+    /// The agent draws its actions by chance instead of taking the likeliest.
+    pub sampling: bool,
+    /// Each task is also played in every other wording.
+    pub language: bool,
+    /// Each task is also played from each of its subtasks on; the expert does those before.
+    pub every_start: bool,
+    /// An episode that ends with an error is begun anew at most this often.
+    pub retries: u32,
+    /// An episode that takes longer ends with an error; `None` for no limit.
+    pub timeout: Option<Duration>,
+    /// Only this share of the episodes.
+    pub shard: Option<Shard>,
+}
+
+impl Options {
+    /// Each task once, from its start, in its own words, on one thread.
+    pub fn plain(grading: Grading) -> Options {
+        Options {
+            grading,
+            seeds: 1,
+            limit: None,
+            jobs: 1,
+            step_by_step: false,
+            sampling: false,
+            language: false,
+            every_start: false,
+            retries: 0,
+            timeout: None,
+            shard: None,
+        }
+    }
 }
 
 /// An evaluation that can start: its tasks fit their scenes.
 pub struct Evaluation {
-    tasks: Vec<Task>,
-    scenes: Scenes,
-    options: Options,
+    pub(super) tasks: Vec<Task>,
+    pub(super) scenes: Scenes,
+    pub(super) options: Options,
     manifest: Manifest,
 }
 
 /// How far an evaluation is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Progress {
     /// Episodes that are over.
     pub done: usize,
@@ -80,20 +105,7 @@ impl Evaluation {
     ) -> anyhow::Result<Evaluation> {
         let mut tasks = set.value.tasks.clone();
         tasks.truncate(options.limit.unwrap_or(usize::MAX));
-        if options.step_by_step
-            && let Some(i) = tasks.iter().position(|task| task.sentences.is_empty())
-        {
-            anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
-        }
-        if options.grading == Grading::Strict {
-            let unrecorded = |task: &Task| task.subtasks.iter().position(|subtask| subtask.literal.is_none());
-            if let Some((i, j)) = tasks.iter().enumerate().find_map(|(i, task)| Some((i, unrecorded(task)?))) {
-                anyhow::bail!(
-                    "tasks[{i}].subtasks[{j}].literal: missing, so the task {:?} has no recording for the strict grader; use --grader class",
-                    tasks[i].id
-                );
-            }
-        }
+        check(&tasks, options)?;
         let scenes_hash = scenes.check(&tasks)?;
         let manifest = Manifest {
             format_version: Manifest::FORMAT,
@@ -107,6 +119,10 @@ impl Evaluation {
             seeds: options.seeds,
             grader: options.grading,
             step_by_step: options.step_by_step,
+            sampling: options.sampling,
+            language: options.language,
+            every_start: options.every_start,
+            shard: options.shard,
         };
         Ok(Evaluation { tasks, scenes, options, manifest })
     }
@@ -116,188 +132,179 @@ impl Evaluation {
         &self.manifest
     }
 
-    /// Every task with every seed, as positions in the set.
-    pub fn all(&self) -> Vec<(usize, u64)> {
-        let seeds = self.options.seeds;
-        (0..self.tasks.len()).flat_map(|task| (0..seeds).map(move |seed| (task, seed))).collect()
+    /// The tasks that are played.
+    pub fn tasks(&self) -> &[Task] {
+        &self.tasks
     }
 
-    /// Plays the episodes of these tasks and seeds on several threads; `sink` takes each, in their order.
+    /// Where they play.
+    pub fn scenes(&self) -> &Scenes {
+        &self.scenes
+    }
+
+    /// Every episode of the run, or of its share, in order.
+    pub fn all(&self) -> Vec<Booking> {
+        let all = bookings(&self.manifest, &self.tasks);
+        let own = self.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
+        all[own].to_vec()
+    }
+
+    /// What tells an episode apart from the others.
+    pub fn key(&self, booking: &Booking) -> Key {
+        booking.key(&self.tasks)
+    }
+
+    /// Plays these episodes on several threads; `sink` takes each, in their order.
     ///
-    /// `stop` ends it early: episodes under way are finished, no others begun.
+    /// `stop` ends it early: what is under way is dropped.
     ///
     /// # Errors
-    /// When a policy cannot be made, or `sink` fails.
+    /// When a team cannot be made, or `sink` fails.
     pub fn play(
         &self,
-        wanted: &[(usize, u64)],
-        make_policy: &MakePolicy<'_>,
+        wanted: &[Booking],
+        make_team: &MakeTeam<'_>,
         stop: &AtomicBool,
         sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let jobs = self.options.jobs.min(wanted.len());
-        let policies = (0..jobs).map(|_| make_policy()).collect::<anyhow::Result<Vec<_>>>()?;
-        let next = AtomicUsize::new(0);
-        // Set when the sink fails; `stop` belongs to the caller.
-        let give_up = AtomicBool::new(false);
-        let (sender, receiver) = mpsc::channel::<(usize, Episode)>();
-        std::thread::scope(|scope| {
-            for policy in policies {
-                let (sender, next, give_up) = (sender.clone(), &next, &give_up);
-                scope.spawn(move || {
-                    let mut policy = Some(policy);
-                    while !stop.load(Ordering::Relaxed) && !give_up.load(Ordering::Relaxed) {
-                        let place = next.fetch_add(1, Ordering::Relaxed);
-                        let Some(&(task, seed)) = wanted.get(place) else { break };
-                        let episode = self.episode(task, seed, &mut policy, make_policy);
-                        if sender.send((place, episode)).is_err() {
-                            break;
-                        }
-                    }
-                });
-            }
-            drop(sender);
-            // Episodes come as they end and leave in their order: what is written is the same for any number of threads.
-            let mut waiting = BTreeMap::new();
-            let mut place = 0;
-            for (at, episode) in receiver {
-                waiting.insert(at, episode);
-                while let Some(episode) = waiting.remove(&place) {
-                    sink(episode).inspect_err(|_| give_up.store(true, Ordering::Relaxed))?;
-                    place += 1;
-                }
-            }
-            Ok(())
-        })
-    }
-
-    /// One episode. Errors and panics of the policy or the environment end it and are recorded.
-    fn episode(
-        &self,
-        index: usize,
-        seed: u64,
-        policy: &mut Option<Box<dyn Policy>>,
-        make_policy: &MakePolicy<'_>,
-    ) -> Episode {
-        let task = &self.tasks[index];
-        let mut episode = Episode {
-            task: task.id.clone(),
-            seed,
-            start_hash: String::new(),
-            instruction: told(task, self.options.step_by_step),
-            completed: 0,
-            of: task.subtasks.len() as u32,
-            success: false,
-            steps: 0,
-            error: None,
-            trace: Vec::new(),
-        };
-        let ending = catch_unwind(AssertUnwindSafe(|| -> anyhow::Result<()> {
-            let setting = self.scenes.setting(task)?;
-            episode.start_hash = setting.world.digest();
-            let grader = Grader::new(self.options.grading, &task.roles, &task.subtasks, task.goal.as_ref());
-            let house = House::new(setting.scene, setting.world);
-            let mut rollout = Rollout::new(house, episode.instruction.clone(), Some(grader), Some(task.horizon));
-            if policy.is_none() {
-                *policy = Some(make_policy().context("the policy could not be made again")?);
-            }
-            let Some(policy) = policy.as_mut() else { anyhow::bail!("there is no policy") };
-            policy.begin(policy_seed(index, seed));
-            episode::play(&mut rollout, policy.as_mut(), &mut episode.trace)
-        }));
-        episode.error = match ending {
-            Ok(Ok(())) => None,
-            Ok(Err(error)) => Some(format!("{error:#}")),
-            Err(panic) => {
-                // Whatever state the panic left it in is not carried into the next episode.
-                *policy = None;
-                Some(format!("panicked: {}", panic_message(panic.as_ref())))
-            }
-        };
-        episode.steps = episode.trace.len() as u32;
-        episode.completed = episode.trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        episode.success = episode.completed == episode.of;
-        episode
+        Player { evaluation: self, make_team, stop }.play(wanted, sink)
     }
 }
 
-/// Runs an evaluation into its folder: the episodes that are not there yet, in the order of tasks and seeds.
+/// Every episode of a run in its order: by task, then seed, then what the agent is told, then from where it starts.
+pub fn bookings(manifest: &Manifest, tasks: &[Task]) -> Vec<Booking> {
+    let wordings: &[Wording] = if manifest.language { &Wording::ALL } else { &Wording::ALL[..1] };
+    let mut all = Vec::new();
+    for (task, of) in tasks.iter().enumerate() {
+        for seed in 0..manifest.seeds {
+            let begin = |wording, from| Booking { place: 0, task, seed, wording, from, attempts: 0 };
+            all.extend(wordings.iter().map(|&wording| begin(wording, 0)));
+            if manifest.every_start {
+                all.extend((1..of.subtasks.len() as u32).map(|from| begin(Wording::Own, from)));
+            }
+        }
+    }
+    for (place, booking) in all.iter_mut().enumerate() {
+        booking.place = place;
+    }
+    all
+}
+
+/// Checks that the tasks have what the options need.
+fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
+    if options.step_by_step
+        && let Some(i) = tasks.iter().position(|task| task.sentences.is_empty())
+    {
+        anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
+    }
+    if options.grading == Grading::Strict {
+        let unrecorded = |task: &Task| task.subtasks.iter().position(|subtask| subtask.literal.is_none());
+        if let Some((i, j)) = tasks.iter().enumerate().find_map(|(i, task)| Some((i, unrecorded(task)?))) {
+            anyhow::bail!(
+                "tasks[{i}].subtasks[{j}].literal: missing, so the task {:?} has no recording for the strict grader; use --grader class",
+                tasks[i].id
+            );
+        }
+    }
+    if options.language && !wording::can_swap(tasks, options.step_by_step) {
+        anyhow::bail!(
+            "tasks: all are told the same, so no instruction can be swapped for another; leave out --language"
+        );
+    }
+    Ok(())
+}
+
+/// Runs an evaluation into its folder: the episodes that are not there yet, in the run's order.
 ///
-/// `stop` ends it early: episodes under way are finished, no others begun, and the summary says that it is partial.
+/// `stop` ends it early: what is under way is dropped, and the summary says that it is partial.
 ///
 /// # Errors
-/// When a policy cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
+/// When a team cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
 pub fn evaluate(
     evaluation: &Evaluation,
-    make_policy: &MakePolicy<'_>,
+    make_team: &MakeTeam<'_>,
     folder: &mut RunFolder,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
 ) -> anyhow::Result<Summary> {
-    let mut episodes = std::mem::take(&mut folder.earlier);
-    let done: BTreeSet<(&str, u64)> = episodes.iter().map(|episode| (episode.task.as_str(), episode.seed)).collect();
     let all = evaluation.all();
-    let total = all.len();
-    let missing = |&(task, seed): &(usize, u64)| !done.contains(&(evaluation.tasks[task].id.as_str(), seed));
-    let wanted: Vec<(usize, u64)> = all.into_iter().filter(missing).collect();
-    let mut state = Progress { of: total, ..Progress::default() };
-    episodes.iter().for_each(|episode| state.count(episode));
+    let mut episodes: BTreeMap<Key, Episode> =
+        std::mem::take(&mut folder.earlier).into_iter().map(|episode| (episode.key(), episode)).collect();
+    let mut wanted = Vec::new();
+    for booking in &all {
+        match episodes.get(&evaluation.key(booking)) {
+            None => wanted.push(*booking),
+            // What failed before is begun anew as often as is asked now.
+            Some(found) if found.error.is_some() && found.attempts <= evaluation.options.retries => {
+                wanted.push(Booking { attempts: found.attempts, ..*booking });
+            }
+            Some(_) => {}
+        }
+    }
+    let mut state = Progress { of: all.len(), ..Progress::default() };
+    let again: Vec<Key> = wanted.iter().map(|booking| evaluation.key(booking)).collect();
+    for key in &again {
+        episodes.remove(key);
+    }
+    episodes.values().for_each(|episode| state.count(episode));
     progress(state);
-    evaluation.play(&wanted, make_policy, stop, &mut |mut episode| {
+    evaluation.play(&wanted, make_team, stop, &mut |mut episode| {
         folder.append(&episode)?;
         state.count(&episode);
         progress(state);
         // It is on disk; a night's run need not be in memory too.
         episode.trace = Vec::new();
-        episodes.push(episode);
+        episodes.insert(episode.key(), episode);
         Ok(())
     })?;
-    let summary = Summary::of(&evaluation.manifest, &evaluation.tasks, &episodes, episodes.len() < total);
+    finish(&evaluation.manifest, &evaluation.tasks, &all, folder)
+}
+
+/// Sums up what a folder holds, and writes the summary into it.
+///
+/// # Errors
+/// When the folder cannot be read or written to.
+pub fn finish(manifest: &Manifest, tasks: &[Task], all: &[Booking], folder: &mut RunFolder) -> anyhow::Result<Summary> {
+    let order: Vec<Key> = all.iter().map(|booking| booking.key(tasks)).collect();
+    let (episodes, hash) = folder.result(&order)?;
+    let mut summary = Summary::of(manifest, tasks, &episodes, episodes.len() < all.len());
+    summary.episodes_hash = hash;
     folder.write_summary(&summary)?;
     Ok(summary)
 }
 
-/// What the agent is told: the task's instruction, or all its steps, each normalised, in one line.
-pub fn told(task: &Task, step_by_step: bool) -> String {
-    if step_by_step {
-        task.sentences.iter().map(|sentence| instruction::normalise(sentence)).collect::<Vec<_>>().join(" ")
-    } else {
-        instruction::normalise(&task.instruction)
-    }
-}
-
 /// What drives a policy's chance in an episode: the task's position and the seed, and nothing else.
-fn policy_seed(task: usize, seed: u64) -> u64 {
-    // SplitMix64's finaliser over both, so that neighbours have nothing in common.
-    let mut z = (task as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-fn panic_message(panic: &(dyn std::any::Any + Send)) -> &str {
-    let text = panic.downcast_ref::<&str>().copied();
-    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message")
+pub(super) fn policy_seed(booking: &Booking) -> u64 {
+    chance::mix(booking.task as u64, booking.seed)
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::atomic::Ordering;
+
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::agent::{Decision, Situation};
+    use crate::agent::{Decision, Policy, Situation, Solo, Team};
     use crate::data::{json, taskset};
     use crate::domain::task::SceneRef;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
     use crate::house::testing::kitchen;
 
     /// Walks by chance, sometimes touching what it can; fails in the ways that it is told to.
-    struct Walker {
+    pub(crate) struct Walker {
         rng: ChaCha8Rng,
         steps: u32,
         fails: bool,
         panics: bool,
+    }
+
+    impl Walker {
+        pub(crate) fn new(fails: bool, panics: bool) -> Walker {
+            Walker { rng: ChaCha8Rng::seed_from_u64(0), steps: 0, fails, panics }
+        }
     }
 
     impl Policy for Walker {
@@ -324,8 +331,8 @@ mod tests {
         }
     }
 
-    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Policy>> {
-        Ok(Box::new(Walker { rng: ChaCha8Rng::seed_from_u64(0), steps: 0, fails, panics }))
+    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Team>> {
+        Ok(Box::new(Solo(Box::new(Walker::new(fails, panics)))))
     }
 
     /// Three tasks in the test kitchen, and the folder that they live in.
@@ -361,14 +368,21 @@ mod tests {
         (folder, document)
     }
 
-    const OPTIONS: Options = Options { grading: Grading::Class, seeds: 4, limit: None, jobs: 1, step_by_step: false };
-
-    struct Ran {
-        summary: Summary,
-        lines: String,
+    pub(crate) fn options() -> Options {
+        Options { seeds: 4, ..Options::plain(Grading::Class) }
     }
 
-    fn run(into: &std::path::Path, options: Options, make: &MakePolicy<'_>, stop_after: usize) -> anyhow::Result<Ran> {
+    pub(crate) struct Ran {
+        pub(crate) summary: Summary,
+        pub(crate) lines: String,
+    }
+
+    pub(crate) fn run(
+        into: &std::path::Path,
+        options: Options,
+        make: &MakeTeam<'_>,
+        stop_after: usize,
+    ) -> anyhow::Result<Ran> {
         let (folder, set) = tasks();
         let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
         let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;
@@ -388,7 +402,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let with = |jobs: usize| {
             let into = folder.path().join(jobs.to_string());
-            run(&into, Options { jobs, ..OPTIONS }, &|| walker(false, false), usize::MAX).unwrap()
+            run(&into, Options { jobs, ..options() }, &|| walker(false, false), usize::MAX).unwrap()
         };
         let (one, four) = (with(1), with(4));
         assert_eq!(one.lines.lines().count(), 12);
@@ -400,11 +414,11 @@ mod tests {
     #[test]
     fn errors_and_panics_end_their_episode_and_stay_in_the_count() {
         let folder = tempfile::tempdir().unwrap();
-        let failing = run(&folder.path().join("a"), OPTIONS, &|| walker(true, false), usize::MAX).unwrap();
+        let failing = run(&folder.path().join("a"), options(), &|| walker(true, false), usize::MAX).unwrap();
         assert_eq!((failing.summary.episodes, failing.summary.partial), (12, false));
         assert!(failing.summary.errors > 0);
         assert!(failing.lines.contains("\"error\":\"no way to the mug\""), "{}", failing.lines);
-        let panicking = run(&folder.path().join("b"), OPTIONS, &|| walker(false, true), usize::MAX).unwrap();
+        let panicking = run(&folder.path().join("b"), options(), &|| walker(false, true), usize::MAX).unwrap();
         assert_eq!(panicking.summary.episodes, 12);
         assert!(panicking.lines.contains("\"error\":\"panicked: out of legs\""), "{}", panicking.lines);
     }
@@ -414,38 +428,22 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (whole, stopped) = (folder.path().join("whole"), folder.path().join("stopped"));
         let make = || walker(false, false);
-        let whole = run(&whole, OPTIONS, &make, usize::MAX).unwrap();
-        let partial = run(&stopped, Options { jobs: 2, ..OPTIONS }, &make, 3).unwrap();
+        let whole = run(&whole, options(), &make, usize::MAX).unwrap();
+        let partial = run(&stopped, Options { jobs: 2, ..options() }, &make, 3).unwrap();
         assert!(partial.summary.partial && (3..12).contains(&partial.summary.episodes));
-        let resumed = run(&stopped, OPTIONS, &make, usize::MAX).unwrap();
+        let resumed = run(&stopped, options(), &make, usize::MAX).unwrap();
         assert_eq!(resumed.lines, whole.lines);
         assert_eq!(resumed.summary, whole.summary);
-        let again = run(&stopped, OPTIONS, &make, usize::MAX).unwrap();
+        let again = run(&stopped, options(), &make, usize::MAX).unwrap();
         assert_eq!(again.lines, whole.lines, "a complete run is left as it is");
     }
 
     #[test]
     fn a_folder_of_other_settings_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        run(folder.path(), OPTIONS, &|| walker(false, false), usize::MAX).unwrap();
-        let other = Options { seeds: 5, ..OPTIONS };
+        run(folder.path(), options(), &|| walker(false, false), usize::MAX).unwrap();
+        let other = Options { seeds: 5, ..options() };
         let error = run(folder.path(), other, &|| walker(false, false), usize::MAX).err().unwrap();
         assert!(error.to_string().contains("seeds: 4, not 5"), "{error}");
-    }
-
-    #[test]
-    fn the_agent_is_told_the_normalised_instruction_or_all_steps() {
-        let (_folder, set) = tasks();
-        let mut task = set.value.tasks[0].clone();
-        task.instruction = "  put it   AWAY".into();
-        task.sentences = vec!["take   it".into(), "drop it!".into()];
-        assert_eq!(told(&task, false), "Put it away.");
-        assert_eq!(told(&task, true), "Take it. Drop it!");
-    }
-
-    #[test]
-    fn every_episode_has_a_seed_of_its_own() {
-        let seeds: BTreeSet<u64> = (0..50).flat_map(|task| (0..50).map(move |seed| policy_seed(task, seed))).collect();
-        assert_eq!(seeds.len(), 2_500);
     }
 }

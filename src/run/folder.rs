@@ -2,14 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
-use super::episode::Episode;
+use super::episode::{Episode, Key};
+use super::plot;
+use super::shard::Shard;
 use crate::data::json;
+use crate::domain::TaskSet;
 use crate::house::grading::Grading;
 
 /// What a run was made from; two runs with equal manifests measure the same thing.
@@ -38,6 +42,18 @@ pub struct Manifest {
     pub grader: Grading,
     /// The agent is told all steps instead of the task's instruction.
     pub step_by_step: bool,
+    /// The agent draws its actions by chance instead of taking the likeliest.
+    #[serde(default)]
+    pub sampling: bool,
+    /// Each task is also played in every other wording.
+    #[serde(default)]
+    pub language: bool,
+    /// Each task is also played from each of its subtasks on.
+    #[serde(default)]
+    pub every_start: bool,
+    /// Which share of the run this is; nothing for a whole one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
 }
 
 impl Manifest {
@@ -45,32 +61,39 @@ impl Manifest {
     pub const FORMAT: u32 = 1;
 
     /// The fields in which `other` differs, each as `field: this, not that`.
-    fn differences(&self, other: &Manifest) -> Vec<String> {
+    pub fn differences(&self, other: &Manifest) -> Vec<String> {
         let fields = |manifest| match serde_json::to_value(manifest) {
             Ok(serde_json::Value::Object(fields)) => fields,
             _ => serde_json::Map::new(),
         };
-        let others = fields(other);
-        let differing = fields(self).into_iter().filter(|(field, value)| others.get(field) != Some(value));
-        differing
-            .map(|(field, value)| {
-                format!("{field}: {value}, not {}", others.get(&field).unwrap_or(&serde_json::Value::Null))
-            })
-            .collect()
+        let (own, others) = (fields(self), fields(other));
+        let names: std::collections::BTreeSet<&String> = own.keys().chain(others.keys()).collect();
+        let null = serde_json::Value::Null;
+        let pairs =
+            names.into_iter().map(|name| (name, own.get(name).unwrap_or(&null), others.get(name).unwrap_or(&null)));
+        pairs.filter(|(_, a, b)| a != b).map(|(name, a, b)| format!("{name}: {a}, not {b}")).collect()
     }
 }
 
-/// An open run folder.
+/// An open run folder, which no other process writes to.
 pub struct RunFolder {
     path: PathBuf,
     episodes: File,
-    /// The episodes that were there when it was opened.
+    /// The episodes that were there when it was opened, without their traces.
     pub earlier: Vec<Episode>,
 }
 
 impl RunFolder {
-    const MANIFEST: &str = "manifest.json";
-    const EPISODES: &str = "episodes.jsonl";
+    /// The file of a run's manifest.
+    pub const MANIFEST: &str = "manifest.json";
+    /// The file of a run's episodes.
+    pub const EPISODES: &str = "episodes.jsonl";
+    /// The file with the tasks that a run plays.
+    pub const TASKS: &str = "tasks.json";
+    /// The file of a run's summary.
+    pub const SUMMARY: &str = "summary.json";
+    /// How the names of files begin that are being written.
+    const UNFINISHED: &str = ".sprint-";
 
     /// Opens a folder for this run: a new or empty one, or one that the same run began, which is then continued.
     ///
@@ -79,19 +102,10 @@ impl RunFolder {
     pub fn open(path: &Path, manifest: &Manifest) -> anyhow::Result<RunFolder> {
         let name = path.display();
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the run folder {name}"))?;
+        own_files_only(path)?;
         let manifest_path = path.join(Self::MANIFEST);
-        if manifest_path.exists() {
-            let found = json::read::<Manifest>(&manifest_path, Manifest::FORMAT)?.value;
-            let differences = found.differences(manifest);
-            if !differences.is_empty() {
-                bail!("{name} holds another run ({}); choose another folder with --out", differences.join("; "));
-            }
-        } else {
-            let mut entries = std::fs::read_dir(path).with_context(|| format!("cannot read {name}"))?;
-            if entries.next().is_some() {
-                bail!("{name} is not empty and holds no run; choose another folder with --out");
-            }
-            json::write_pretty(&manifest_path, manifest)?;
+        if !manifest_path.exists() {
+            only_begun(path)?;
         }
         let episodes_path = path.join(Self::EPISODES);
         let context = || format!("cannot write {}", episodes_path.display());
@@ -103,9 +117,22 @@ impl RunFolder {
             // A file system without locks: the user has to see to it.
             Err(TryLockError::Error(_)) => {}
         }
-        let (earlier, whole) = read_episodes(&episodes_path)?;
+        if manifest_path.exists() {
+            let found = json::read::<Manifest>(&manifest_path, Manifest::FORMAT)?.value;
+            let differences = found.differences(manifest);
+            if !differences.is_empty() {
+                bail!("{name} holds another run ({}); choose another folder with --out", differences.join("; "));
+            }
+        } else {
+            json::write_pretty(&manifest_path, manifest)?;
+        }
+        let (mut earlier, whole) = read_episodes(&episodes_path)?;
+        for episode in &mut earlier {
+            episode.trace = Vec::new();
+        }
         // What follows the last whole line is the rest of a write that was cut off.
         episodes.set_len(whole).with_context(context)?;
+        remove_unfinished(path);
         Ok(RunFolder { path: path.to_owned(), episodes, earlier })
     }
 
@@ -125,43 +152,129 @@ impl RunFolder {
         self.episodes.write_all(&line).with_context(context)
     }
 
-    /// Writes the summary in its three forms, each atomically.
+    /// Writes down which tasks are played, so that the folder can be opened without their file.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub fn write_tasks(&self, set: &TaskSet) -> anyhow::Result<()> {
+        let path = self.path.join(Self::TASKS);
+        if path.exists() { Ok(()) } else { json::write(&path, set) }
+    }
+
+    /// The episodes in the given order, without their traces, and the SHA-256 of their lines in that order: that of the file
+    /// `episodes.jsonl` of a run that nothing went wrong in.
+    ///
+    /// # Errors
+    /// When the file cannot be read any more.
+    pub fn result(&self, order: &[Key]) -> anyhow::Result<(Vec<Episode>, String)> {
+        let (episodes, _) = read_episodes(&self.path.join(Self::EPISODES))?;
+        let mut by_key: BTreeMap<Key, Episode> = episodes.into_iter().map(|e| (e.key(), e)).collect();
+        let mut digest = Sha256::new();
+        let mut ordered = Vec::new();
+        for key in order {
+            let Some(mut episode) = by_key.remove(key) else { continue };
+            digest.update(serde_json::to_vec(&episode)?);
+            digest.update(b"\n");
+            episode.trace = Vec::new();
+            ordered.push(episode);
+        }
+        Ok((ordered, json::hex(&digest.finalize())))
+    }
+
+    /// Writes the summary in its three forms and the plots, each atomically.
     ///
     /// # Errors
     /// When the folder cannot be written to.
     pub fn write_summary(&self, summary: &super::report::Summary) -> anyhow::Result<()> {
-        json::write_pretty(&self.path.join("summary.json"), summary)?;
         json::write_bytes(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
-        json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)
+        json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)?;
+        plot::write(&self.path, plot::PROGRESS, &plot::progress_by_length(&[summary]))?;
+        json::write_pretty(&self.path.join(Self::SUMMARY), summary)
     }
 }
 
-/// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out.
+/// No file of the folder lies elsewhere: what is written stays in it.
+fn own_files_only(path: &Path) -> anyhow::Result<()> {
+    let entries = std::fs::read_dir(path).with_context(|| format!("cannot read {}", path.display()))?;
+    for entry in entries {
+        let entry = entry.with_context(|| format!("cannot read {}", path.display()))?;
+        if entry.file_type().is_ok_and(|kind| kind.is_symlink()) {
+            bail!("{}: a symbolic link; a run folder holds its own files, so remove it", entry.path().display());
+        }
+    }
+    Ok(())
+}
+
+/// A folder without a manifest holds nothing, or what a run left that was killed before it had written one.
+fn only_begun(path: &Path) -> anyhow::Result<()> {
+    let name = path.display();
+    for entry in std::fs::read_dir(path).with_context(|| format!("cannot read {name}"))? {
+        let entry = entry.with_context(|| format!("cannot read {name}"))?;
+        let file = entry.file_name();
+        let file = file.to_string_lossy();
+        let empty = || entry.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
+        // The shares of a run lie in the folder that they are merged into.
+        let begun = file.starts_with(RunFolder::UNFINISHED)
+            || file == Shard::FOLDER
+            || (file == RunFolder::EPISODES && empty());
+        if !begun {
+            bail!("{name} is not empty and holds no run; choose another folder with --out");
+        }
+    }
+    Ok(())
+}
+
+/// Files that a killed process did not get to rename are of no use to anyone; failing to remove them does no harm.
+fn remove_unfinished(path: &Path) {
+    let entries = std::fs::read_dir(path).into_iter().flatten().filter_map(Result::ok);
+    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(RunFolder::UNFINISHED)) {
+        let _ = std::fs::remove_file(entry.path());
+    }
+}
+
+/// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out; where an episode was
+/// begun anew after an error, its last record counts.
 ///
 /// # Errors
 /// When a line before the last is not an episode, or one is there twice; names file and line.
 pub fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
     let name = path.display();
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
-    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
-    let mut episodes = Vec::new();
-    let mut lines = BTreeMap::new();
-    for (number, line) in (1..).zip(bytes[..whole].split_inclusive(|&byte| byte == b'\n')) {
-        let episode: Episode =
-            serde_json::from_slice(line).with_context(|| format!("{name}: line {number} is not an episode"))?;
-        if let Some(first) = lines.insert((episode.task.clone(), episode.seed), number) {
-            bail!("{name}: lines {first} and {number} are the same task {:?} and seed {}", episode.task, episode.seed);
+    let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
+    let mut reader = BufReader::new(file);
+    let (mut episodes, mut places) = (Vec::<Episode>::new(), BTreeMap::<Key, (usize, usize)>::new());
+    let (mut line, mut whole) = (Vec::new(), 0);
+    for number in 1.. {
+        line.clear();
+        reader.read_until(b'\n', &mut line).with_context(|| format!("cannot read {name}"))?;
+        if line.last() != Some(&b'\n') {
+            break;
         }
-        episodes.push(episode);
+        whole += line.len() as u64;
+        let episode: Episode =
+            serde_json::from_slice(&line).with_context(|| format!("{name}: line {number} is not an episode"))?;
+        let key = episode.key();
+        match places.get(&key) {
+            Some(&(place, _)) if episodes[place].error.is_some() && episodes[place].attempts < episode.attempts => {
+                episodes[place] = episode;
+            }
+            Some((_, first)) => bail!("{name}: lines {first} and {number} are the same {key}"),
+            None => {
+                places.insert(key, (episodes.len(), number));
+                episodes.push(episode);
+            }
+        }
     }
-    Ok((episodes, whole as u64))
+    Ok((episodes, whole))
 }
 
-/// The folder of a run that was given none: `runs/NAME-YYYYMMDD-HHMMSS`, in universal time.
-pub fn default_path(name: &str, unix_seconds: u64) -> PathBuf {
+/// The folder of a run that was given none: `runs/NAME-YYYYMMDD-HHMMSS`, in universal time. Where there is one already,
+/// of a run that began in the same second or before the clock was set back, a number is added.
+pub fn default_path(name: &str, unix_seconds: u64, is_taken: &dyn Fn(&Path) -> bool) -> PathBuf {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
     let name: String = name.trim().trim_start_matches('.').chars().take(60).map(plain).collect();
-    Path::new("runs").join(format!("{name}-{}", timestamp(unix_seconds)))
+    let first = Path::new("runs").join(format!("{name}-{}", timestamp(unix_seconds)));
+    let numbered = (2..10_000).map(|number| PathBuf::from(format!("{}-{number}", first.display())));
+    std::iter::once(first.clone()).chain(numbered).find(|path| !is_taken(path)).unwrap_or(first)
 }
 
 /// `YYYYMMDD-HHMMSS` in universal time.
@@ -196,6 +309,10 @@ pub(crate) mod tests {
             seeds: 1,
             grader: Grading::Class,
             step_by_step: false,
+            sampling: false,
+            language: false,
+            every_start: false,
+            shard: None,
         }
     }
 
@@ -209,8 +326,8 @@ pub(crate) mod tests {
             of: 2,
             success: false,
             steps: 9,
-            error: None,
-            trace: vec![],
+            attempts: 1,
+            ..Episode::default()
         }
     }
 
@@ -266,9 +383,48 @@ pub(crate) mod tests {
         assert!(read_episodes(&path).unwrap_err().to_string().contains("lines 1 and 2"));
     }
 
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(200))]
+        #[test]
+        fn damaged_episodes_and_manifests_are_read_or_refused(
+            edits in proptest::collection::vec((proptest::prelude::any::<usize>(), proptest::prelude::any::<u8>(), 0u8..4), 1..8),
+        ) {
+            let damaged = |text: String| {
+                let mut bytes = text.into_bytes();
+                for &(at, byte, edit) in &edits {
+                    let at = at % bytes.len().max(1);
+                    match edit {
+                        0 => bytes.truncate(at),
+                        1 if at < bytes.len() => bytes[at] = byte,
+                        2 if at < bytes.len() => drop(bytes.remove(at)),
+                        _ => bytes.insert(at.min(bytes.len()), byte),
+                    }
+                }
+                bytes
+            };
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("episodes.jsonl");
+            let line = |task| serde_json::to_string(&episode(task)).unwrap() + "\n";
+            std::fs::write(&path, damaged(line("a") + &line("b") + &line("c"))).unwrap();
+            if let Ok((episodes, whole)) = read_episodes(&path) {
+                proptest::prop_assert!(whole <= std::fs::metadata(&path).unwrap().len());
+                proptest::prop_assert!(episodes.len() <= 11);
+            }
+            let text = serde_json::to_string_pretty(&manifest()).unwrap();
+            let _ = json::parse::<Manifest>(&damaged(text), Manifest::FORMAT);
+        }
+    }
+
     #[test]
     fn a_default_folder_is_named_by_set_and_time() {
-        assert_eq!(default_path("eval 100/x", 0), Path::new("runs/eval-100-x-19700101-000000"));
+        let first = Path::new("runs/eval-100-x-19700101-000000");
+        assert_eq!(default_path("eval 100/x", 0, &|_| false), first);
+        let second = default_path("eval 100/x", 0, &|path| path == first);
+        assert_eq!(
+            second,
+            Path::new("runs/eval-100-x-19700101-000000-2"),
+            "a clock that was set back finds no old folder"
+        );
         assert_eq!(timestamp(951_826_153), "20000229-120913");
         assert_eq!(timestamp(1_767_225_599), "20251231-235959");
     }

@@ -1,17 +1,20 @@
 //! What a run came to: rates and means with their intervals.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::breakdown::{self, Errored, FailureClass, Group, Grouped, Start};
 use super::episode::Episode;
+use super::failure::Failure;
 use super::folder::Manifest;
 use super::stats::{self, Interval};
+use super::wording::Wording;
 use crate::domain::{SkillKind, Task};
 use crate::house::grading::Grading;
 
 /// Drives the resampling of the bootstrap.
-const BOOTSTRAP_SEED: u64 = 0;
+pub const BOOTSTRAP_SEED: u64 = 0;
 
 /// A mean and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,7 +27,8 @@ pub struct Mean {
 }
 
 impl Mean {
-    fn of(groups: &[Vec<f64>]) -> Mean {
+    /// Of the values of each task's episodes.
+    pub fn of(groups: &[Vec<f64>]) -> Mean {
         let mean = stats::mean(groups.iter().flatten().copied());
         Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
     }
@@ -54,7 +58,8 @@ pub struct IntervalMethods {
     pub means: String,
 }
 
-/// The summary of a run.
+/// The summary of a run. Its figures are of the episodes in the tasks' own words from their starts; those in other words or
+/// from later subtasks have tables of their own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
@@ -72,7 +77,7 @@ pub struct Summary {
     pub tasks: usize,
     /// Episodes, failed and errored ones included.
     pub episodes: usize,
-    /// Episodes that ended with an error; they count as they stood.
+    /// Episodes that ended with an error, in other words and from later subtasks too; they count as no success.
     pub errors: usize,
     /// The share of episodes in which every subtask was completed.
     pub success: f64,
@@ -84,16 +89,37 @@ pub struct Summary {
     pub progress: Mean,
     /// By the number of subtasks: mean completed ones as a share of them.
     pub progress_by_length: BTreeMap<u32, f64>,
+    /// By the number of subtasks: the 95 % interval of that.
+    pub progress_interval_by_length: BTreeMap<u32, Interval>,
     /// By the number of subtasks: the share of successes.
     pub success_by_length: BTreeMap<u32, f64>,
     /// By the number of subtasks: the episodes.
     pub episodes_by_length: BTreeMap<u32, usize>,
     /// By the kind of skill.
     pub skills: BTreeMap<SkillKind, SkillRate>,
+    /// By the scene; generated houses by their room.
+    pub scenes: BTreeMap<String, Group>,
     /// Steps of an episode.
     pub steps_mean: f64,
     /// Steps that the expert takes, for the same episodes.
     pub expert_steps_mean: f64,
+    /// Steps of a successful episode as a multiple of the expert's; nothing without any.
+    pub steps_over_expert: Option<Mean>,
+    /// Why episodes fell short, by class.
+    pub failures: BTreeMap<Failure, FailureClass>,
+    /// Every episode that ended with an error.
+    pub errored: Vec<Errored>,
+    /// By wording, where a run asked for them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub language: BTreeMap<Wording, Group>,
+    /// By the subtask from which the agent acted, where a run asked for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub starts: BTreeMap<u32, Start>,
+    /// By the kind of the first subtask that was the agent's own, where a run asked for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub first_skills: BTreeMap<SkillKind, SkillRate>,
+    /// SHA-256 of the episodes' lines in the run's order.
+    pub episodes_hash: String,
     /// How the intervals were made.
     pub interval_methods: IntervalMethods,
 }
@@ -104,47 +130,45 @@ impl Summary {
 
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
     pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
-        let mut of_task: BTreeMap<&str, Vec<&Episode>> = BTreeMap::new();
-        for episode in episodes {
-            of_task.entry(&episode.task).or_default().push(episode);
-        }
-        // By task in the set's order, by seed within: sums of floats then do not depend on the order of the episodes.
-        let mut groups: Vec<(&Task, Vec<&Episode>)> =
-            tasks.iter().filter_map(|task| Some((task, of_task.remove(task.id.as_str())?))).collect();
-        for (_, group) in &mut groups {
-            group.sort_by_key(|episode| episode.seed);
-        }
-        let values = |value: fn(&Episode) -> f64| -> Vec<Vec<f64>> {
-            groups.iter().map(|(_, group)| group.iter().map(|episode| value(episode)).collect()).collect()
-        };
-        let all: Vec<(&Task, &Episode)> =
-            groups.iter().flat_map(|(task, group)| group.iter().map(|&episode| (*task, episode))).collect();
+        let every = Grouped::of(tasks, episodes);
+        let main = every.only(|episode| episode.wording.is_own() && episode.from == 0);
+        let all = main.pairs();
         let successes = all.iter().filter(|(_, episode)| episode.success).count();
-        let lengths: std::collections::BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
+        let lengths: BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
         let by_length = |value: fn(&Episode) -> f64| -> BTreeMap<u32, f64> {
             let of_length = |length| all.iter().filter(move |(_, e)| e.of == length).map(move |(_, e)| value(e));
             lengths.iter().map(|&length| (length, stats::mean(of_length(length)))).collect()
         };
         let count = |length| all.iter().filter(|(_, episode)| episode.of == length).count();
+        let interval = |length: u32| Mean::of(&main.only(|e| e.of == length).values(Episode::progress)).interval;
         Summary {
             format_version: Summary::FORMAT,
             task_set: manifest.task_set.clone(),
             policy: manifest.policy.clone(),
             grader: manifest.grader,
             partial,
-            tasks: groups.len(),
+            tasks: main.tasks(),
             episodes: all.len(),
-            errors: all.iter().filter(|(_, episode)| episode.error.is_some()).count(),
+            errors: every.pairs().iter().filter(|(_, episode)| episode.error.is_some()).count(),
             success: stats::mean(all.iter().map(|(_, episode)| f64::from(u8::from(episode.success)))),
             success_interval: stats::wilson(successes, all.len()),
-            completed_subtasks: Mean::of(&values(|episode| f64::from(episode.completed))),
-            progress: Mean::of(&values(progress)),
-            progress_by_length: by_length(progress),
+            completed_subtasks: Mean::of(&main.values(|episode| f64::from(episode.completed))),
+            progress: Mean::of(&main.values(Episode::progress)),
+            progress_by_length: by_length(Episode::progress),
+            progress_interval_by_length: lengths.iter().map(|&length| (length, interval(length))).collect(),
             success_by_length: by_length(|episode| f64::from(u8::from(episode.success))),
             episodes_by_length: lengths.iter().map(|&length| (length, count(length))).collect(),
             skills: skill_rates(&all),
+            scenes: main.by_scene(),
             steps_mean: stats::mean(all.iter().map(|(_, episode)| f64::from(episode.steps))),
             expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
+            steps_over_expert: main.steps_over_expert(),
+            failures: breakdown::failures(&main),
+            errored: breakdown::errored(&every),
+            language: if manifest.language { breakdown::language(&every) } else { BTreeMap::new() },
+            starts: if manifest.every_start { breakdown::starts(&every) } else { BTreeMap::new() },
+            first_skills: if manifest.every_start { breakdown::first_skills(&every) } else { BTreeMap::new() },
+            episodes_hash: String::new(),
             interval_methods: IntervalMethods {
                 rates: "Wilson score, 95 %".into(),
                 means: format!(
@@ -156,8 +180,13 @@ impl Summary {
     }
 }
 
-fn progress(episode: &Episode) -> f64 {
-    f64::from(episode.completed) / f64::from(episode.of.max(1))
+impl SkillRate {
+    pub(super) fn count(&mut self, completed: bool) {
+        self.reached += 1;
+        self.completed += usize::from(completed);
+        self.rate = self.completed as f64 / self.reached as f64;
+        self.interval = stats::wilson(self.completed, self.reached);
+    }
 }
 
 fn skill_rates(episodes: &[(&Task, &Episode)]) -> BTreeMap<SkillKind, SkillRate> {
@@ -165,14 +194,8 @@ fn skill_rates(episodes: &[(&Task, &Episode)]) -> BTreeMap<SkillKind, SkillRate>
     for (task, episode) in episodes {
         let completed = episode.completed as usize;
         for (i, subtask) in task.subtasks.iter().enumerate().take(completed + 1) {
-            let rate = rates.entry(subtask.skill).or_default();
-            rate.reached += 1;
-            rate.completed += usize::from(i < completed);
+            rates.entry(subtask.skill).or_default().count(i < completed);
         }
-    }
-    for rate in rates.values_mut() {
-        rate.rate = rate.completed as f64 / rate.reached as f64;
-        rate.interval = stats::wilson(rate.completed, rate.reached);
     }
     rates
 }
@@ -202,6 +225,9 @@ pub(crate) mod tests {
         let (tasks, episodes) = sample();
         let summary = Summary::of(&manifest(), &tasks, &episodes, false);
         assert_eq!((summary.tasks, summary.episodes, summary.errors), (2, 4, 1));
+        assert_eq!(summary.errored.len(), 1);
+        assert_eq!(summary.steps_over_expert.unwrap().mean, 1.5);
+        assert_eq!(summary.scenes["FloorPlan7"].episodes, 2);
         assert_eq!(summary.success, 0.5);
         assert_eq!(summary.completed_subtasks.mean, 1.25);
         assert_eq!(summary.progress.mean, 0.625);
@@ -226,8 +252,7 @@ pub(crate) mod tests {
     fn a_run_without_episodes_still_has_a_summary() {
         let summary = Summary::of(&manifest(), &sample().0, &[], true);
         assert_eq!((summary.episodes, summary.success, summary.success_interval), (0, 0.0, [0.0, 1.0]));
-        let text = serde_json::to_string(&summary).unwrap();
-        assert!(!text.contains("null"), "{text}");
+        assert_eq!(summary.steps_over_expert, None);
     }
 
     #[test]

@@ -67,12 +67,17 @@ impl Rollout {
     /// # Errors
     /// Whatever the policy reports.
     pub fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
-        policy.decide(&mut Situation {
+        policy.decide(&mut self.situation())
+    }
+
+    /// What a policy decides from now.
+    pub fn situation(&mut self) -> Situation<'_> {
+        Situation {
             house: &mut self.house,
             instruction: &self.instruction,
             step: self.steps,
             grader: self.grader.as_ref(),
-        })
+        }
     }
 
     /// Takes one step by `policy`'s choice.

@@ -53,6 +53,19 @@ pub fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
     [quantile(&means, 0.025), quantile(&means, 0.975)]
 }
 
+/// McNemar's exact test, two-sided: how likely so uneven a split of the pairs that differ is when neither side is better.
+pub fn mcnemar(only_first: usize, only_second: usize) -> f64 {
+    let (n, fewer) = (only_first + only_second, only_first.min(only_second));
+    // The binomial distribution's terms in logarithms: 2^-n underflows for large n.
+    let mut log_term = -(n as f64) * std::f64::consts::LN_2;
+    let mut tail = 0.0;
+    for k in 0..=fewer {
+        tail += log_term.exp();
+        log_term += ((n - k) as f64).ln() - ((k + 1) as f64).ln();
+    }
+    (2.0 * tail).min(1.0)
+}
+
 /// A quantile of sorted values, interpolated between neighbours.
 fn quantile(sorted: &[f64], q: f64) -> f64 {
     let at = q * (sorted.len() - 1) as f64;
@@ -109,6 +122,16 @@ mod tests {
         let single: Vec<_> = (0..40).map(|i| vec![f64::from(i % 2)]).collect();
         let triple: Vec<_> = (0..40).map(|i| vec![f64::from(i % 2); 3]).collect();
         assert!(close(bootstrap_mean(&single, 7), bootstrap_mean(&triple, 7), 1e-12));
+    }
+
+    #[test]
+    fn mcnemars_test_has_the_binomial_values() {
+        // Twice the binomial tail at one half: 2 * (1 + 10) / 1024, 2 / 32, and certainty for an even split.
+        assert!((mcnemar(1, 9) - 22.0 / 1024.0).abs() < 1e-12);
+        assert!((mcnemar(5, 0) - 2.0 / 32.0).abs() < 1e-12);
+        assert_eq!(mcnemar(3, 3), 1.0);
+        assert_eq!(mcnemar(0, 0), 1.0);
+        assert!(mcnemar(1000, 1200) < 1e-4 && mcnemar(1000, 1200) > 1e-6);
     }
 
     #[test]

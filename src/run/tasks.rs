@@ -60,6 +60,54 @@ impl Wish {
     }
 }
 
+/// Samples as many tasks of each length as of any other, longest first. Where there are too few of the longer ones, all of
+/// those are taken, and the shorter ones make up the number: so the paper's EVAL_100 was made.
+///
+/// # Errors
+/// When there are too few tasks of all these lengths together.
+pub fn balanced(
+    wish: &Wish,
+    lengths: &[usize],
+    sample: &dyn Fn(&Wish) -> anyhow::Result<TaskSet>,
+) -> anyhow::Result<TaskSet> {
+    if let [_] = lengths {
+        return sample(wish);
+    }
+    let mut whole: Option<TaskSet> = None;
+    let mut wanted = wish.count;
+    for (left, &length) in (1..=lengths.len()).rev().zip(lengths.iter().rev()) {
+        let count = if left == lengths.len() { wanted.div_ceil(left) } else { wanted / left };
+        if count == 0 {
+            continue;
+        }
+        let of = |count: usize| sample(&Wish { length, count, ..wish.clone() });
+        let set = match of(count) {
+            Err(error) => match error.downcast_ref::<TooFew>() {
+                Some(&TooFew { there, .. }) if left > 1 && there > 0 => of(there)?,
+                Some(&TooFew { there: 0, .. }) if left > 1 => continue,
+                _ => return Err(error),
+            },
+            Ok(set) => set,
+        };
+        wanted -= set.tasks.len();
+        let renamed = set.tasks.into_iter().map(|task| Task { id: format!("{length}-{}", task.id), ..task });
+        match &mut whole {
+            Some(whole) => whole.tasks.extend(renamed),
+            None => whole = Some(TaskSet { tasks: renamed.collect(), ..set }),
+        }
+    }
+    whole.context("no tasks were asked for")
+}
+
+/// A dataset holds fewer spans than were asked for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{folder} holds {there} spans of {length} subtasks that fit; ask for at most that many tasks")]
+pub struct TooFew {
+    folder: String,
+    there: usize,
+    length: usize,
+}
+
 /// Samples tasks in generated houses, each in a house of its own; `done` is called as they come, from several threads.
 ///
 /// # Errors
@@ -113,12 +161,8 @@ pub fn sample_dataset(
         spans.extend(firsts.filter(said).map(|first| (number, first)));
     }
     if spans.len() < wish.count {
-        bail!(
-            "{} holds {} spans of {} subtasks that fit; ask for at most that many tasks",
-            dataset.folder().display(),
-            spans.len(),
-            wish.length
-        );
+        let folder = dataset.folder().display().to_string();
+        return Err(TooFew { folder, there: spans.len(), length: wish.length }.into());
     }
     let (chosen, _) = spans.partial_shuffle(&mut wish.source(u64::MAX, 0), wish.count);
     let mut places: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
@@ -161,6 +205,19 @@ pub fn sample_dataset(
     let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let scenes = named.then(|| relative(&dataset.folder().join("scenes"), set_folder)).transpose()?;
     Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes, tasks })
+}
+
+/// The set with these of its tasks, as it is written in another folder: the scenes are where they were.
+///
+/// # Errors
+/// When the scenes' folder cannot be found.
+pub fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &Path) -> anyhow::Result<TaskSet> {
+    let scenes = set.scenes.as_ref().map(|scenes| {
+        let beside = file.parent().unwrap_or(Path::new("")).join(scenes);
+        // A set of generated houses may name a folder that is not there.
+        if beside.is_dir() { relative(&beside, folder) } else { Ok(scenes.clone()) }
+    });
+    Ok(TaskSet { scenes: scenes.transpose()?, tasks: tasks.to_vec(), ..set.clone() })
 }
 
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
@@ -294,6 +351,20 @@ mod tests {
         }
         let error = sample(1, 3, Phrasing::Own).unwrap_err().to_string();
         assert!(error.contains("2 spans of 1 subtasks"), "{error}");
+    }
+
+    #[test]
+    fn a_balanced_set_takes_what_there_is_of_the_long_ones_and_fills_up_with_short_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let dataset = dataset(folder.path());
+        let sample = |wish: &Wish| sample_dataset(wish, &dataset, None, Phrasing::Own, folder.path());
+        let set = balanced(&wish(1, 3, 0), &[1, 2], &sample).unwrap();
+        let lengths: Vec<usize> = set.tasks.iter().map(|task| task.subtasks.len()).collect();
+        assert_eq!(lengths, [2, 1, 1]);
+        taskset::check(&set).unwrap();
+        assert!(balanced(&wish(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtasks"));
+        let long = balanced(&wish(1, 2, 0), &[1, 2, 7], &sample).unwrap();
+        assert_eq!(long.tasks.len(), 2);
     }
 
     #[test]

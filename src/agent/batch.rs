@@ -1,0 +1,200 @@
+//! A trained agent that acts in several episodes at once, with one forward pass for all of them.
+//!
+//! The pass always has the same shape: an empty seat is a row of zeros. A row of a pass of one shape is computed the same
+//! way whatever the other rows hold, so a decision depends on its own episode and seat alone; the tests hold this.
+
+use tch::{Device, Kind, Tensor};
+
+use super::checkpoint::{Config, Networks};
+use super::learned::LearnedPolicy;
+use super::memory::{Memory, SharedEmbedder};
+use super::policy::Situation;
+use super::team::{Decisions, Team};
+use super::told;
+use crate::nets::visual::SIDE;
+
+/// A trained agent with several seats.
+pub struct LearnedTeam {
+    name: String,
+    config: Config,
+    networks: Networks,
+    sentences: SharedEmbedder,
+    device: Device,
+    samples: bool,
+    seats: Vec<Memory>,
+    /// What an empty seat shows.
+    blank: Vec<u8>,
+}
+
+impl LearnedTeam {
+    /// Rows of a pass on the CPU: enough to read the weights once for several episodes, few enough to stay in its caches.
+    pub const SEATS: usize = 8;
+
+    /// Seats for an agent.
+    pub fn new(agent: LearnedPolicy, seats: usize) -> LearnedTeam {
+        let LearnedPolicy { name, config, networks, sentences, device, samples, memory: _ } = agent;
+        let blank = vec![0; (3 * config.visual.input * config.visual.input) as usize];
+        let seats = (0..seats.max(1)).map(|_| Memory::default()).collect();
+        LearnedTeam { name, config, networks, sentences, device, samples, seats, blank }
+    }
+
+    /// The maps [seats, features, 7, 7] of what each seat sees now.
+    fn see(&mut self, situations: &mut [Option<Situation<'_>>]) -> Tensor {
+        let spec = self.networks.visual.spec();
+        let image = |(situation, memory): (&mut Option<Situation<'_>>, &mut Memory)| match situation {
+            Some(here) => {
+                let image = spec.image(here.house.frame());
+                memory.look(&image, here.step);
+                image
+            }
+            None => self.blank.clone(),
+        };
+        let images: Vec<Vec<u8>> = situations.iter_mut().zip(&mut self.seats).map(image).collect();
+        self.networks.visual.encode(&images)
+    }
+}
+
+impl Team for LearnedTeam {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn seats(&self) -> usize {
+        self.seats.len()
+    }
+
+    fn begin(&mut self, seat: usize, seed: u64) {
+        self.seats[seat].begin(seed);
+    }
+
+    fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+        anyhow::ensure!(situations.len() == self.seats.len(), "{} situations are not one a seat", situations.len());
+        let maps = self.see(situations);
+        let (history, features) = (self.config.policy.history, self.config.visual.features());
+        let floats = (Kind::Float, self.device);
+        let mut observations = Vec::new();
+        let mut told = Vec::new();
+        for ((seat, memory), situation) in (0i64..).zip(&mut self.seats).zip(situations.iter()) {
+            match situation {
+                Some(here) => {
+                    observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
+                    let hear = || {
+                        told::told(here, &self.config, &self.networks.visual, &self.sentences, self.device)
+                    };
+                    told.push(memory.told(here.instruction, hear)?);
+                }
+                None => {
+                    observations.push(Tensor::zeros([1, history * features, SIDE, SIDE], floats));
+                    told.push(told::nothing(&self.config, self.device));
+                }
+            }
+        }
+        let (observations, told) = (Tensor::cat(&observations, 0), Tensor::cat(&told, 0));
+        let logits = tch::no_grad(|| self.networks.policy.forward(&observations, &told, false));
+        let numbers = |tensor: Tensor| -> anyhow::Result<(usize, Vec<f32>)> {
+            let width = tensor.size()[1] as usize;
+            Ok((width, Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu))?))
+        };
+        let ((kinds, actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        let rows = actions.chunks_exact(kinds).zip(objects.chunks_exact(classes));
+        let decided = rows.zip(&mut self.seats).zip(situations).map(|(((actions, objects), memory), situation)| {
+            let here = situation.as_mut()?;
+            Some(Ok(memory.decide(actions, objects, &here.house.candidates(), self.samples)))
+        });
+        Ok(decided.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::agent::{Mind, Policy};
+    use crate::domain::Heading;
+    use crate::house::House;
+    use crate::house::testing::kitchen_house;
+    use crate::nets::device;
+    use crate::nets::embedding_cache::Embedder;
+    use crate::nets::sentence::default_folder;
+
+    fn shipped() -> Option<LearnedPolicy> {
+        device::set_threads(1);
+        let sentences = Embedder::open(&default_folder(), Device::Cpu).ok()?;
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+        LearnedPolicy::load(&folder, Arc::new(Mutex::new(sentences)), Device::Cpu).ok()
+    }
+
+    fn turned(heading: Heading) -> House {
+        let mut house = kitchen_house();
+        let mut world = house.world().clone();
+        world.agent.heading = heading;
+        house.restore(world);
+        house
+    }
+
+    /// What the agent thinks in one seat in ten steps, with these other seats taken.
+    fn minds(team: &mut LearnedTeam, seat: usize, others: &[usize]) -> Vec<Mind> {
+        let mut houses: Vec<Option<House>> = (0..team.seats()).map(|_| None).collect();
+        for &other in others {
+            houses[other] = Some(turned(Heading::ALL[other % 4]));
+        }
+        houses[seat] = Some(turned(Heading::West));
+        (0..team.seats()).for_each(|seat| team.begin(seat, seat as u64));
+        let mut minds = Vec::new();
+        for step in 0..10 {
+            let told = ["Take the mug.", "Slice the bread.", "Open the fridge."];
+            let mut situations: Vec<Option<Situation<'_>>> = Vec::new();
+            for (place, house) in houses.iter_mut().enumerate() {
+                let instruction = if place == seat { "Put the apple in the sink." } else { told[place % 3] };
+                situations.push(house.as_mut().map(|house| Situation { house, instruction, step, grader: None }));
+            }
+            let decisions = team.decide(&mut situations).unwrap();
+            for (place, decision) in decisions.into_iter().enumerate() {
+                let Some(decision) = decision.map(Result::unwrap) else { continue };
+                if let Some(house) = &mut houses[place] {
+                    house.step(decision.action);
+                }
+                if place == seat {
+                    minds.extend(decision.mind);
+                }
+            }
+        }
+        minds
+    }
+
+    #[test]
+    fn a_decision_depends_on_its_own_seat_alone_bit_for_bit() {
+        let Some(agent) = shipped() else {
+            eprintln!("skipped: the shipped agent needs its sentence encoder");
+            return;
+        };
+        let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
+        for seat in [0, 5] {
+            let alone = minds(&mut team, seat, &[]);
+            assert_eq!(alone.len(), 10);
+            assert_eq!(minds(&mut team, seat, &[1, 2]), alone);
+            assert_eq!(minds(&mut team, seat, &[0, 1, 2, 3, 4, 5, 6, 7]), alone);
+        }
+    }
+
+    #[test]
+    fn several_at_once_think_what_one_alone_thinks() {
+        let (Some(mut one), Some(agent)) = (shipped(), shipped()) else {
+            eprintln!("skipped: the shipped agent needs its sentence encoder");
+            return;
+        };
+        let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
+        let together = minds(&mut team, 3, &[0, 1, 2]).remove(0);
+        let mut house = turned(Heading::West);
+        one.begin(3);
+        let mut here =
+            Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
+        let alone = one.decide(&mut here).unwrap().mind.unwrap();
+        // Another shape of the pass may round otherwise, no more.
+        for (a, b) in together.actions.iter().zip(alone.actions) {
+            assert!((a.unwrap_or(-1.0) - b.unwrap_or(-1.0)).abs() < 1e-4, "{together:?} {alone:?}");
+        }
+    }
+}

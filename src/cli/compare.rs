@@ -1,0 +1,68 @@
+//! `sprint compare`: two or more runs of the same tasks, paired.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Ending;
+use crate::data::json;
+use crate::run::comparison::Comparison;
+use crate::run::finished::FinishedRun;
+use crate::run::threshold::Threshold;
+
+/// Compares runs, episode by episode.
+#[derive(Args)]
+pub struct Compare {
+    /// The run folders; the others are compared with the first
+    #[arg(value_name = "RUN", required = true, num_args = 2..)]
+    runs: Vec<PathBuf>,
+    /// Print the comparison as one JSON object
+    #[arg(long)]
+    json: bool,
+    /// Write the comparison to a file too, as JSON
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Exit with 2 when a figure of the last run falls short, for example success=0.8; may be repeated
+    #[arg(long, value_name = "METRIC=X")]
+    fail_below: Vec<Threshold>,
+    /// Exit with 2 when a run fails in more episodes that the first solved
+    #[arg(long, value_name = "N")]
+    max_regressions: Option<usize>,
+}
+
+impl Compare {
+    /// Compares.
+    ///
+    /// # Errors
+    /// When a folder holds no run, or two have no episode in common.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let runs: Vec<FinishedRun> =
+            self.runs.iter().map(|path| FinishedRun::open(path)).collect::<anyhow::Result<_>>()?;
+        let (comparison, summaries) = Comparison::of(&runs)?;
+        if let Some(path) = &self.out {
+            json::write_pretty(path, &comparison)?;
+        }
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&comparison)?)?;
+        } else {
+            write!(out, "{}", comparison.markdown())?;
+        }
+        out.flush()?;
+        let mut ending = Ending::Ok;
+        if let Some(most) = self.max_regressions.filter(|&most| comparison.regressions() > most) {
+            eprintln!("{} regressions, at most {most} are allowed", comparison.regressions());
+            ending = Ending::BelowThreshold;
+        }
+        let last = summaries.last();
+        for (threshold, summary) in self.fail_below.iter().filter_map(|threshold| Some((threshold, last?))) {
+            if let Some(measured) = threshold.missed_by(summary)? {
+                eprintln!("{threshold} was missed: {measured:.4}");
+                ending = Ending::BelowThreshold;
+            }
+        }
+        Ok(ending)
+    }
+}

@@ -1,0 +1,40 @@
+//! `sprint merge`: joins the shares of a run.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Ending;
+use crate::run::merge;
+
+/// Joins the shares that `sprint eval --shard` wrote into one run.
+#[derive(Args)]
+pub struct Merge {
+    /// The run folder; its shares lie in RUN/shards
+    run: PathBuf,
+    /// The shares, where they lie elsewhere
+    shares: Vec<PathBuf>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Merge {
+    /// Merges.
+    ///
+    /// # Errors
+    /// When a share is missing or not complete, or they are not of one run.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let shares = if self.shares.is_empty() { merge::shares_in(&self.run)? } else { self.shares };
+        let summary = merge::merge(&shares, &self.run)?;
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        } else {
+            writeln!(out, "{}", summary.markdown())?;
+        }
+        out.flush()?;
+        Ok(if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed })
+    }
+}

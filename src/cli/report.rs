@@ -1,0 +1,61 @@
+//! `sprint report`: plots and pages of what lies in a folder.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+use super::Ending;
+use crate::data::json;
+use crate::run::finished::FinishedRun;
+use crate::run::folder::RunFolder;
+use crate::run::report::Summary;
+use crate::run::{html, plot};
+
+/// Draws a run, or a training.
+#[derive(Args)]
+pub struct Report {
+    /// A run folder: its page is written to report.html there. Or a checkpoint that was trained here: its learning curves are
+    /// drawn there, as PNG and SVG
+    folder: PathBuf,
+    /// The most frames of an episode on the page
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    frames: usize,
+    /// Where to write instead
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+impl Report {
+    /// Draws.
+    ///
+    /// # Errors
+    /// When the folder holds neither, or cannot be written to.
+    #[allow(clippy::print_stderr)]
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let out = self.out.as_ref().unwrap_or(&self.folder);
+        let journal = self.folder.join("training/progress.jsonl");
+        if self.folder.join(RunFolder::MANIFEST).exists() {
+            let run = FinishedRun::open(&self.folder)?;
+            let path = self.folder.join(RunFolder::SUMMARY);
+            let summary = json::read::<Summary>(&path, Summary::FORMAT)
+                .context("the same eval command writes the summary")?
+                .value;
+            let page = out.join("report.html");
+            json::write_bytes(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
+            plot::write(out, plot::PROGRESS, &plot::progress_by_length(&[&summary]))?;
+            eprintln!("wrote {}", page.display());
+        } else if journal.exists() {
+            for (name, chart) in plot::learning_curves(&journal)? {
+                plot::write(out, &name, &chart)?;
+                eprintln!("wrote {}", out.join(format!("{name}.svg")).display());
+            }
+        } else {
+            bail!(
+                "{} holds neither a run (manifest.json) nor a training (training/progress.jsonl)",
+                self.folder.display()
+            );
+        }
+        Ok(Ending::Ok)
+    }
+}

@@ -1,0 +1,201 @@
+//! Two runs side by side: what each made of the same episodes.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::episode::{Episode, Key};
+use super::finished::FinishedRun;
+use super::report::BOOTSTRAP_SEED;
+use super::stats::{self, Interval};
+
+/// A difference of two means, second less first, and its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Difference {
+    /// The first run's mean.
+    pub first: f64,
+    /// The second's.
+    pub second: f64,
+    /// Second less first.
+    pub difference: f64,
+    /// Its 95 % interval.
+    pub interval: Interval,
+}
+
+/// An episode in which one run succeeded and the other did not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// The task.
+    pub task: String,
+    /// The seed.
+    pub seed: u64,
+    /// What the agent was told in the second run.
+    pub instruction: String,
+    /// Completed subtasks in the first run and in the second, and of how many.
+    pub completed: [u32; 3],
+    /// The command that opens the first run's episode.
+    pub open_first: String,
+    /// The command that opens the second run's episode.
+    pub open_second: String,
+}
+
+/// What came of a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Paired {
+    /// The first run's folder.
+    pub first: String,
+    /// The second run's folder.
+    pub second: String,
+    /// Pairs of episodes: same task, seed, words and start.
+    pub pairs: usize,
+    /// Episodes of either run without a counterpart.
+    pub unpaired: usize,
+    /// Of those, episodes whose counterpart began in another state.
+    pub other_starts: usize,
+    /// Success.
+    pub success: Difference,
+    /// Completed subtasks.
+    pub completed_subtasks: Difference,
+    /// Completed subtasks as a share of those that were asked.
+    pub progress: Difference,
+    /// Two-sided exact McNemar test of equal success.
+    pub mcnemar_p: f64,
+    /// Only the first run succeeded.
+    pub regressions: Vec<Change>,
+    /// Only the second run succeeded.
+    pub fixes: Vec<Change>,
+    /// How the intervals and the test were made.
+    pub methods: String,
+}
+
+impl Paired {
+    /// Pairs the episodes of two runs.
+    ///
+    /// # Errors
+    /// When they have no episode in common.
+    pub fn of(first: &FinishedRun, second: &FinishedRun) -> anyhow::Result<Paired> {
+        let mut others: BTreeMap<Key, &Episode> =
+            second.episodes.iter().map(|episode| (episode.key(), episode)).collect();
+        let (mut groups, mut unpaired, mut other_starts) = (BTreeMap::<&str, Vec<(&Episode, &Episode)>>::new(), 0, 0);
+        for episode in &first.episodes {
+            match others.remove(&episode.key()) {
+                // An episode that failed before it had a start is no success from any start.
+                Some(other) if episode.start_hash == other.start_hash => {
+                    groups.entry(&episode.task).or_default().push((episode, other));
+                }
+                Some(_) => (unpaired, other_starts) = (unpaired + 2, other_starts + 2),
+                None => unpaired += 1,
+            }
+        }
+        unpaired += others.len();
+        let groups: Vec<Vec<(&Episode, &Episode)>> = groups.into_values().collect();
+        let all: Vec<(&Episode, &Episode)> = groups.iter().flatten().copied().collect();
+        anyhow::ensure!(
+            !all.is_empty(),
+            "{} and {} have no episode in common: they pair by task, seed and start",
+            first.path.display(),
+            second.path.display()
+        );
+        let change = |(a, b): &(&Episode, &Episode)| -> anyhow::Result<Change> {
+            Ok(Change {
+                task: a.task.clone(),
+                seed: a.seed,
+                instruction: b.instruction.clone(),
+                completed: [a.completed, b.completed, b.of],
+                open_first: format!("sprint open {}", first.reference(&a.key())?),
+                open_second: format!("sprint open {}", second.reference(&b.key())?),
+            })
+        };
+        let only = |wanted: bool| -> anyhow::Result<Vec<Change>> {
+            all.iter().filter(|(a, b)| a.success == wanted && b.success != wanted).map(change).collect()
+        };
+        let (regressions, fixes) = (only(true)?, only(false)?);
+        Ok(Paired {
+            first: first.path.display().to_string(),
+            second: second.path.display().to_string(),
+            pairs: all.len(),
+            unpaired,
+            other_starts,
+            success: difference(&groups, |episode| f64::from(u8::from(episode.success))),
+            completed_subtasks: difference(&groups, |episode| f64::from(episode.completed)),
+            progress: difference(&groups, Episode::progress),
+            mcnemar_p: stats::mcnemar(regressions.len(), fixes.len()),
+            regressions,
+            fixes,
+            methods: format!(
+                "differences by paired percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}; \
+                 success by McNemar's exact test, two-sided",
+                stats::RESAMPLES
+            ),
+        })
+    }
+}
+
+fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) -> Difference {
+    let first = stats::mean(groups.iter().flatten().map(|(a, _)| value(a)));
+    let second = stats::mean(groups.iter().flatten().map(|(_, b)| value(b)));
+    let differences: Vec<Vec<f64>> =
+        groups.iter().map(|group| group.iter().map(|(a, b)| value(b) - value(a)).collect()).collect();
+    let interval = stats::bootstrap_mean(&differences, BOOTSTRAP_SEED);
+    Difference { first, second, difference: second - first, interval }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::data::taskset::tests::sample_set;
+    use crate::run::folder::tests::{episode, manifest};
+    use crate::run::scenes::Scenes;
+
+    /// A run of the sample set in which these seeds of the first task succeeded.
+    pub(crate) fn run(name: &str, outcomes: &[bool]) -> FinishedRun {
+        let outcome = |(seed, &success): (u64, &bool)| Episode {
+            seed,
+            success,
+            completed: if success { 2 } else { 1 },
+            ..episode("first")
+        };
+        let set = sample_set();
+        FinishedRun {
+            path: name.into(),
+            manifest: manifest(),
+            scenes: Scenes::in_folder(None),
+            set,
+            episodes: (0..).zip(outcomes).map(outcome).collect(),
+        }
+    }
+
+    #[test]
+    fn regressions_and_fixes_are_told_apart_and_named_with_the_command_that_opens_them() {
+        let (a, b) = (run("runs/a", &[true, true, false, false]), run("runs/b", &[true, false, true, false]));
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired), (4, 0));
+        assert_eq!(paired.regressions.len(), 1);
+        assert_eq!(paired.regressions[0].seed, 1);
+        assert_eq!(paired.regressions[0].open_second, "sprint open runs/b#2");
+        assert_eq!(paired.fixes[0].completed, [1, 2, 2]);
+        assert_eq!(paired.mcnemar_p, 1.0);
+        assert_eq!(paired.success.difference, 0.0);
+    }
+
+    #[test]
+    fn an_episode_that_began_elsewhere_is_no_counterpart() {
+        let (a, mut b) = (run("a", &[true, true]), run("b", &[false, false]));
+        b.episodes[0].start_hash = "77".into();
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired, paired.other_starts), (1, 2, 2));
+        b.episodes[1].seed = 9;
+        assert!(Paired::of(&a, &b).unwrap_err().to_string().contains("no episode in common"));
+    }
+
+    #[test]
+    fn a_run_against_itself_differs_in_nothing() {
+        let a = run("a", &[true, false, true]);
+        let paired = Paired::of(&a, &a).unwrap();
+        assert_eq!((paired.success.difference, paired.success.interval), (0.0, [0.0, 0.0]));
+        assert!(paired.regressions.is_empty() && paired.fixes.is_empty());
+    }
+}

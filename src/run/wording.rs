@@ -1,0 +1,155 @@
+//! What the agent is told of a task: its own words, or others that show whether it listens.
+
+use std::collections::BTreeSet;
+
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::domain::Task;
+use crate::language::{instruction, phrases};
+
+/// Whose words the agent hears.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Wording {
+    /// The task's own.
+    #[default]
+    Own,
+    /// Those of another task of the set.
+    Swapped,
+    /// Nothing at all.
+    Emptied,
+    /// The task's own words in another order.
+    Shuffled,
+    /// The same task in the words of the program's grammar.
+    Paraphrased,
+}
+
+impl Wording {
+    /// Every wording, the task's own first.
+    pub const ALL: [Wording; 5] =
+        [Wording::Own, Wording::Swapped, Wording::Emptied, Wording::Shuffled, Wording::Paraphrased];
+
+    /// Whether it is the task's own.
+    pub fn is_own(&self) -> bool {
+        *self == Wording::Own
+    }
+
+    /// What it is called in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Wording::Own => "own",
+            Wording::Swapped => "swapped",
+            Wording::Emptied => "emptied",
+            Wording::Shuffled => "shuffled",
+            Wording::Paraphrased => "paraphrased",
+        }
+    }
+}
+
+/// The task's instruction, or all its steps, each normalised, in one line.
+pub fn told(task: &Task, step_by_step: bool) -> String {
+    if step_by_step {
+        task.sentences.iter().map(|sentence| instruction::normalise(sentence)).collect::<Vec<_>>().join(" ")
+    } else {
+        instruction::normalise(&task.instruction)
+    }
+}
+
+/// What the agent is told of the task at `index`; `chance` drives what is drawn.
+pub fn say(tasks: &[Task], index: usize, wording: Wording, step_by_step: bool, chance: u64) -> String {
+    let task = &tasks[index];
+    let own = told(task, step_by_step);
+    let mut rng = ChaCha8Rng::seed_from_u64(chance);
+    match wording {
+        Wording::Own => own,
+        Wording::Swapped => swapped(tasks, index, step_by_step).unwrap_or(own),
+        Wording::Emptied => String::new(),
+        Wording::Shuffled => shuffled(&own, &mut rng),
+        Wording::Paraphrased => {
+            let mut said = String::new();
+            // The grammar has dozens of ways to say a thing; a handful of draws finds one that differs.
+            for _ in 0..20 {
+                said = instruction::normalise(&phrases::instruction(&task.roles, &task.subtasks, &mut rng));
+                if said != own {
+                    break;
+                }
+            }
+            said
+        }
+    }
+}
+
+/// The words of the next task that is told something else.
+fn swapped(tasks: &[Task], index: usize, step_by_step: bool) -> Option<String> {
+    let own = told(&tasks[index], step_by_step);
+    let others = (1..tasks.len()).map(|ahead| told(&tasks[(index + ahead) % tasks.len()], step_by_step));
+    others.into_iter().find(|other| *other != own)
+}
+
+/// Whether some task of the set is told something else than another.
+pub fn can_swap(tasks: &[Task], step_by_step: bool) -> bool {
+    tasks.iter().map(|task| told(task, step_by_step)).collect::<BTreeSet<_>>().len() > 1
+}
+
+fn shuffled(own: &str, rng: &mut ChaCha8Rng) -> String {
+    let mut words: Vec<&str> = own.trim_end_matches(['.', '!', '?']).split(' ').collect();
+    let before = words.clone();
+    let differs = before.iter().collect::<BTreeSet<_>>().len() > 1;
+    for _ in 0..20 {
+        words.shuffle(rng);
+        if !differs || words != before {
+            break;
+        }
+    }
+    if differs && words == before {
+        words.rotate_left(rng.random_range(1..before.len()));
+    }
+    instruction::normalise(&words.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::taskset::tests::sample_set;
+
+    #[test]
+    fn every_wording_says_what_it_should_and_the_same_each_time() {
+        let mut tasks = sample_set().tasks;
+        tasks[1].instruction = "Heat the potato.".into();
+        let say = |wording, chance| say(&tasks, 0, wording, false, chance);
+        assert_eq!(say(Wording::Own, 1), "Put the apple in the fridge.");
+        assert_eq!(say(Wording::Swapped, 1), "Heat the potato.");
+        assert_eq!(say(Wording::Emptied, 1), "");
+        let mut words: Vec<String> =
+            say(Wording::Shuffled, 1).to_lowercase().replace('.', "").split(' ').map(String::from).collect();
+        words.sort();
+        assert_eq!(words, ["apple", "fridge", "in", "put", "the", "the"]);
+        for chance in 0..20 {
+            for wording in [Wording::Shuffled, Wording::Paraphrased] {
+                assert_eq!(say(wording, chance), say(wording, chance));
+                assert_ne!(say(wording, chance), say(Wording::Own, chance), "{wording:?}");
+            }
+        }
+        assert!(say(Wording::Paraphrased, 3).to_lowercase().contains("apple"));
+    }
+
+    #[test]
+    fn a_set_of_one_instruction_has_nothing_to_swap() {
+        let mut tasks = sample_set().tasks;
+        assert!(!can_swap(&tasks, false));
+        tasks[1].instruction = "Heat the potato.".into();
+        assert!(can_swap(&tasks, false));
+    }
+
+    #[test]
+    fn the_agent_is_told_the_normalised_instruction_or_all_steps() {
+        let mut task = sample_set().tasks.remove(0);
+        task.instruction = "  put it   AWAY".into();
+        task.sentences = vec!["take   it".into(), "drop it!".into()];
+        assert_eq!(told(&task, false), "Put it away.");
+        assert_eq!(told(&task, true), "Take it. Drop it!");
+    }
+}

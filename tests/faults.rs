@@ -1,0 +1,168 @@
+//! What `sprint eval` does when the disk, the clock or the files fail it.
+
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::program::Sprint;
+
+#[test]
+fn a_full_disk_is_one_clear_error_and_the_run_goes_on_when_there_is_room() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 6);
+    let line = "eval --tasks tasks.json --policy random --seeds 12 --jobs 1 --out";
+    assert_eq!(sprint.run(&format!("{line} whole")).code, Some(0));
+    // A limit on the size of files stands in for the disk: it needs no root, and a write ends in the middle as well.
+    let size = std::fs::metadata(sprint.path("whole/episodes.jsonl")).unwrap().len();
+    let blocks = size / 2 / 1024 + 1;
+    let program = assert_cmd::cargo::cargo_bin("sprint");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {} {line} full", program.display());
+    let mut command = std::process::Command::new("bash");
+    command.args(["-c", &script]).current_dir(sprint.path(".")).env("SPRINT_HOME", sprint.path("home"));
+    let full = command.output().unwrap();
+    let said = String::from_utf8_lossy(&full.stderr).into_owned();
+    assert_eq!(full.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot write full/") && !said.contains("panicked"), "{said}");
+    assert_eq!(sprint.run(&format!("{line} full")).code, Some(0));
+    assert_eq!(sprint.read("full/episodes.jsonl"), sprint.read("whole/episodes.jsonl"));
+    assert_eq!(sprint.read("full/summary.json"), sprint.read("whole/summary.json"));
+}
+
+#[test]
+fn a_disk_without_any_room_is_named() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 2);
+    let disk = sprint.path("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let mounted = std::process::Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=8k,nr_inodes=40", "tmpfs"])
+        .arg(&disk)
+        .output();
+    if !mounted.is_ok_and(|mounted| mounted.status.success()) {
+        eprintln!("skipped: mounting a small disk needs root");
+        return;
+    }
+    let ended = sprint.run("eval --tasks tasks.json --policy random --out disk/run");
+    let unmounted = std::process::Command::new("umount").arg(&disk).status().unwrap();
+    assert!(unmounted.success());
+    assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+    assert!(ended.stderr.contains("disk/run") && ended.stderr.contains("No space left"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_to_is_named() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 1);
+    // Not even root writes here.
+    let ended = sprint.run("eval --tasks tasks.json --policy random --out /proc/sprint-run");
+    assert_eq!(ended.code, Some(1));
+    assert!(ended.stderr.contains("/proc/sprint-run"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_run_folder_with_a_link_out_of_it_is_refused() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 1);
+    let line = "eval --tasks tasks.json --policy random --out run";
+    assert_eq!(sprint.run(line).code, Some(0));
+    std::fs::write(sprint.path("diary.txt"), "mine").unwrap();
+    std::fs::remove_file(sprint.path("run/episodes.jsonl")).unwrap();
+    std::os::unix::fs::symlink(sprint.path("diary.txt"), sprint.path("run/episodes.jsonl")).unwrap();
+    let ended = sprint.run(line);
+    assert_eq!(ended.code, Some(1));
+    assert!(ended.stderr.contains("run/episodes.jsonl: a symbolic link"), "{}", ended.stderr);
+    assert_eq!(sprint.read("diary.txt"), "mine");
+}
+
+#[test]
+fn a_task_file_of_a_hundred_megabytes_is_read_or_refused_in_words() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 2);
+    let small = sprint.read("tasks.json");
+    let padded = small.replacen('{', &format!("{{{}", " ".repeat(100 << 20)), 1);
+    std::fs::write(sprint.path("padded.json"), padded).unwrap();
+    assert_eq!(sprint.run("eval --tasks padded.json --policy random --out padded").code, Some(0));
+    let mut set: Value = serde_json::from_str(&small).unwrap();
+    set["tasks"][1]["instruction"] = "take it ".repeat(13 << 20).into();
+    std::fs::write(sprint.path("long.json"), set.to_string()).unwrap();
+    let said = sprint.refused("long.json");
+    assert!(said.contains("tasks[1].instruction") && said.len() < 500, "{said}");
+    let hole = std::fs::File::create(sprint.path("hole.json")).unwrap();
+    hole.set_len(20 << 30).unwrap();
+    assert!(sprint.refused("hole.json").contains("larger than"));
+}
+
+#[test]
+fn two_processes_do_not_write_one_run() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 4);
+    let line = "eval --tasks tasks.json --policy random --seeds 2000 --out run";
+    let mut first = sprint.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    wait_for(|| sprint.path("run/manifest.json").exists());
+    let second = sprint.run(line);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert_eq!(second.code, Some(1));
+    assert!(second.stderr.contains("another process is writing this run"), "{}", second.stderr);
+}
+
+#[test]
+fn sigterm_ends_with_130_and_a_valid_partial_result_that_is_continued() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 4);
+    let line = "eval --tasks tasks.json --policy random --seeds 2000 --out run";
+    let mut child = sprint.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = || std::fs::read_to_string(sprint.path("run/episodes.jsonl")).unwrap_or_default().lines().count();
+    wait_for(|| lines() > 2);
+    assert!(std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    let asked = Instant::now();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(asked.elapsed() < Duration::from_secs(20), "it stops soon");
+    let summary: Value = serde_json::from_str(&sprint.read("run/summary.json")).unwrap();
+    assert_eq!((&summary["partial"], &summary["episodes"]), (&Value::Bool(true), &Value::from(lines())));
+}
+
+#[test]
+fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
+    let sprint = Sprint::new();
+    let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+    let Some(home) = encoders() else {
+        eprintln!("skipped: the shipped agent needs its sentence encoder");
+        return;
+    };
+    sprint.sample("tasks.json", 1, 4);
+    std::fs::create_dir(sprint.path("agent")).unwrap();
+    for file in ["config.json", "model.safetensors"] {
+        std::fs::copy(shipped.join(file), sprint.path("agent").join(file)).unwrap();
+    }
+    let line = "eval --tasks tasks.json --checkpoint agent --out run --jobs 1";
+    let child =
+        sprint.command(line).env("SPRINT_HOME", home).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    // The manifest is written once the agent is loaded.
+    wait_for(|| sprint.path("run/tasks.json").exists());
+    let config = sprint.read("agent/config.json");
+    std::fs::write(sprint.path("agent/config.json"), config + "\n").unwrap();
+    let ended = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("the checkpoint was replaced while the run was under way"), "{said}");
+    let again = sprint.command(line).env("SPRINT_HOME", encoders().unwrap()).output().unwrap();
+    assert!(String::from_utf8_lossy(&again.stderr).contains("checkpoint_hash"), "the other one does not continue it");
+}
+
+/// The folder with the sentence encoder, where it is installed.
+fn encoders() -> Option<std::path::PathBuf> {
+    let cache = std::env::var_os("XDG_CACHE_HOME").map(Into::into);
+    let home = std::env::var_os("HOME").map(|home| std::path::PathBuf::from(home).join(".cache"));
+    let found = std::env::var_os("SPRINT_HOME").map(Into::into).or_else(|| Some(cache.or(home)?.join("sprint")))?;
+    found.join("encoders").is_dir().then_some(found)
+}
+
+fn wait_for(happened: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !happened() {
+        assert!(began.elapsed() < Duration::from_secs(60), "it did not happen within a minute");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
