@@ -78,9 +78,7 @@ impl Team for LearnedTeam {
             match situation {
                 Some(here) => {
                     observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
-                    let hear = || {
-                        told::told(here, &self.config, &self.networks.visual, &self.sentences, self.device)
-                    };
+                    let hear = || told::told(here, &self.config, &self.networks.visual, &self.sentences, self.device);
                     told.push(memory.told(here.instruction, hear)?);
                 }
                 None => {

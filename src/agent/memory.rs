@@ -104,11 +104,7 @@ impl Memory {
     ///
     /// # Errors
     /// When `hear` fails.
-    pub fn told(
-        &mut self,
-        instruction: &str,
-        hear: impl FnOnce() -> anyhow::Result<Tensor>,
-    ) -> anyhow::Result<Tensor> {
+    pub fn told(&mut self, instruction: &str, hear: impl FnOnce() -> anyhow::Result<Tensor>) -> anyhow::Result<Tensor> {
         if let Some((text, told)) = &self.read
             && text == instruction
         {

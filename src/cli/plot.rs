@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::Ending;
 use crate::agent::checkpoint::write_whole;
-use crate::run::plot::{self, Plot};
+use crate::run::curves::{self, Plot};
 
 /// Draws the curves of trainings.
 #[derive(Args)]
@@ -30,7 +30,7 @@ impl PlotCurves {
     /// When a training's progress cannot be read, or the picture not be written.
     #[allow(clippy::print_stdout)]
     pub fn run(self) -> anyhow::Result<Ending> {
-        let read = |folder: &PathBuf| Ok((folder.display().to_string(), plot::read(folder)?));
+        let read = |folder: &PathBuf| Ok((folder.display().to_string(), curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
         let plot = Plot::of(&trainings, &self.only)?;
         let extension = self.out.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_lowercase();

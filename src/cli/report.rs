@@ -1,4 +1,4 @@
-//! `sprint report`: plots and pages of what lies in a folder.
+//! `sprint report`: the plots and the page of a run.
 
 use std::path::PathBuf;
 
@@ -12,11 +12,10 @@ use crate::run::folder::RunFolder;
 use crate::run::report::Summary;
 use crate::run::{html, plot};
 
-/// Draws a run, or a training.
+/// Draws a run: its plots and its page.
 #[derive(Args)]
 pub struct Report {
-    /// A run folder: its page is written to report.html there. Or a checkpoint that was trained here: its learning curves are
-    /// drawn there, as PNG and SVG
+    /// A run folder: its page is written to report.html there
     folder: PathBuf,
     /// The most frames of an episode on the page
     #[arg(long, value_name = "N", default_value_t = 8)]
@@ -30,11 +29,10 @@ impl Report {
     /// Draws.
     ///
     /// # Errors
-    /// When the folder holds neither, or cannot be written to.
+    /// When the folder holds none, or cannot be written to.
     #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
-        let journal = self.folder.join("training/progress.jsonl");
         if self.folder.join(RunFolder::MANIFEST).exists() {
             let run = FinishedRun::open(&self.folder)?;
             let path = self.folder.join(RunFolder::SUMMARY);
@@ -45,14 +43,9 @@ impl Report {
             json::write_bytes(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
             plot::write(out, plot::PROGRESS, &plot::progress_by_length(&[&summary]))?;
             eprintln!("wrote {}", page.display());
-        } else if journal.exists() {
-            for (name, chart) in plot::learning_curves(&journal)? {
-                plot::write(out, &name, &chart)?;
-                eprintln!("wrote {}", out.join(format!("{name}.svg")).display());
-            }
         } else {
             bail!(
-                "{} holds neither a run (manifest.json) nor a training (training/progress.jsonl)",
+                "{} holds no run (manifest.json is missing); the curves of a training are drawn by `sprint plot`",
                 self.folder.display()
             );
         }

@@ -8,6 +8,7 @@ pub mod chance;
 pub mod chart;
 pub mod collect;
 pub mod comparison;
+pub mod curves;
 pub mod encoding;
 pub mod episode;
 pub mod evaluate;
