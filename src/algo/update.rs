@@ -421,7 +421,7 @@ mod tests {
         }
     }
 
-    const IQL: Iql = Iql { discount: 0.9, expectile: 0.9, temperature: 3.0, weight_cap: 100.0, target_rate: 0.05 };
+    const IQL: Iql = Iql { discount: 0.9, expectile: 0.7, temperature: 3.0, weight_cap: 100.0, target_rate: 0.05 };
 
     fn optimisation(steps: u64) -> Optimisation {
         Optimisation {
@@ -480,7 +480,7 @@ mod tests {
         let mut v = [0.0f64; 2];
         let mut q = [[0.0f64; 2]; 2];
         // Of two equally frequent numbers a > b the expectile is τ a + (1 − τ) b.
-        let expectile = |q: [f64; 2]| 0.9 * q[0].max(q[1]) + 0.1 * q[0].min(q[1]);
+        let expectile = |q: [f64; 2]| 0.7 * q[0].max(q[1]) + 0.3 * q[0].min(q[1]);
         for _ in 0..1000 {
             q = [[0.9 * v[1], 0.9 * v[0]], [1.0, 0.9 * v[0]]];
             v = q.map(expectile);
@@ -495,7 +495,7 @@ mod tests {
         let nets = nets();
         let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(8).collect();
         let batch = Batch { base: transitions(&rows), pairs: None };
-        let mut update = update(&nets, 800, None);
+        let mut update = update(&nets, 1000, None);
         while !update.is_done() {
             update.update(&batch, false).unwrap();
         }

@@ -59,7 +59,8 @@ impl<'a> Batches<'a> {
             let mut rng = self.chance(GOALS, step);
             for item in &mut items {
                 // A state to reach anywhere in what is left of the trajectory.
-                item.end = rng.random_range(item.frame + 1..self.material.items.trajectory_of(item).end);
+                let end = self.material.items.trajectory_of(item).end.max(item.end + 1);
+                item.end = rng.random_range(item.frame + 1..end);
             }
         }
         items
