@@ -150,7 +150,7 @@ impl Paired {
             table(["measure", "first", "second", "difference", "95 % interval"], rows)
         );
         text += &format!(
-            "McNemar: p = {} ({} only in the first, {} only in the second).\n",
+            "McNemar: p {} ({} only in the first, {} only in the second).\n",
             p(self.mcnemar_p),
             self.regressions.len(),
             self.fixes.len()
@@ -180,7 +180,7 @@ fn points(share: f64) -> String {
 }
 
 fn p(value: f64) -> String {
-    if value < 0.001 { "< 0.001".into() } else { format!("{value:.3}") }
+    if value < 0.001 { "< 0.001".into() } else { format!("= {value:.3}") }
 }
 
 #[cfg(test)]

@@ -79,19 +79,25 @@ impl Paired {
     pub fn of(first: &FinishedRun, second: &FinishedRun) -> anyhow::Result<Paired> {
         let mut others: BTreeMap<Key, &Episode> =
             second.episodes.iter().map(|episode| (episode.key(), episode)).collect();
-        let (mut groups, mut unpaired, mut other_starts) = (BTreeMap::<&str, Vec<(&Episode, &Episode)>>::new(), 0, 0);
+        // By task, in the first run's order.
+        let mut groups: Vec<Vec<(&Episode, &Episode)>> = Vec::new();
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        let (mut unpaired, mut other_starts) = (0, 0);
         for episode in &first.episodes {
             match others.remove(&episode.key()) {
                 // An episode that failed before it had a start is no success from any start.
                 Some(other) if episode.start_hash == other.start_hash => {
-                    groups.entry(&episode.task).or_default().push((episode, other));
+                    let place = *places.entry(&episode.task).or_insert(groups.len());
+                    if place == groups.len() {
+                        groups.push(Vec::new());
+                    }
+                    groups[place].push((episode, other));
                 }
                 Some(_) => (unpaired, other_starts) = (unpaired + 2, other_starts + 2),
                 None => unpaired += 1,
             }
         }
         unpaired += others.len();
-        let groups: Vec<Vec<(&Episode, &Episode)>> = groups.into_values().collect();
         let all: Vec<(&Episode, &Episode)> = groups.iter().flatten().copied().collect();
         anyhow::ensure!(
             !all.is_empty(),
