@@ -10,14 +10,17 @@ mod doctor;
 mod embed;
 mod explore;
 mod eval;
+mod export;
 mod import;
 mod logging;
+mod open;
 mod policies;
 mod pretrain;
 mod replay;
 mod shell;
 mod stop;
 mod tasks;
+mod verify;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
@@ -36,6 +39,12 @@ enum Command {
     Doctor(doctor::Doctor),
     /// Play a task set, and write a run folder with every episode and a summary
     Eval(eval::Eval),
+    /// Show a recorded episode in the explorer, at any of its steps
+    Open(open::Open),
+    /// Play a run's episodes again, and say whether they come out the same
+    Verify(verify::Verify),
+    /// Write a recorded episode as a picture, a film, a strip, a transcript, or a page
+    Export(export::Export),
     /// Sample, check and show task sets
     Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
@@ -98,6 +107,9 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
         Command::Eval(eval) => eval.run(),
+        Command::Open(open) => open.run(),
+        Command::Verify(verify) => verify.run(),
+        Command::Export(export) => export.run(),
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),

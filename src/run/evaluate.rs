@@ -267,7 +267,7 @@ pub fn told(task: &Task, step_by_step: bool) -> String {
 }
 
 /// What drives a policy's chance in an episode: the task's position and the seed, and nothing else.
-fn policy_seed(task: usize, seed: u64) -> u64 {
+pub fn policy_seed(task: usize, seed: u64) -> u64 {
     // SplitMix64's finaliser over both, so that neighbours have nothing in common.
     let mut z = (task as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

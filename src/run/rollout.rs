@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::agent::{Decision, Policy, Situation};
-use crate::domain::Action;
+use crate::domain::{Action, World};
 use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
 
@@ -67,12 +67,24 @@ impl Rollout {
     /// # Errors
     /// Whatever the policy reports.
     pub fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
-        policy.decide(&mut Situation {
+        policy.decide(&mut self.situation())
+    }
+
+    /// What a policy decides from now.
+    pub fn situation(&mut self) -> Situation<'_> {
+        Situation {
             house: &mut self.house,
             instruction: &self.instruction,
             step: self.steps,
             grader: self.grader.as_ref(),
-        })
+        }
+    }
+
+    /// Goes on from another state, `steps` into the episode.
+    pub fn resume(&mut self, world: World, grader: Option<Grader>, steps: u32) {
+        self.house.restore(world);
+        self.grader = grader;
+        self.steps = steps;
     }
 
     /// Takes one step by `policy`'s choice.

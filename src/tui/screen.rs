@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::Event;
 use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
@@ -14,14 +15,16 @@ use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::layout::Size;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::app::{App, Effect, Farewell, Graphics, Msg, update};
+use super::app::{App, Graphics};
+use super::update::{Effect, Farewell, Msg, update};
 use super::engine::Engine;
 use super::graphics::encoder::Encoder;
+use super::graphics::coarse::COARSEST;
 use super::graphics::{Protocol, detect};
 use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
-use super::worker::{self, Command};
+use super::worker::{self, Command, Going};
 
 /// What the screen is started with.
 pub struct Screen {
@@ -67,7 +70,7 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     })?;
     let pictures = tell.clone();
     if screen.runs && !screen.manual {
-        commands.send(Command::Run(true))?;
+        commands.send(Command::Go(Some(Going::Policy)))?;
     }
     let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
@@ -132,6 +135,9 @@ impl<W: Write> Conversation<W> {
                     // A worker that is gone says so itself.
                     Effect::Send(command) => drop(self.commands.send(command)),
                     Effect::Encode => encode = true,
+                    Effect::Copy(text) => {
+                        queue!(self.display.backend_mut(), CopyToClipboard::to_clipboard_from(text))?;
+                    }
                     Effect::Repaint => self.display.clear()?,
                     Effect::Quit(farewell) => return Ok(Some(farewell)),
                 }
@@ -147,6 +153,16 @@ impl<W: Write> Conversation<W> {
         Ok(None)
     }
 
+    /// Makes pictures coarser or finer, so that steps keep to what they may cost.
+    fn budget(&mut self) {
+        let (Some(most), Some(cost)) = (self.app.bandwidth, self.app.bytes) else { return };
+        if cost > most {
+            self.app.coarseness = (self.app.coarseness + 1).min(COARSEST);
+        } else if 3 * cost < most {
+            self.app.coarseness = self.app.coarseness.saturating_sub(1);
+        }
+    }
+
     /// Notes what the newest steps cost on the wire.
     fn meter(&mut self) {
         let step = self.app.now.as_ref().map_or(0, |now| now.step);
@@ -155,6 +171,7 @@ impl<W: Write> Conversation<W> {
             let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
             self.app.bytes = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
             self.metered = (step, bytes);
+            self.budget();
         }
     }
 }
@@ -209,7 +226,8 @@ fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
             }
         }
     };
-    Graphics { protocol, reason, cell_pixels }
+    let in_tmux = std::env::var_os("TMUX").is_some();
+    Graphics { protocol, reason, cell_pixels, in_tmux }
 }
 
 fn read_keys(tell: SyncSender<Msg>) -> io::Result<()> {

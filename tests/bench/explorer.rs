@@ -12,7 +12,8 @@ use ratatui::layout::{Rect, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 use sprint_explorer::domain::scene::Room;
 use sprint_explorer::run::scenes::Scenes;
-use sprint_explorer::tui::app::{App, Graphics, Msg};
+use sprint_explorer::tui::app::{App, Graphics};
+use sprint_explorer::tui::update::Msg;
 use sprint_explorer::tui::engine::Engine;
 use sprint_explorer::tui::graphics::Protocol;
 use sprint_explorer::tui::graphics::encoder::Encoder;
@@ -21,7 +22,7 @@ use sprint_explorer::tui::policies::{Policies, PolicyKind};
 use sprint_explorer::tui::screen::Conversation;
 use sprint_explorer::tui::terminal::Counted;
 use sprint_explorer::tui::theme::Ability;
-use sprint_explorer::tui::worker::{self, Command, Pace};
+use sprint_explorer::tui::worker::{self, Command, Going, Pace};
 
 const KEYS: usize = 600;
 const BETWEEN: Duration = Duration::from_millis(11);
@@ -32,7 +33,7 @@ fn main() -> anyhow::Result<()> {
     let reports = tell.clone();
     let open = || {
         let openings = Openings::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
-        let policies = Policies::new(Box::new(|| anyhow::bail!("not in this bench")));
+        let policies = Policies::new(Vec::new());
         Engine::new(openings, policies, PolicyKind::Random, Some("look around"))
     };
     let commands = worker::start(open, move |report| reports.send((None, Msg::Report(report))).is_ok())?;
@@ -42,10 +43,10 @@ fn main() -> anyhow::Result<()> {
     let viewport = Viewport::Fixed(Rect::from((ratatui::layout::Position::ORIGIN, size)));
     let backend = CrosstermBackend::new(BufWriter::new(Counted::new(io::sink())));
     let display = Terminal::with_options(backend, TerminalOptions { viewport })?;
-    let graphics = Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16) };
+    let graphics = Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16), in_tmux: false };
     let app = App::new(size, graphics, Ability::FULL, PolicyKind::Random, false);
     commands.send(Command::Pace((0..9).fold(Pace::START, |pace, _| pace.faster())))?;
-    commands.send(Command::Run(true))?;
+    commands.send(Command::Go(Some(Going::Policy)))?;
     let mut conversation = Conversation::new(app, display, commands, encoder);
 
     std::thread::spawn(move || {

@@ -19,7 +19,7 @@ impl Widget for Help<'_> {
             Mode::Manual => " Keys while you act ",
             _ => " Keys while a policy acts ",
         };
-        let lines: Vec<Line> = keys::bindings(mode)
+        let lines: Vec<Line> = keys::bindings(mode, self.0.page)
             .map(|binding| {
                 Line::from(vec![
                     Span::styled(format!("{:<13}", binding.label), THEME.chosen),

@@ -1,14 +1,21 @@
 //! The screen: one widget a panel, drawn from the state alone.
 
+mod branches;
+mod chain;
+mod compare;
 mod frame;
 mod help;
 mod instruction;
 mod log;
 mod map;
 mod mind;
+mod palette;
 mod reach;
 mod status;
 mod task;
+mod thoughts;
+mod time;
+mod world;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -21,6 +28,7 @@ use super::app::App;
 use super::keys::Mode;
 use super::layout::SMALLEST;
 use super::theme::THEME;
+use super::verb::Page;
 
 impl Widget for &App {
     fn render(self, area: Rect, buf: &mut Buffer) {
@@ -29,16 +37,28 @@ impl Widget for &App {
             return;
         };
         status::Header(self).render(layout.header, buf);
-        frame::Sees(self).render(layout.sees, buf);
-        reach::Reach(self).render(layout.reach, buf);
-        mind::MindPanel(self).render(layout.mind, buf);
-        task::TaskPanel(self).render(layout.task, buf);
-        log::Log(self).render(layout.log, buf);
-        map::Map(self).render(layout.map, buf);
+        match self.page {
+            Page::Branches => branches::Branches(self).render(layout.page, buf),
+            Page::Mind => thoughts::Thoughts(self).render(layout.page, buf),
+            Page::World => world::World(self).render(layout.page, buf),
+            Page::Compare => compare::Compare(self).render(layout.page, buf),
+            Page::Chain => chain::ChainPage(self).render(layout.page, buf),
+            Page::Main => {
+                frame::Sees(self).render(layout.sees, buf);
+                reach::Reach(self).render(layout.reach, buf);
+                mind::MindPanel(self).render(layout.mind, buf);
+                task::TaskPanel(self).render(layout.task, buf);
+                log::Log(self).render(layout.log, buf);
+                map::Map(self).render(layout.map, buf);
+            }
+        }
+        time::Time(self).render(layout.time, buf);
         instruction::Instruction(self).render(layout.instruction, buf);
         status::Status(self).render(layout.status, buf);
-        if self.mode == Mode::Help {
-            help::Help(self).render(area, buf);
+        match self.mode {
+            Mode::Help => help::Help(self).render(area, buf),
+            Mode::Palette => palette::Palette(self).render(layout.page, buf),
+            Mode::Watch | Mode::Manual | Mode::Typing => {}
         }
         self.ability.adapt(buf);
     }
@@ -154,7 +174,7 @@ mod screens {
     use termprofile::TermProfile;
 
     use crate::house::Outcome;
-    use crate::tui::app::{Msg, perform, update};
+    use crate::tui::update::{Msg, perform, update};
     use crate::tui::engine::Event;
     use crate::tui::graphics::Protocol;
     use crate::tui::testing::{app, engine, screen, snapshot};
@@ -174,7 +194,7 @@ mod screens {
             let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
             for (step, action) in [(1, "RotateLeft"), (2, "MoveAhead")] {
                 let event =
-                    Event { step, action: action.into(), outcome: Outcome::Done, by_hand: step == 2, completed: None };
+                    Event { step, action: action.into(), outcome: Outcome::Done, by_hand: step == 2, completed: None, forked: None };
                 update(&mut app, Msg::Report(Report::Stepped(event)));
             }
             check(name, &screen(&mut app));

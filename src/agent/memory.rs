@@ -1,0 +1,136 @@
+//! What a trained agent carries from step to step of an episode.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tch::{Device, Kind, Tensor};
+
+use super::policy::Decision;
+use super::select::{self, Selection};
+use crate::domain::ActionType;
+use crate::house::view::Candidate;
+use crate::language::instruction::normalise;
+use crate::nets::embedding_cache::Embedder;
+
+/// A sentence encoder with its cache, which several policies may share.
+pub type SharedEmbedder = Arc<Mutex<Embedder>>;
+
+/// The last frames, what did not work, the sentence, and chance.
+#[derive(Debug)]
+pub struct Memory {
+    /// The maps of the last frames, oldest first, and the step that the last one belongs to.
+    seen: VecDeque<Tensor>,
+    seen_at: Option<u32>,
+    /// The last image, and the actions that were chosen at it and left it as it was.
+    last_image: Vec<u8>,
+    blocked: Vec<ActionType>,
+    last_choice: Option<ActionType>,
+    /// The instruction that was read last, with its embedding.
+    read: Option<(String, Tensor)>,
+    rng: ChaCha8Rng,
+}
+
+impl Default for Memory {
+    fn default() -> Memory {
+        Memory {
+            seen: VecDeque::new(),
+            seen_at: None,
+            last_image: Vec::new(),
+            blocked: Vec::new(),
+            last_choice: None,
+            read: None,
+            rng: ChaCha8Rng::seed_from_u64(0),
+        }
+    }
+}
+
+impl Clone for Memory {
+    /// The maps and the embedding are shared, not copied: nothing ever writes into them.
+    fn clone(&self) -> Memory {
+        Memory {
+            seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
+            seen_at: self.seen_at,
+            last_image: self.last_image.clone(),
+            blocked: self.blocked.clone(),
+            last_choice: self.last_choice,
+            read: self.read.as_ref().map(|(text, embedding)| (text.clone(), embedding.shallow_clone())),
+            rng: self.rng.clone(),
+        }
+    }
+}
+
+impl Memory {
+    /// Forgets the past: a new episode starts.
+    pub fn begin(&mut self, seed: u64) {
+        self.seen.clear();
+        self.last_image.clear();
+        self.blocked.clear();
+        self.last_choice = None;
+        self.seen_at = None;
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+    }
+
+    /// Notices when the last choice changed nothing: a wall, or the camera's limit. Until the view changes it is not tried again.
+    pub fn look(&mut self, image: &[u8], step: u32) {
+        let stepped = self.seen_at != Some(step);
+        if self.last_image != image {
+            self.blocked.clear();
+            image.clone_into(&mut self.last_image);
+        } else if stepped && let Some(choice) = self.last_choice.filter(|choice| !choice.is_interaction()) {
+            self.blocked.push(choice);
+        }
+    }
+
+    /// Adds the map of the frame at `step`; the last `history` maps as one observation. Before the first frames there was
+    /// the first one.
+    pub fn observe(&mut self, map: Tensor, step: u32, history: usize) -> Tensor {
+        if self.seen_at == Some(step) {
+            self.seen.pop_back();
+        }
+        self.seen_at = Some(step);
+        self.seen.push_back(map);
+        while self.seen.len() > history {
+            self.seen.pop_front();
+        }
+        let first = history - self.seen.len();
+        let maps: Vec<&Tensor> = (0..history).map(|i| &self.seen[i.saturating_sub(first)]).collect();
+        Tensor::cat(&maps, 1)
+    }
+
+    /// The embedding of an instruction, [1, width].
+    ///
+    /// # Errors
+    /// When the sentence encoder fails.
+    pub fn sentence(
+        &mut self,
+        instruction: &str,
+        sentences: &SharedEmbedder,
+        device: Device,
+    ) -> anyhow::Result<Tensor> {
+        if let Some((text, embedding)) = &self.read
+            && text == instruction
+        {
+            return Ok(embedding.shallow_clone());
+        }
+        let mut embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        let embedding = embedder.embed(&[&normalise(instruction)])?.to_device(device).to_kind(Kind::Float);
+        self.read = Some((instruction.to_string(), embedding.shallow_clone()));
+        Ok(embedding)
+    }
+
+    /// Decides from the logits of both heads, and remembers the choice.
+    pub fn decide(
+        &mut self,
+        actions: &[f32],
+        objects: &[f32],
+        candidates: &[Candidate],
+        samples: bool,
+    ) -> Decision {
+        let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
+        let decision = select::decide(actions, objects, candidates, &self.blocked, selection);
+        self.last_choice = Some(decision.action.kind);
+        decision
+    }
+}
