@@ -37,6 +37,7 @@ impl Session {
         command.env("COLORTERM", "truecolor");
         command.env("LANG", "en_US.UTF-8");
         command.env("XDG_STATE_HOME", state.path());
+        command.env("XDG_CONFIG_HOME", state.path());
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
         let mut output = pair.master.try_clone_reader().unwrap();

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use etcetera::BaseStrategy;
 
 use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
 use crate::tui::update::Farewell;
+use crate::tui::config::Config;
 use crate::tui::engine::Engine;
 use crate::tui::graphics::Protocol;
 use crate::tui::openings::{Openings, Start};
@@ -97,7 +99,8 @@ impl Display {
             GraphicsName::Ascii => Some(Protocol::Ascii),
         };
         let log = logging::open().ok();
-        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, log };
+        let (config, memory) = (settings()?, Some(logging::path().with_file_name("terminals.json")));
+        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, config, memory, log };
         match screen::run(screen, open)? {
             Farewell::Signal(_) => Ok(Ending::Interrupted),
             Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
@@ -107,6 +110,17 @@ impl Display {
     /// The same, but waiting for a key before the first step.
     pub fn paused(self) -> Display {
         Display { paused: true, ..self }
+    }
+}
+
+/// What the person has set in `sprint/explorer.toml` of the configuration folder.
+fn settings() -> anyhow::Result<Config> {
+    let Ok(base) = etcetera::choose_base_strategy() else { return Ok(Config::default()) };
+    let path = base.config_dir().join("sprint").join("explorer.toml");
+    match std::fs::read_to_string(&path) {
+        Ok(text) => Config::parse(&text).with_context(|| path.display().to_string()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Config::default()),
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
     }
 }
 

@@ -125,6 +125,11 @@ pub struct Tree {
     at: u32,
 }
 
+/// States that keep what the policy carried; older ones are come back to by looking back at the frames before them.
+const CARRIED: usize = 4096;
+/// The most states that a tree holds.
+const MOST: usize = 20_000;
+
 /// What growing came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Growth {
@@ -174,6 +179,11 @@ impl Tree {
     /// The steps of the branch in hand, from the first.
     pub fn steps(&self) -> impl Iterator<Item = &Taken> {
         self.line.iter().filter_map(|&place| self.twigs[place].taken.as_ref())
+    }
+
+    /// Whether it holds as many states as it can.
+    pub fn is_full(&self) -> bool {
+        self.twigs.len() >= MOST
     }
 
     /// The state at the start.
@@ -302,6 +312,9 @@ impl Tree {
         let step = self.at + 1;
         self.twigs.push(Twig { parent: Some(from), step, taken: Some(taken), moment: moment(), children: Vec::new() });
         self.twigs[from].children.push(place);
+        if let Some(old) = place.checked_sub(CARRIED) {
+            self.twigs[old].moment.carried = Carried::Nothing;
+        }
         let longer = self.branches[self.branch].tip == from;
         let growth = if longer {
             self.branches[self.branch].tip = place;

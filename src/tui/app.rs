@@ -7,6 +7,7 @@ use ratatui::layout::{Rect, Size};
 
 use super::breakpoints::Condition;
 use super::chained::Chained;
+use super::config::Config;
 use super::editor::Editor;
 use super::engine::Snapshot;
 use super::graphics::classes::{Letters, Names};
@@ -86,6 +87,8 @@ pub struct App {
     pub under: Mode,
     /// What the terminal can show.
     pub ability: Ability,
+    /// What a person has set.
+    pub config: Config,
     /// How pictures are shown.
     pub graphics: Graphics,
     /// The newest state.
@@ -161,6 +164,7 @@ impl App {
             selected: 0,
             under: mode,
             ability,
+            config: Config::default(),
             graphics,
             now: None,
             thought: None,

@@ -67,6 +67,8 @@ pub struct Snapshot {
     pub recent: Vec<Arc<Frame>>,
     /// What the sentence encoder makes of the instruction.
     pub reading: Option<Reading>,
+    /// Instructions that make sense in this house.
+    pub examples: Arc<Vec<String>>,
     /// The checkpoints that may act.
     pub checkpoints: Arc<Vec<String>>,
 }
@@ -116,6 +118,7 @@ pub struct Engine {
     tree: Tree,
     decision: Option<(Decision, Option<Values>)>,
     frame: Option<Arc<Frame>>,
+    examples: Arc<Vec<String>>,
     /// The screen shows the frames before the present one.
     looks_back: bool,
 }
@@ -150,8 +153,10 @@ impl Engine {
             episode: 1,
             decision: None,
             frame: None,
+            examples: Arc::default(),
             looks_back: false,
         };
+        engine.examples = Arc::new(engine.suggest());
         if let Some(text) = instruction {
             engine.instruct(text)?;
             engine.plant();
@@ -267,6 +272,7 @@ impl Engine {
     /// # Errors
     /// When the policy cannot go on; nothing was done then.
     pub fn step(&mut self) -> anyhow::Result<Event> {
+        anyhow::ensure!(!self.tree.is_full(), "no more steps are remembered in this episode: N opens the next one");
         let decision = self.think()?.0.clone();
         Ok(self.carry_out(decision, self.author.clone()))
     }
@@ -642,7 +648,29 @@ impl Engine {
             policy.begin(self.seed);
         }
         self.tree = Tree::new(self.moment());
+        self.examples = Arc::new(self.suggest());
         Ok(())
+    }
+
+    /// Instructions that make sense in this house: the task's own, its steps in training's words, and a pickup of each thing.
+    fn suggest(&self) -> Vec<String> {
+        let mut found: Vec<String> = Vec::new();
+        if let Some(task) = &self.task {
+            found.push(instruction::normalise(&task.instruction));
+            found.extend(task.sentences.iter().map(|sentence| instruction::normalise(sentence)));
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            for subtask in &task.subtasks {
+                found.push(instruction::normalise(&phrases::sentence(&task.roles, subtask, &mut rng)));
+            }
+        }
+        let objects = &self.rollout.house.world().objects;
+        let mut names: Vec<&str> =
+            objects.iter().filter(|o| o.class.info().pickupable).map(|object| object.class.spoken()).collect();
+        names.sort_unstable();
+        names.dedup();
+        found.extend(names.into_iter().map(|name| format!("Pick up the {name}.")));
+        found.dedup();
+        found
     }
 
     /// How far the task has come, where one applies.
@@ -714,6 +742,7 @@ impl Engine {
             time: Arc::new(Timeline::of(&self.tree)),
             recent,
             reading: self.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
+            examples: self.examples.clone(),
             checkpoints: self.checkpoints.clone(),
         }
     }

@@ -17,6 +17,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             let new_episode = app.now.as_ref().is_none_or(|now| now.episode != snapshot.episode);
             if new_episode {
                 app.letters = Arc::new(Letters::of(&snapshot.scene, &snapshot.world));
+                app.examples.clone_from(&snapshot.examples);
                 app.replaced = None;
                 app.thought = None;
                 app.divergence = None;

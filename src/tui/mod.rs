@@ -7,6 +7,7 @@ pub mod app;
 pub mod breakpoints;
 pub mod chained;
 pub mod choices;
+pub mod config;
 pub mod editor;
 pub mod engine;
 pub mod graphics;

@@ -1,6 +1,7 @@
 //! The loop of the explorer's screen: messages in, one `update`, effects out, one drawing for all that came.
 
 use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
@@ -16,6 +17,7 @@ use ratatui::layout::Size;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::app::{App, Graphics};
+use super::config::Config;
 use super::update::{Effect, Farewell, Msg, update};
 use super::engine::Engine;
 use super::graphics::encoder::Encoder;
@@ -36,6 +38,10 @@ pub struct Screen {
     pub manual: bool,
     /// The policy runs as soon as it is there.
     pub runs: bool,
+    /// What a person has set.
+    pub config: Config,
+    /// Where it is remembered what a terminal answered.
+    pub memory: Option<PathBuf>,
     /// Where libtorch's messages go.
     pub log: Option<std::fs::File>,
 }
@@ -58,9 +64,10 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     watch_signals(tell.clone())?;
     let guard =
         terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let graphics = graphics(screen.protocol, ability);
+    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref());
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
-    let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
+    let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
+    app.config = screen.config;
 
     let reports = tell.clone();
     let gone = Gone(tell.clone());
@@ -205,7 +212,7 @@ fn ability() -> Ability {
 }
 
 /// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
-fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
+fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) -> Graphics {
     let cell_pixels = match crossterm::terminal::window_size() {
         Ok(window) if window.width > 0 && window.height > 0 => {
             ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
@@ -217,7 +224,9 @@ fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
         None => {
             let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
             let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
-            if reason == detect::UNKNOWN && detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false) {
+            let ask = || detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false);
+            let name = ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
+            if reason == detect::UNKNOWN && detect::remembered(memory, &name, ask) {
                 (Protocol::Sixel, "the terminal says that it has sixels".into())
             } else if protocol == Protocol::HalfBlocks && !ability.shades() {
                 (Protocol::Ascii, "the terminal has few colours".into())

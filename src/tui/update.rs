@@ -62,7 +62,7 @@ pub enum Farewell {
 pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
-        Msg::Key(key) => match keys::verb(app.mode, app.page, key) {
+        Msg::Key(key) => match own(app, key).or_else(|| keys::verb(app.mode, app.page, key)) {
             Some(verb) => perform(app, verb),
             None => {
                 match app.mode {
@@ -106,6 +106,11 @@ pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         Msg::Signal(number) => vec![Effect::Quit(Farewell::Signal(number))],
         Msg::WorkerGone => vec![Effect::Quit(Farewell::WorkerGone)],
     }
+}
+
+/// What a key means by the person's own settings, while keys are no text.
+fn own(app: &App, key: KeyEvent) -> Option<Verb> {
+    matches!(app.mode, Mode::Watch | Mode::Manual).then(|| app.config.verb(key)).flatten()
 }
 
 fn send(command: Command) -> Vec<Effect> {
