@@ -7,8 +7,8 @@ use tch::{Device, Tensor};
 use super::checkpoint::{Config, Networks};
 use super::memory::Memory;
 pub use super::memory::SharedEmbedder;
-use crate::language::instruction::normalise;
 use super::policy::{Carried, Decision, Policy, Reading, Situation};
+use crate::language::instruction::normalise;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {

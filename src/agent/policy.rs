@@ -7,8 +7,8 @@ use super::values::Values;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::expert::Plan;
 use crate::house::grading::Grader;
-use crate::house::view::Candidate;
 use crate::house::session::House;
+use crate::house::view::Candidate;
 
 /// What a policy decides from.
 pub struct Situation<'a> {

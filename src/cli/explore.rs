@@ -11,12 +11,12 @@ use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
-use crate::tui::update::Farewell;
 use crate::tui::config::Config;
 use crate::tui::engine::Engine;
 use crate::tui::graphics::Protocol;
 use crate::tui::openings::{Openings, Start};
 use crate::tui::policies::{Policies, PolicyKind};
+use crate::tui::update::Farewell;
 use crate::tui::{plain, screen};
 
 /// Where the explorer starts, and who acts.

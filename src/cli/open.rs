@@ -85,12 +85,16 @@ impl Open {
         let acts = first.cloned().unwrap_or_else(|| author.clone());
         let kind = kind_of(&acts);
         let checkpoint = self.checkpoint.clone();
+        let explored = recorded.manifest.policy == "explored";
         let open = move || -> anyhow::Result<Engine> {
             let scenes = recorded.scenes;
             let start = Start::Tasks { tasks: vec![task], index: 0 };
             let policies = Policies::new(policies::agents(checkpoint.as_deref()));
             let openings = Openings::new(start, 0, scenes);
             let mut engine = Engine::new(openings, policies, kind, None)?;
+            if explored {
+                engine.unlimited();
+            }
             // Without its policy an episode can still be seen, step by step.
             let found = summon(&mut engine, kind, &acts);
             let thinks = found.is_ok();
@@ -127,4 +131,3 @@ fn summon(engine: &mut Engine, kind: PolicyKind, author: &Author) -> anyhow::Res
     }
     anyhow::bail!("no checkpoint at hand has the hash that the run names")
 }
-

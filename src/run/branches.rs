@@ -262,7 +262,8 @@ impl Tree {
     pub fn completed(&self, branch: usize) -> u32 {
         let tip = self.branches.get(branch).map(|branch| branch.tip);
         let up = std::iter::successors(tip, |&place| self.twigs[place].parent);
-        up.filter(|&place| self.twigs[place].taken.as_ref().is_some_and(|taken| taken.step.subtask.is_some())).count() as u32
+        up.filter(|&place| self.twigs[place].taken.as_ref().is_some_and(|taken| taken.step.subtask.is_some())).count()
+            as u32
     }
 
     /// Goes to a step of the branch in hand, or to its end.
@@ -370,7 +371,8 @@ mod tests {
     }
 
     fn taken(kind: ActionType, told: &str) -> Taken {
-        let step = Step { kind, target: None, class: None, outcome: Outcome::Done, subtask: None, told: None, by: None };
+        let step =
+            Step { kind, target: None, class: None, outcome: Outcome::Done, subtask: None, told: None, by: None };
         Taken {
             decision: Decision { action: Action::navigate(kind), mind: None },
             step,

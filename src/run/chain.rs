@@ -159,7 +159,14 @@ impl Chain {
                 None => None,
             };
             let (steps, exit) = (rollout.steps() - begun, rollout.house.world().clone());
-            play.outcomes.push(Outcome { reached: !failed, done: done.filter(|_| !failed), steps, entry, exit, handover });
+            play.outcomes.push(Outcome {
+                reached: !failed,
+                done: done.filter(|_| !failed),
+                steps,
+                entry,
+                exit,
+                handover,
+            });
         }
         Ok(play)
     }

@@ -197,7 +197,8 @@ impl Again<'_> {
             let found = Step { told: recorded.told.clone(), by: recorded.by.clone(), ..Step::of(&tick, &rollout) };
             if found != *recorded {
                 let field = if found.outcome != recorded.outcome { "outcome" } else { "subtask" };
-                let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
+                let text =
+                    |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
                 return Ok(Some((number, field, text(recorded), text(&found))));
             }
             self.verdict.steps += 1;
@@ -215,10 +216,10 @@ impl Again<'_> {
 mod tests {
     use super::*;
     use crate::agent::RandomPolicy;
-    use crate::run::explored::{self, Explored};
     use crate::domain::{ActionType, Class, Role, SkillKind, Subtask};
     use crate::house::testing::kitchen;
     use crate::run::branches::{Taken, Tree};
+    use crate::run::explored::{self, Explored};
 
     /// A random walk of eight steps in the kitchen; the fourth and fifth by hand, with another instruction from the sixth on.
     fn walked() -> Explored {
@@ -286,11 +287,16 @@ mod tests {
             let mut explored = walked();
             change(&mut explored.episodes[0]);
             let verdict = verified(&explored);
-            let found: Vec<_> = verdict.differences.iter().map(|difference| (difference.step, difference.what)).collect();
+            let found: Vec<_> =
+                verdict.differences.iter().map(|difference| (difference.step, difference.what)).collect();
             assert_eq!(found, [(step, what)]);
         };
         check(|episode| episode.start_hash = "00".into(), 0, "start");
-        check(|episode| episode.trace[3].outcome = crate::house::Outcome::Impossible(crate::house::Reason::Blocked), 4, "outcome");
+        check(
+            |episode| episode.trace[3].outcome = crate::house::Outcome::Impossible(crate::house::Reason::Blocked),
+            4,
+            "outcome",
+        );
         check(|episode| episode.trace[0].kind = ActionType::Slice, 1, "choice");
         check(|episode| episode.completed += 1, 0, "result");
     }

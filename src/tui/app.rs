@@ -7,6 +7,7 @@ use ratatui::layout::{Rect, Size};
 
 use super::breakpoints::Condition;
 use super::chained::Chained;
+use super::choices::Sort;
 use super::config::Config;
 use super::editor::Editor;
 use super::engine::Snapshot;
@@ -18,7 +19,6 @@ use super::keys::Mode;
 use super::layout::Layout;
 use super::policies::PolicyKind;
 use super::theme::Ability;
-use super::choices::Sort;
 use super::timeline::Divergence;
 use super::verb::Page;
 use super::worker::{Going, Pace};

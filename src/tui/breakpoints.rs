@@ -50,7 +50,8 @@ impl Condition {
     /// Says what conditions there are.
     pub fn parse(text: &str) -> Result<Condition, String> {
         let (word, rest) = text.trim().split_once(' ').map_or((text.trim(), ""), |(word, rest)| (word, rest.trim()));
-        let number = || rest.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or(format!("{word}: {rest:?} is not a number"));
+        let number =
+            || rest.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or(format!("{word}: {rest:?} is not a number"));
         match word {
             "subtask" => Ok(Condition::Subtask),
             "failed" => Ok(Condition::Failed),
@@ -60,7 +61,8 @@ impl Condition {
             "step" => rest.parse().map(Condition::Step).map_err(|_| format!("step: {rest:?} is not a number")),
             "sees" => {
                 let plain = |name: &str| name.to_lowercase().replace([' ', '-', '_'], "");
-                let named = |class: &Class| [class.name(), class.spoken()].iter().any(|name| plain(name) == plain(rest));
+                let named =
+                    |class: &Class| [class.name(), class.spoken()].iter().any(|name| plain(name) == plain(rest));
                 Class::all().find(named).map(Condition::Sees).ok_or(format!("sees: {rest:?} is no class of objects"))
             }
             _ => Err(format!(
@@ -156,7 +158,9 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        for (text, part) in [("dance", "there are"), ("drop x", "not a number"), ("sees unicorn", "no class"), ("step", "not a number")] {
+        for (text, part) in
+            [("dance", "there are"), ("drop x", "not a number"), ("sees unicorn", "no class"), ("step", "not a number")]
+        {
             let error = Condition::parse(text).unwrap_err();
             assert!(error.contains(part), "{error}");
         }

@@ -86,7 +86,12 @@ pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sor
 
 /// The choices of a policy without a distribution.
 fn legal(now: &Snapshot) -> Vec<(ActionType, Option<Class>, f32)> {
-    let uniform = Mind { actions: [None; ActionType::COUNT], objects: Vec::new(), entropy: 0.0, greedy: Action::navigate(ActionType::MoveAhead) };
+    let uniform = Mind {
+        actions: [None; ActionType::COUNT],
+        objects: Vec::new(),
+        entropy: 0.0,
+        greedy: Action::navigate(ActionType::MoveAhead),
+    };
     uniform.joint(&now.candidates)
 }
 
@@ -106,10 +111,8 @@ mod tests {
         assert_eq!((rows[0].kind, rows[0].class.unwrap().name(), rows[0].chosen), (ActionType::Pickup, "Mug", true));
         let sum: f32 = rows.iter().filter_map(|row| row.probability).sum();
         assert!((sum - 1.0).abs() < 1e-5, "{sum}");
-        let values = Values {
-            state: 0.5,
-            choices: vec![ChoiceValue { kind: ActionType::LookUp, class: None, q: 0.7 }],
-        };
+        let values =
+            Values { state: 0.5, choices: vec![ChoiceValue { kind: ActionType::LookUp, class: None, q: 0.7 }] };
         let rows = choices(&now, &decision, Some(&values), Sort::Q);
         assert_eq!(rows[0].kind, ActionType::LookUp);
         assert!((rows[0].advantage.unwrap() - 0.2).abs() < 1e-6);

@@ -61,9 +61,8 @@ impl Config {
     /// What a key means by these settings.
     pub fn verb(&self, key: KeyEvent) -> Option<Verb> {
         let shift = KeyModifiers::SHIFT;
-        let is = |remapped: &&Remapped| {
-            remapped.code == key.code && remapped.modifiers - shift == key.modifiers - shift
-        };
+        let is =
+            |remapped: &&Remapped| remapped.code == key.code && remapped.modifiers - shift == key.modifiers - shift;
         self.keys.iter().find(is).map(|remapped| remapped.verb.clone())
     }
 }

@@ -608,7 +608,14 @@ impl Engine {
         task
     }
 
-    /// Puts the policy's chance and, where the task says so, the end of the episode as an evaluation has them.
+    /// The episode has no end but success.
+    pub fn unlimited(&mut self) {
+        self.limited = false;
+        self.rollout.horizon = None;
+        self.plant();
+    }
+
+    /// Lets that author's policy begin here: its chance, and whether it draws.
     pub fn begin_as(&mut self, author: Author) {
         self.author = author;
         self.look_back();
@@ -695,7 +702,8 @@ impl Engine {
             return Vec::new();
         }
         let scene = self.rollout.house.scene().clone();
-        let mut worlds: Vec<Arc<World>> = self.tree.past().rev().skip(1).take(FRAMES - 1).map(|m| m.world.clone()).collect();
+        let mut worlds: Vec<Arc<World>> =
+            self.tree.past().rev().skip(1).take(FRAMES - 1).map(|m| m.world.clone()).collect();
         // Before the first frame there was the first one.
         let first = self.tree.past().next().map(|moment| moment.world.clone());
         worlds.extend(std::iter::repeat_n(first, FRAMES).flatten());
@@ -760,6 +768,8 @@ fn who(author: &Author) -> String {
 fn rollout_of(opening: &Opening) -> Rollout {
     let house = House::new(opening.scene.clone(), opening.world.clone());
     match &opening.task {
+        // What a person made up is not graded.
+        Some(task) if task.subtasks.is_empty() => Rollout::new(house, task.instruction.clone(), None, None),
         Some(task) => {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
             Rollout::new(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
@@ -846,7 +856,12 @@ mod tests {
         let moment = engine.moment();
         let (world, told) = (moment.world.digest(), &moment.instruction);
         let sum: u64 = frame.rgb.iter().zip(1u64..).map(|(&value, at)| u64::from(value) * at).sum();
-        format!("{world} {told} {:?} {:?} {thought} {sum} {:?}", moment.grader, moment.horizon, engine.policy.as_ref().unwrap().carried())
+        format!(
+            "{world} {told} {:?} {:?} {thought} {sum} {:?}",
+            moment.grader,
+            moment.horizon,
+            engine.policy.as_ref().unwrap().carried()
+        )
     }
 
     #[test]

@@ -113,7 +113,11 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             {
                 app.chain_before = Some(before);
             }
-            if app.chain_before.as_ref().is_some_and(|before| before.links != chained.links || of(before) == of(&chained)) {
+            if app
+                .chain_before
+                .as_ref()
+                .is_some_and(|before| before.links != chained.links || of(before) == of(&chained))
+            {
                 app.chain_before = None;
             }
             app.chain = Some(*chained);

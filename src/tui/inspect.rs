@@ -85,7 +85,7 @@ fn applies(kind: ActionType, class: Class, now: &Snapshot) -> bool {
         ActionType::Put => info.receptacle && now.world.held.is_some(),
         ActionType::Open | ActionType::Close => info.openable,
         ActionType::ToggleOn | ActionType::ToggleOff => info.toggleable,
-        ActionType::Slice => info.sliceable,
+        ActionType::Slice => info.slices > 0,
         _ => false,
     }
 }

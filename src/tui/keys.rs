@@ -116,8 +116,7 @@ const BRANCHES: &[Binding] = &[
     bind("E", &[Char('E')], Verb::Palette("export ")),
 ];
 const MIND: &[Binding] = &[bind("s", &[Char('s')], Verb::Sort)];
-const COMPARE: &[Binding] =
-    &[bind("enter", &[Enter], Verb::Palette("compare ")), bind("s", &[Char('s')], Verb::Swap)];
+const COMPARE: &[Binding] = &[bind("enter", &[Enter], Verb::Palette("compare ")), bind("s", &[Char('s')], Verb::Swap)];
 const CHAIN: &[Binding] = &[
     bind("enter", &[Enter], Verb::Palette("chain ")),
     bind("w", &[Char('w')], Verb::WhichLink(8)),

@@ -10,8 +10,8 @@ use super::engine::{Engine, Event, Snapshot};
 use super::inspect::state;
 use super::policies::PolicyKind;
 use super::timeline::{Divergence, words};
-use super::worker::Report;
 use super::verb::{SAID, Verb, parse};
+use super::worker::Report;
 use crate::agent::Mind;
 use crate::domain::{Action, ActionType, Instance};
 use crate::run::chain::{Play, Rate};
@@ -28,7 +28,9 @@ const FARTHEST: u32 = 1000;
 /// When reading or writing fails.
 pub fn run(mut engine: Engine, kind: PolicyKind, input: impl BufRead, mut out: impl Write) -> anyhow::Result<()> {
     opening(&engine.snapshot(), &mut out)?;
-    if let Err(error) = engine.choose(kind) {
+    if !engine.has_policy()
+        && let Err(error) = engine.choose(kind)
+    {
         writeln!(out, "error: {error:#}")?;
     }
     out.flush()?;
@@ -234,9 +236,16 @@ fn chain(engine: &Engine, text: &str, times: Option<u32>, out: &mut impl Write) 
         None => "-".into(),
     };
     for (at, link) in known.links.iter().enumerate() {
-        write!(out, "link {}: {link} by link: {}; as one: {}", at + 1, word(&known.by_link, at), word(&known.as_one, at))?;
+        write!(
+            out,
+            "link {}: {link} by link: {}; as one: {}",
+            at + 1,
+            word(&known.by_link, at),
+            word(&known.as_one, at)
+        )?;
         if let Some(trials) = &known.trials {
-            let rate = |rates: &[Rate]| rates.get(at).map_or(String::new(), |rate| format!("{} of {}", rate.done, rate.of));
+            let rate =
+                |rates: &[Rate]| rates.get(at).map_or(String::new(), |rate| format!("{} of {}", rate.done, rate.of));
             write!(out, "; from the expert's entry {}, from its own {}", rate(&trials.expert), rate(&trials.own))?;
         }
         writeln!(out)?;
@@ -380,7 +389,9 @@ mod tests {
 
     #[test]
     fn time_travel_and_branches_speak_the_same_verbs() {
-        let text = say("step 3\nback 2\ndo RotateLeft\ndo LookUp\nname left\nbranches\ndiverge main\nbranch 1\nlast\nseek 1\nback\n");
+        let text = say(
+            "step 3\nback 2\ndo RotateLeft\ndo LookUp\nname left\nbranches\ndiverge main\nbranch 1\nlast\nseek 1\nback\n",
+        );
         for wanted in [
             "at step 1 of 3 on main",
             "branch b1: ",

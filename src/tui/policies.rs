@@ -99,7 +99,9 @@ impl Policies {
         match kind {
             PolicyKind::Agent => match self.agents.get(self.chosen) {
                 Some(agent) => (agent.load)(),
-                None => anyhow::bail!("there is no checkpoint"),
+                None => anyhow::bail!(
+                    "there is no checkpoint in checkpoints/: name one with --checkpoint, or let the expert (e) or chance (x) act"
+                ),
             },
             PolicyKind::Expert => plain(Box::new(ExpertPolicy::new())),
             PolicyKind::Random => plain(Box::new(RandomPolicy::new())),

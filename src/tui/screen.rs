@@ -18,14 +18,14 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::app::{App, Graphics};
 use super::config::Config;
-use super::update::{Effect, Farewell, Msg, update};
 use super::engine::Engine;
-use super::graphics::encoder::Encoder;
 use super::graphics::coarse::COARSEST;
+use super::graphics::encoder::Encoder;
 use super::graphics::{Protocol, detect};
 use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
+use super::update::{Effect, Farewell, Msg, update};
 use super::worker::{self, Command, Going};
 
 /// What the screen is started with.
@@ -225,7 +225,8 @@ fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) ->
             let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
             let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
             let ask = || detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false);
-            let name = ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
+            let name =
+                ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
             if reason == detect::UNKNOWN && detect::remembered(memory, &name, ask) {
                 (Protocol::Sixel, "the terminal says that it has sixels".into())
             } else if protocol == Protocol::HalfBlocks && !ability.shades() {

@@ -7,12 +7,12 @@ use ratatui::backend::TestBackend;
 use ratatui::layout::Size;
 
 use super::app::{App, Graphics};
-use super::update::{Msg, update};
 use super::engine::{Engine, Snapshot};
 use super::graphics::{Picture, Protocol};
 use super::openings::{Openings, Start};
 use super::policies::{Policies, PolicyKind};
 use super::theme::Ability;
+use super::update::{Msg, update};
 use super::worker::Report;
 use crate::agent::{Decision, Mind};
 use crate::domain::task::SceneRef;

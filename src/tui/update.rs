@@ -178,7 +178,8 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
                 Some(condition) => app.breaks.push(condition),
             }
             let all: Vec<String> = app.breaks.iter().map(ToString::to_string).collect();
-            let text = if all.is_empty() { "runs stop nowhere".into() } else { format!("runs stop at: {}", all.join("; ")) };
+            let text =
+                if all.is_empty() { "runs stop nowhere".into() } else { format!("runs stop at: {}", all.join("; ")) };
             app.note(Tone::Note, text);
             send(Command::Break(app.breaks.clone()))
         }
@@ -453,11 +454,11 @@ mod tests {
 
     use super::*;
     use crate::domain::ActionType;
-    use crate::tui::graphics::Protocol;
-    use crate::tui::theme::Ability;
     use crate::house::{Outcome, Reason};
     use crate::tui::engine::Event;
+    use crate::tui::graphics::Protocol;
     use crate::tui::testing;
+    use crate::tui::theme::Ability;
 
     fn app() -> App {
         testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL)

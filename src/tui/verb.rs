@@ -185,7 +185,11 @@ pub const SAID: &[Said] = &[
     said("branches", "", "list the branches"),
     said("name", "TEXT", "name the branch"),
     said("diverge", "NAME|N", "this branch and another, side by side from where they part"),
-    said("break", "[CONDITION]", "stop runs at: subtask, failed, drop X, gap X, entropy X, sees OBJECT, step N; without any, nowhere"),
+    said(
+        "break",
+        "[CONDITION]",
+        "stop runs at: subtask, failed, drop X, gap X, entropy X, sees OBJECT, step N; without any, nowhere",
+    ),
     said("until", "CONDITION", "run until that holds"),
     said("policy", "NAME", "who acts: agent, expert, random"),
     said("checkpoint", "NAME|N", "another checkpoint becomes the agent"),

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::breakpoints::{Condition, Facts};
@@ -441,7 +441,9 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
     /// Follows the chain in the background; with `times`, also which link breaks.
     fn follow(&mut self, times: Option<u32>) -> bool {
         let Some(chain) = self.chain.clone() else {
-            return (self.tell)(Report::Refused("there is no chain yet: type one (chain A; B; ...), or chain alone".into()));
+            return (self.tell)(Report::Refused(
+                "there is no chain yet: type one (chain A; B; ...), or chain alone".into(),
+            ));
         };
         let policy = match self.engine.another_policy() {
             Ok(policy) => policy,

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 use std::io::{self, BufWriter, Write};
-use std::sync::mpsc::sync_channel;
 use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -14,17 +14,17 @@ use ratatui::{Terminal, TerminalOptions, Viewport};
 use sprint_explorer::domain::scene::Room;
 use sprint_explorer::run::scenes::Scenes;
 use sprint_explorer::tui::app::{App, Graphics};
-use sprint_explorer::tui::update::Msg;
 use sprint_explorer::tui::engine::Engine;
 use sprint_explorer::tui::graphics::classes::{self, Letters};
+use sprint_explorer::tui::graphics::encoder::Encoder;
 use sprint_explorer::tui::graphics::overlay::Overlay;
 use sprint_explorer::tui::graphics::{Job, Picture, Protocol};
-use sprint_explorer::tui::graphics::encoder::Encoder;
 use sprint_explorer::tui::openings::{Openings, Start};
 use sprint_explorer::tui::policies::{Policies, PolicyKind};
 use sprint_explorer::tui::screen::Conversation;
 use sprint_explorer::tui::terminal::{Counted, WRITTEN};
 use sprint_explorer::tui::theme::Ability;
+use sprint_explorer::tui::update::Msg;
 use sprint_explorer::tui::worker::{self, Command, Going, Pace};
 
 const KEYS: usize = 600;
@@ -42,7 +42,12 @@ fn engine() -> anyhow::Result<Engine> {
 /// The typical cost of a step's picture, in bytes and encoding time, while the expert does a task.
 fn frames() -> anyhow::Result<()> {
     // Half-blocks at 40 x 20 cells; sixels at 300 x 300 pixels; kitty sends the frame as it is.
-    let sizes = [(Protocol::HalfBlocks, (40, 20)), (Protocol::Kitty, (40, 20)), (Protocol::Sixel, (30, 15)), (Protocol::Ascii, (40, 20))];
+    let sizes = [
+        (Protocol::HalfBlocks, (40, 20)),
+        (Protocol::Kitty, (40, 20)),
+        (Protocol::Sixel, (30, 15)),
+        (Protocol::Ascii, (40, 20)),
+    ];
     for (protocol, (width, height)) in sizes {
         let mut engine = engine()?;
         engine.choose(PolicyKind::Expert)?;
@@ -110,7 +115,8 @@ fn main() -> anyhow::Result<()> {
     let viewport = Viewport::Fixed(Rect::from((ratatui::layout::Position::ORIGIN, size)));
     let backend = CrosstermBackend::new(BufWriter::new(Counted::new(io::sink())));
     let display = Terminal::with_options(backend, TerminalOptions { viewport })?;
-    let graphics = Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16), in_tmux: false };
+    let graphics =
+        Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16), in_tmux: false };
     let app = App::new(size, graphics, Ability::FULL, PolicyKind::Random, false);
     commands.send(Command::Pace((0..9).fold(Pace::START, |pace, _| pace.faster())))?;
     commands.send(Command::Go(Some(Going::Policy)))?;

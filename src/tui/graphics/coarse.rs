@@ -32,9 +32,8 @@ mod tests {
     fn coarse_frames_have_fewer_different_pixels() {
         let rgb = (0..3 * 64 * 64).map(|i| (i * 7 % 251) as u8).collect();
         let frame = Arc::new(Frame { width: 64, height: 64, rgb, depth: vec![1.0; 4096], ids: vec![0; 4096] });
-        let kinds = |frame: &Frame| {
-            frame.rgb.chunks(3).map(<[u8]>::to_vec).collect::<std::collections::BTreeSet<_>>().len()
-        };
+        let kinds =
+            |frame: &Frame| frame.rgb.chunks(3).map(<[u8]>::to_vec).collect::<std::collections::BTreeSet<_>>().len();
         assert!(Arc::ptr_eq(&coarse(frame.clone(), 0), &frame));
         let many: Vec<usize> = (0..=3).map(|coarseness| kinds(&coarse(frame.clone(), coarseness))).collect();
         assert!(many.is_sorted_by(|a, b| a > b), "{many:?}");

@@ -47,7 +47,10 @@ impl ChainPage<'_> {
         let before = self.0.chain_before.as_ref().and_then(|chain| chain.by_link.as_ref());
         let other = before.map_or(String::new(), |play| format!("{:<12}", fit(&play.acts, 11)));
         let width = usize::from(inner.width).saturating_sub(3 + 13 + 13 + 26 + other.len());
-        let head = format!("   {:<width$}{:<13}{other}{:<13}{:<12} {:<12}", "link", "by link", "as one", "from expert", "from own");
+        let head = format!(
+            "   {:<width$}{:<13}{other}{:<13}{:<12} {:<12}",
+            "link", "by link", "as one", "from expert", "from own"
+        );
         put(buf, inner, 0, head, THEME.quiet);
         let weakest = chain.trials.as_ref().and_then(|trials| trials.weakest());
         let of = |play: Option<&Play>, at: usize| play.and_then(|play| play.outcomes.get(at)).cloned();
@@ -55,7 +58,10 @@ impl ChainPage<'_> {
             let weak = weakest == Some(at);
             let mut spans = vec![
                 Span::styled(format!("{:>2} ", at + 1), THEME.key),
-                Span::styled(format!("{:<width$}", fit(link, width.saturating_sub(1))), if weak { THEME.bad } else { Style::new() }),
+                Span::styled(
+                    format!("{:<width$}", fit(link, width.saturating_sub(1))),
+                    if weak { THEME.bad } else { Style::new() },
+                ),
             ];
             spans.push(outcome(of(chain.by_link.as_ref(), at), 13));
             if before.is_some() {
@@ -64,7 +70,10 @@ impl ChainPage<'_> {
             spans.push(outcome(of(chain.as_one.as_ref(), at), 13));
             if let Some(trials) = &chain.trials {
                 spans.push(Span::styled(format!("{:<12} ", rate(trials.expert.get(at))), Style::new()));
-                spans.push(Span::styled(format!("{:<12}", rate(trials.own.get(at))), if weak { THEME.bad } else { Style::new() }));
+                spans.push(Span::styled(
+                    format!("{:<12}", rate(trials.own.get(at))),
+                    if weak { THEME.bad } else { Style::new() },
+                ));
             }
             Line::from(spans).render(Rect { y: inner.y + 1 + at as u16, height: 1, ..inner }, buf);
         }
@@ -145,7 +154,13 @@ fn heat(chain: &Chained, area: Rect, buf: &mut Buffer) {
     }
     let left = Rect { y: inner.y + chain.links.len() as u16, height: 1, ..inner };
     if left.y < inner.bottom() && steps > 0 {
-        put(buf, left, 0, format!("{:<label$}0 is {low:.2}, 9 is {high:.2}; underlined: the link in force", ""), THEME.quiet);
+        put(
+            buf,
+            left,
+            0,
+            format!("{:<label$}0 is {low:.2}, 9 is {high:.2}; underlined: the link in force", ""),
+            THEME.quiet,
+        );
     }
 }
 

@@ -77,7 +77,8 @@ fn verdict(bits: f32) -> &'static str {
 fn table(contrast: &Contrast, selected: usize, area: Rect, buf: &mut Buffer) {
     let inner = panel(buf, area, "Choices", "the largest difference first");
     let width = usize::from(inner.width).saturating_sub(48) / 2;
-    let head = format!("{:<11} {:<16} {:>4} {:<width$} {:>4} {:<width$} {:>6}", "action", "object", "A", "", "B", "", "B - A");
+    let head =
+        format!("{:<11} {:<16} {:>4} {:<width$} {:>4} {:<width$} {:>6}", "action", "object", "A", "", "B", "", "B - A");
     put(buf, inner, 0, head, THEME.quiet);
     let rows = usize::from(inner.height).saturating_sub(1);
     let first = (selected + 1).saturating_sub(rows);

@@ -12,8 +12,8 @@ use super::chain::warmth;
 use super::{fit, panel};
 use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Instance, Pose};
-use crate::tui::app::App;
 use crate::run::landscape::Landscape;
+use crate::tui::app::App;
 use crate::tui::engine::Snapshot;
 use crate::tui::inspect::things;
 use crate::tui::theme::THEME;
@@ -75,7 +75,11 @@ impl Widget for Map<'_> {
 
 /// What the painted values are, and their range.
 fn legend(values: &Landscape) -> String {
-    let far = if values.heights.len() < values.of { format!(" {}/{}", values.heights.len(), values.of) } else { String::new() };
+    let far = if values.heights.len() < values.of {
+        format!(" {}/{}", values.heights.len(), values.of)
+    } else {
+        String::new()
+    };
     let range = values.range().map_or(String::new(), |(low, high)| format!(" {low:.2} to {high:.2}"));
     format!("{}{range}{far}", values.measure.words())
 }

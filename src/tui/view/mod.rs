@@ -198,8 +198,14 @@ mod screens {
         for (name, width, height) in [("watch-80x24", 80, 24), ("watch-120x36", 120, 36)] {
             let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
             for (step, action) in [(1, "RotateLeft"), (2, "MoveAhead")] {
-                let event =
-                    Event { step, action: action.into(), outcome: crate::house::Outcome::Done, by_hand: step == 2, completed: None, forked: None };
+                let event = Event {
+                    step,
+                    action: action.into(),
+                    outcome: crate::house::Outcome::Done,
+                    by_hand: step == 2,
+                    completed: None,
+                    forked: None,
+                };
                 update(&mut app, Msg::Report(Report::Stepped(event)));
             }
             check(name, &screen(&mut app));
@@ -325,7 +331,10 @@ mod screens {
             graded: true,
             by_link: Some(play(false)),
             as_one: Some(play(true)),
-            trials: Some(Trials { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), Rate::default()] }),
+            trials: Some(Trials {
+                expert: vec![rate(8), rate(6), rate(7)],
+                own: vec![rate(8), rate(1), Rate::default()],
+            }),
         };
         for (name, width, height) in [("chain-80x24", 80, 24), ("chain-120x36", 120, 36)] {
             let (mut app, _) = forked(width, height);

@@ -30,7 +30,7 @@ impl Widget for Header<'_> {
                 (Some(horizon), _) => format!("step {}/{horizon}", now.step),
                 (None, Some(expert)) => format!("step {} (expert: {expert})", now.step),
                 (None, None) if app.working.is_some() => (app.working.clone().unwrap_or_default(), THEME.note),
-            (None, None) => format!("step {}", now.step),
+                (None, None) => format!("step {}", now.step),
             });
             words.push(format!("seed {}", now.seed));
         }

@@ -38,7 +38,10 @@ impl Thoughts<'_> {
         let app = self.0;
         let Some((decision, words)) = &app.thought else {
             let inner = panel(buf, area, "Mind", &now.acts);
-            let text = app.trouble.as_deref().unwrap_or("nothing is being decided: the episode is over, or no policy is loaded");
+            let text = app
+                .trouble
+                .as_deref()
+                .unwrap_or("nothing is being decided: the episode is over, or no policy is loaded");
             for (row, line) in (0..).zip(wrap(text, usize::from(inner.width), "")) {
                 put(buf, inner, row, line, THEME.quiet);
             }
@@ -98,7 +101,14 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
         _ => THEME.quiet,
     };
     Line::from(vec![
-        Span::styled(format!("{mark} {:<11} {object:<18} {:>5} ", choice.kind.name(), choice.probability.map_or("-".into(), share)), style),
+        Span::styled(
+            format!(
+                "{mark} {:<11} {object:<18} {:>5} ",
+                choice.kind.name(),
+                choice.probability.map_or("-".into(), share)
+            ),
+            style,
+        ),
         Span::styled(bar(p, width), if choice.chosen { THEME.chosen } else { THEME.bar }),
         Span::styled(format!(" {:>6}", number(choice.q)), style),
         Span::styled(format!(" {:>6}", number(choice.advantage)), good),

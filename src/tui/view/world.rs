@@ -55,7 +55,10 @@ impl World<'_> {
                 _ => thing.verdict(),
             };
             Line::from(vec![
-                Span::styled(format!("{} {:<14}", if selected { ">" } else { " " }, fit(thing.class.spoken(), 14)), style),
+                Span::styled(
+                    format!("{} {:<14}", if selected { ">" } else { " " }, fit(thing.class.spoken(), 14)),
+                    style,
+                ),
                 Span::styled(format!("{:>5.1} m ", thing.metres), THEME.quiet),
                 Span::styled(fit(&verdict, room), if thing.possible.is_empty() { THEME.quiet } else { THEME.good }),
             ])
