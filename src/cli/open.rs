@@ -7,7 +7,6 @@ use clap::Args;
 
 use super::{Ending, explore::Display, policies};
 use crate::run::episode::Author;
-use crate::run::scenes::Scenes;
 use crate::run::verify::Recorded;
 use crate::tui::engine::Engine;
 use crate::tui::openings::{Openings, Start};

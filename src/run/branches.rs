@@ -357,7 +357,7 @@ mod tests {
     use crate::domain::{Action, ActionType};
     use crate::house::Outcome;
 
-    fn moment(x: i32) -> Moment {
+    fn moment(x: i16) -> Moment {
         let mut world = World::default();
         world.agent.cell.x = x;
         Moment {
@@ -382,7 +382,7 @@ mod tests {
         }
     }
 
-    fn grow(tree: &mut Tree, kind: ActionType, x: i32) -> Growth {
+    fn grow(tree: &mut Tree, kind: ActionType, x: i16) -> Growth {
         tree.grow(taken(kind, "go"), || moment(x), || "why".into())
     }
 

@@ -199,6 +199,12 @@ impl App {
         }
     }
 
+    /// What acts is called: a checkpoint's name, where one is loaded.
+    pub fn acts(&self) -> &str {
+        let loaded = self.now.as_ref().filter(|now| now.policy == self.policy).map(|now| now.acts.as_str());
+        loaded.unwrap_or_else(|| self.policy.name())
+    }
+
     /// Whether a person acts.
     pub fn by_hand(&self) -> bool {
         self.mode == Mode::Manual || (self.mode != Mode::Watch && self.under == Mode::Manual)

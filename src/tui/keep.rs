@@ -46,7 +46,6 @@ impl Engine {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::data::taskset;
     use crate::domain::{Action, ActionType};
     use crate::run::verify::{Recorded, verify};

@@ -125,6 +125,7 @@ pub fn app(width: u16, height: u16, protocol: Protocol, ability: Ability) -> App
     let mut engine = engine();
     let mut now = snapshot(&mut engine);
     now.policy = PolicyKind::Agent;
+    now.acts = "first".into();
     let thought = thought(&now);
     update(&mut app, Msg::Report(Report::Seen(Box::new(now))));
     update(&mut app, Msg::Report(Report::Busy(None)));

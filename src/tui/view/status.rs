@@ -29,15 +29,14 @@ impl Widget for Header<'_> {
             words.push(match (now.horizon, now.expert_steps) {
                 (Some(horizon), _) => format!("step {}/{horizon}", now.step),
                 (None, Some(expert)) => format!("step {} (expert: {expert})", now.step),
-                (None, None) if app.working.is_some() => (app.working.clone().unwrap_or_default(), THEME.note),
                 (None, None) => format!("step {}", now.step),
             });
             words.push(format!("seed {}", now.seed));
         }
         words.push(if app.by_hand() {
-            format!("you act ({} advises)", app.policy.name())
+            format!("you act ({} advises)", app.acts())
         } else {
-            format!("{} acts", app.policy.name())
+            format!("{} acts", app.acts())
         });
         let (state, style) = match (&app.busy, app.going) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
