@@ -143,7 +143,7 @@ mod tests {
         memory.begin(5);
         for step in 0..3u8 {
             memory.look(&[step], u32::from(step));
-            memory.observe(map(f32::from(step)), u32::from(step), 5);
+            let _ = memory.observe(map(f32::from(step)), u32::from(step), 5);
         }
         let copy = memory.clone();
         let go_on = |mut memory: Memory| {

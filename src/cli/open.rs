@@ -28,11 +28,9 @@ pub struct Open {
     display: Display,
 }
 
-/// A run with one of its episodes, as the command line names it.
+/// One of a run's episodes, as the command line names it.
 pub struct Reference {
-    /// The run folder.
-    pub run: PathBuf,
-    /// The episode's place in it, from 0.
+    /// The episode's place in the run, from 0.
     pub episode: usize,
     /// The step; the start without.
     pub step: Option<u32>,
@@ -66,7 +64,7 @@ impl Reference {
         })?;
         let last = recorded.episodes[episode].trace.len() as u32;
         ensure!(step.is_none_or(|step| step <= last), "{text}: the episode ends at step {last}");
-        Ok((Reference { run, episode, step }, recorded))
+        Ok((Reference { episode, step }, recorded))
     }
 }
 
