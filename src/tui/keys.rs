@@ -41,11 +41,11 @@ use KeyCode::{Backspace, Char, Down, End, Enter, Esc, F, Home, Left, PageDown, P
 const COMMON: &[Binding] = &[
     bind("space", &[Char(' ')], Verb::ToggleRun),
     bind("enter n .", &[Enter, Char('n'), Char('.')], Verb::Step(1)),
-    bind("h l", &[Char('h')], Verb::Back(1)),
+    bind("h", &[Char('h')], Verb::Back(1)),
     bind("l", &[Char('l')], Verb::Forward(1)),
     bind("0 home", &[Char('0'), Home], Verb::Seek(0)),
     bind("$ end", &[Char('$'), End], Verb::Last),
-    bind("] [", &[Char(']')], Verb::NextEvent),
+    bind("]", &[Char(']')], Verb::NextEvent),
     bind("[", &[Char('[')], Verb::LastEvent),
     bind("}", &[Char('}')], Verb::NextBranch),
     bind("c", &[Char('c')], Verb::Continue),
@@ -76,7 +76,7 @@ const COMMON: &[Binding] = &[
 ];
 
 const WATCH: &[Binding] = &[
-    bind("left right", &[Left], Verb::Back(1)),
+    bind("left", &[Left], Verb::Back(1)),
     bind("right", &[Right], Verb::Forward(1)),
     bind("a", &[Char('a')], Verb::Policy(PolicyKind::Agent)),
     bind("e", &[Char('e')], Verb::Policy(PolicyKind::Expert)),
@@ -105,8 +105,8 @@ const HELP: &[Binding] =
 
 /// Keys of any page but the main one; they come before the common ones.
 const LIST: &[Binding] = &[
-    bind("j k", &[Char('j'), Down], Verb::Select(1)),
-    bind("k", &[Char('k'), Up], Verb::Select(-1)),
+    bind("j down", &[Char('j'), Down], Verb::Select(1)),
+    bind("k up", &[Char('k'), Up], Verb::Select(-1)),
     bind("esc", &[Esc], Verb::Show(Page::Main)),
 ];
 const BRANCHES: &[Binding] = &[

@@ -49,9 +49,10 @@ impl Branches<'_> {
             let mark = if at == time.branch { "*" } else { " " };
             let from = branch.left.and_then(|(from, step)| Some((&time.branches.get(from)?.name, step)));
             let from = from.map_or(String::new(), |(name, step)| format!("leaves {name} at {step}"));
-            let name = fit(&format!("{tree}{}", branch.name), 24);
+            let width = if inner.width < 100 { 14 } else { 24 };
+            let name = fit(&format!("{tree}{}", branch.name), width);
             let text = format!(
-                "{mark} {:>2} {name:<24} {:>4} steps {:>2} done  {from:<20} {}",
+                "{mark} {:>2} {name:<width$} {:>4} steps {:>2} done  {from:<16} {}",
                 at + 1,
                 branch.last,
                 branch.completed,
