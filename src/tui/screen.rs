@@ -12,7 +12,7 @@ use crossterm::event::Event;
 use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
-use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 use ratatui::layout::Size;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -145,7 +145,7 @@ impl<W: Write> Conversation<W> {
                     Effect::Copy(text) => {
                         queue!(self.display.backend_mut(), CopyToClipboard::to_clipboard_from(text))?;
                     }
-                    Effect::Repaint => self.display.clear()?,
+                    Effect::Repaint => self.repaint()?,
                     Effect::Quit(farewell) => return Ok(Some(farewell)),
                 }
             }
@@ -158,6 +158,14 @@ impl<W: Write> Conversation<W> {
         }
         self.meter();
         Ok(None)
+    }
+
+    /// Clears the screen, so that the next drawing is a whole one. The display's own way would ask the terminal where its
+    /// cursor is, and its answer would be taken by whoever reads the keys.
+    fn repaint(&mut self) -> io::Result<()> {
+        self.display.backend_mut().clear_region(ClearType::All)?;
+        self.display.swap_buffers();
+        Ok(())
     }
 
     /// Makes pictures coarser or finer, so that steps keep to what they may cost.
