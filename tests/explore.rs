@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A terminal with the explorer in it.
 struct Session {
-    _master: Box<dyn MasterPty + Send>,
+    master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
     child: Box<dyn Child + Send + Sync>,
     screen: Arc<Mutex<vt100::Parser>>,
@@ -20,11 +20,15 @@ struct Session {
 
 impl Session {
     fn start(arguments: &[&str]) -> Session {
+        Session::of("explore", arguments)
+    }
+
+    fn of(command_name: &str, arguments: &[&str]) -> Session {
         let size = PtySize { rows: 36, cols: 120, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size).unwrap();
         let state = tempfile::tempdir().unwrap();
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
-        command.arg("explore");
+        command.arg(command_name);
         command.args(arguments);
         for name in ["TMUX", "CI", "NO_COLOR", "LC_ALL", "LC_CTYPE"] {
             command.env_remove(name);
@@ -33,6 +37,7 @@ impl Session {
         command.env("COLORTERM", "truecolor");
         command.env("LANG", "en_US.UTF-8");
         command.env("XDG_STATE_HOME", state.path());
+        command.env("XDG_CONFIG_HOME", state.path());
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
         let mut output = pair.master.try_clone_reader().unwrap();
@@ -45,7 +50,7 @@ impl Session {
             }
         });
         let keys = pair.master.take_writer().unwrap();
-        Session { _master: pair.master, keys, child, screen, _state: state }
+        Session { master: pair.master, keys, child, screen, _state: state }
     }
 
     fn text(&self) -> String {
@@ -121,6 +126,93 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
     session.press("?");
     session.see("Keys while you act");
     session.press("?");
+    session.press("q");
+    assert_eq!(session.end(), 0);
+    session.is_restored();
+}
+
+#[test]
+fn time_travel_forks_are_kept_opened_and_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run");
+    let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
+    session.see("Mind");
+    session.see("step 0");
+    for step in ["main 1/1", "main 2/2", "main 3/3", "main 4/4"] {
+        session.press("n");
+        session.see(step);
+    }
+    session.press("h");
+    session.see("main 3/4");
+    session.press("0");
+    session.see("main 0/4");
+    session.press("]");
+    session.press("0");
+    session.press("l");
+    session.see("main 1/4");
+    // Another action in the past is a fork.
+    session.press("m\x1b[D");
+    session.see("b1 2/2");
+    session.see("2 branches");
+    session.press("mt");
+    session.see("Side by side");
+    session.see("the same until step 1");
+    session.press(":name left turn\r");
+    session.see("left turn");
+    session.press("\x1b");
+    session.see("In reach");
+    session.press(&format!(":save {}\r", run.display()));
+    session.see("wrote the 2 branches");
+    session.press(":quit\r");
+    assert_eq!(session.end(), 0);
+    session.is_restored();
+
+    let reference = format!("{}#left turn:1", run.display());
+    let mut session = Session::of("open", &[&reference, "--graphics", "ascii"]);
+    session.see("main 1/2");
+    session.press(" ");
+    session.see("main 2/2");
+    session.press("n");
+    session.see("main 3/3");
+    session.press("q");
+    assert_eq!(session.end(), 0);
+
+    let sprint = |arguments: &[&str]| {
+        let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_sprint")).args(arguments).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap())
+    };
+    let path = run.display().to_string();
+    let (code, text) = sprint(&["verify", &path]);
+    assert!(code == Some(0) && text.contains("2 episodes, 6 steps the same, 5 of them chosen again"), "{text}");
+    let film = folder.path().join("a.gif").display().to_string();
+    assert_eq!(sprint(&["export", &format!("{path}#1"), &film]).0, Some(0));
+    assert!(std::fs::read(&film).unwrap().starts_with(b"GIF89a"));
+    // A changed record is found.
+    let episodes = run.join("episodes.jsonl");
+    let text = std::fs::read_to_string(&episodes).unwrap();
+    std::fs::write(&episodes, text.replacen("\"steps\":4", "\"steps\":5", 1)).unwrap();
+    let (code, text) = sprint(&["verify", &path]);
+    assert!(code == Some(3) && text.contains("result was"), "{text}");
+}
+
+#[test]
+fn a_huge_paste_and_a_storm_of_resizes_do_no_harm() {
+    let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
+    session.see("Mind");
+    session.see("step 0");
+    session.press("i\x1b[200~");
+    session.press(&"carry the mug ".repeat(75_000));
+    session.press("\x1b[201~");
+    session.see("carry the mug");
+    for (rows, cols) in [(24, 80), (10, 30), (60, 200), (30, 100), (1, 1), (36, 120)] {
+        let size = PtySize { rows, cols, pixel_width: 0, pixel_height: 0 };
+        session.master.resize(size).unwrap();
+        session.screen.lock().unwrap().screen_mut().set_size(rows.max(2), cols.max(2));
+    }
+    session.press("\x1b");
+    session.see("space run");
+    session.press("n");
+    session.see("main 1/1");
     session.press("q");
     assert_eq!(session.end(), 0);
     session.is_restored();

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 
-use super::policy::{Decision, Policy, Situation};
+use super::policy::{Carried, Decision, Policy, Situation};
 use crate::house::expert::Expert;
 
 /// Acts as the expert would.
@@ -32,5 +32,15 @@ impl Policy for ExpertPolicy {
             situation.grader.context("the expert needs a task with subtasks; it does not read instructions")?;
         let action = self.expert.next(situation.house, grader)?;
         Ok(Decision { action, mind: None })
+    }
+
+    fn carried(&self) -> Carried {
+        Carried::Plan(Box::new(self.expert.plan()))
+    }
+
+    fn put_back(&mut self, carried: Carried) {
+        if let Carried::Plan(plan) = carried {
+            self.expert.follow(*plan);
+        }
     }
 }

@@ -7,9 +7,11 @@ use tch::{Device, Tensor};
 use super::checkpoint::{Config, Networks};
 use super::memory::Memory;
 pub use super::memory::SharedEmbedder;
-use super::policy::{Decision, Policy, Situation, Values};
+use super::policy::{Carried, Decision, Policy, Reading, Situation};
 use super::told;
+use super::values::{ChoiceValue, Values};
 use crate::domain::{ActionType, Class};
+use crate::language::instruction::normalise;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
@@ -67,11 +69,6 @@ impl LearnedPolicy {
         &self.config
     }
 
-    /// Whether it draws its actions by chance instead of taking the likeliest.
-    pub fn set_sampling(&mut self, samples: bool) {
-        self.samples = samples;
-    }
-
     /// The last frames' maps as one observation, and what the agent is told.
     fn perceive(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
         let image = self.networks.visual.spec().image(situation.house.frame());
@@ -100,6 +97,26 @@ impl Policy for LearnedPolicy {
         Ok(self.memory.decide(&actions, &objects, &situation.house.candidates(), self.samples))
     }
 
+    fn carried(&self) -> Carried {
+        Carried::Frames(Box::new(self.memory.clone()))
+    }
+
+    fn put_back(&mut self, carried: Carried) {
+        if let Carried::Frames(memory) = carried {
+            self.memory = *memory;
+        }
+    }
+
+    fn set_sampling(&mut self, samples: bool) {
+        self.samples = samples;
+    }
+
+    fn reading(&self, instruction: &str) -> Option<Reading> {
+        let embedder = self.sentences.lock().ok()?;
+        let count = embedder.encoder().tokens(&normalise(instruction)).ok()?;
+        Some(Reading { tokens: count.used, cut: count.truncated })
+    }
+
     fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
         if self.networks.critic.is_none() {
             return Ok(None);
@@ -120,8 +137,8 @@ impl Policy for LearnedPolicy {
         let pairs: Vec<(i64, i64)> = possible.iter().map(index).collect();
         let (value, q) = critic.online.appraise(&observation, &told, &pairs);
         let q = Vec::<f32>::try_from(q.to_device(Device::Cpu))?;
-        let actions = possible.into_iter().zip(q).map(|((kind, class), q)| (kind, class, q)).collect();
-        Ok(Some(Values { value: value.double_value(&[0]) as f32, actions }))
+        let choices = possible.into_iter().zip(q).map(|((kind, class), q)| ChoiceValue { kind, class, q }).collect();
+        Ok(Some(Values { state: value.double_value(&[0]) as f32, choices }))
     }
 }
 
@@ -198,8 +215,8 @@ mod tests {
         assert_eq!(agent.decide(&mut situation).unwrap().action, decision.action);
         let candidates = situation.house.candidates();
         let wanted: std::collections::BTreeSet<_> = candidates.iter().map(|c| (c.kind, c.class.index())).collect();
-        assert_eq!(values.actions.len(), 5 + wanted.len());
-        assert!(values.value.is_finite() && values.q(ActionType::MoveAhead, None).is_some());
+        assert_eq!(values.choices.len(), 5 + wanted.len());
+        assert!(values.state.is_finite() && values.q(ActionType::MoveAhead, None).is_some());
     }
 
     #[test]

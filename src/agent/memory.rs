@@ -123,3 +123,36 @@ impl Memory {
         decision
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+
+    fn map(value: f32) -> Tensor {
+        Tensor::full([1, 2, 2, 2], f64::from(value), (Kind::Float, Device::Cpu))
+    }
+
+    #[test]
+    fn a_copy_goes_on_exactly_as_the_original_does() {
+        let mut memory = Memory::default();
+        memory.begin(5);
+        for step in 0..3u8 {
+            memory.look(&[step], u32::from(step));
+            let _ = memory.observe(map(f32::from(step)), u32::from(step), 5);
+        }
+        let copy = memory.clone();
+        let go_on = |mut memory: Memory| {
+            let mut trace = Vec::new();
+            for step in 3..12u8 {
+                memory.look(&[step / 4], u32::from(step));
+                let seen = memory.observe(map(f32::from(step)), u32::from(step), 5);
+                let decision = memory.decide(&[0.1; ActionType::COUNT], &[0.0; 82], &[], true);
+                trace.push((Vec::<f32>::try_from(seen.flatten(0, -1)).unwrap(), decision.action));
+            }
+            trace
+        };
+        assert_eq!(go_on(memory), go_on(copy));
+    }
+}

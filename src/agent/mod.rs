@@ -12,10 +12,12 @@ pub mod seeker;
 pub mod select;
 pub mod team;
 pub mod told;
+pub mod values;
 
 pub use batch::LearnedTeam;
 pub use expert::ExpertPolicy;
 pub use learned::LearnedPolicy;
-pub use policy::{Decision, Mind, Policy, Situation, Values};
+pub use policy::{Carried, Decision, Mind, Policy, Reading, Situation};
 pub use random::RandomPolicy;
 pub use team::{Solo, Team};
+pub use values::Values;

@@ -1,8 +1,14 @@
 //! The seam between a house and whatever acts in it.
 
+use rand_chacha::ChaCha8Rng;
+
+use super::memory::Memory;
+use super::values::Values;
 use crate::domain::{Action, ActionType, Class};
+use crate::house::expert::Plan;
 use crate::house::grading::Grader;
 use crate::house::session::House;
+use crate::house::view::Candidate;
 
 /// What a policy decides from.
 pub struct Situation<'a> {
@@ -39,21 +45,56 @@ pub struct Mind {
     pub greedy: Action,
 }
 
-/// What a critic makes of a situation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Values {
-    /// V: how likely the instruction will be fulfilled from here, discounted by how long it takes.
-    pub value: f32,
-    /// min(Q1, Q2) of everything that is possible now: the five ways to move, without a class, then each interaction with each
-    /// class that is a candidate of it, nearest first.
-    pub actions: Vec<(ActionType, Option<Class>, f32)>,
+impl Mind {
+    /// The distribution over everything that could be done now: navigation, and each interaction with each class that is a
+    /// candidate of it, in the order of actions. Sums to 1.
+    pub fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
+        let share = |class: Class| self.objects.iter().find(|(known, ..)| *known == class).map_or(0.0, |found| found.1);
+        let mut found = Vec::new();
+        for kind in ActionType::ALL {
+            let p = self.actions[kind.index()].unwrap_or(0.0);
+            if !kind.is_interaction() {
+                found.push((kind, None, p));
+                continue;
+            }
+            let mut classes: Vec<Class> = Vec::new();
+            for candidate in candidates.iter().filter(|candidate| candidate.kind == kind) {
+                if !classes.contains(&candidate.class) {
+                    classes.push(candidate.class);
+                }
+            }
+            let all: f32 = classes.iter().map(|&class| share(class)).sum();
+            for &class in &classes {
+                // Classes that are too unlikely to be listed share alike where none is.
+                let part = if all > 0.0 { share(class) / all } else { 1.0 / classes.len() as f32 };
+                found.push((kind, Some(class), p * part));
+            }
+        }
+        found
+    }
 }
 
-impl Values {
-    /// Q of an action, if it is possible now.
-    pub fn q(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
-        self.actions.iter().find(|(own, of, _)| (*own, *of) == (kind, class)).map(|&(_, _, q)| q)
-    }
+/// What the sentence encoder makes of an instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// Tokens that are read.
+    pub tokens: usize,
+    /// Tokens at the end that are left out because the text is too long.
+    pub cut: usize,
+}
+
+/// What a policy carries from one step to the next. Put back, it decides as it did then, bit for bit.
+#[derive(Clone, Debug, Default)]
+pub enum Carried {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// Its chance.
+    Chance(ChaCha8Rng),
+    /// What it is about to do.
+    Plan(Box<Plan>),
+    /// The last frames, and its chance.
+    Frames(Box<Memory>),
 }
 
 /// Something that acts: a trained agent, the expert, chance.
@@ -70,10 +111,26 @@ pub trait Policy: Send {
     /// When the policy cannot go on (the expert sees no way, a forward pass fails); the episode then ends with that reason.
     fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision>;
 
-    /// What its critic makes of the situation; nothing without a critic. Asked before or after deciding, it changes no decision.
+    /// What it carries now.
+    fn carried(&self) -> Carried {
+        Carried::Nothing
+    }
+
+    /// Takes back what it carried at another step.
+    fn put_back(&mut self, _carried: Carried) {}
+
+    /// Whether it draws its actions by chance instead of taking the likeliest, where it can do either.
+    fn set_sampling(&mut self, _samples: bool) {}
+
+    /// What its sentence encoder makes of an instruction, where it has one.
+    fn reading(&self, _instruction: &str) -> Option<Reading> {
+        None
+    }
+
+    /// What its critics make of a situation; `None` without critics. It changes nothing about what is decided next.
     ///
     /// # Errors
-    /// As [`Policy::decide`].
+    /// When a forward pass fails.
     fn values(&mut self, _situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
         Ok(None)
     }

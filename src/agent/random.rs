@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::policy::{Decision, Mind, Policy, Situation};
+use super::policy::{Carried, Decision, Mind, Policy, Situation};
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{self, Candidate};
 
@@ -63,6 +63,16 @@ impl Policy for RandomPolicy {
             greedy: action,
         };
         Ok(Decision { action, mind: Some(mind) })
+    }
+
+    fn carried(&self) -> Carried {
+        Carried::Chance(self.rng.clone())
+    }
+
+    fn put_back(&mut self, carried: Carried) {
+        if let Carried::Chance(rng) = carried {
+            self.rng = rng;
+        }
     }
 }
 

@@ -1,26 +1,39 @@
 //! `sprint explore`: opens what the explorer starts in, and starts it.
 
-use std::cell::OnceCell;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use etcetera::BaseStrategy;
 
 use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
-use crate::tui::app::Farewell;
+use crate::tui::config::Config;
 use crate::tui::engine::Engine;
 use crate::tui::graphics::Protocol;
 use crate::tui::openings::{Openings, Start};
 use crate::tui::policies::{Policies, PolicyKind};
+use crate::tui::update::Farewell;
 use crate::tui::{plain, screen};
 
 /// Where the explorer starts, and who acts.
 #[derive(Args)]
 pub struct Explore {
+    #[command(flatten)]
+    from: Origin,
+    #[command(flatten)]
+    display: Display,
+    /// Who acts at first
+    #[arg(long, value_enum, default_value = "agent")]
+    policy: PolicyName,
+}
+
+/// Where the explorer starts.
+#[derive(Args)]
+struct Origin {
     /// The checkpoint folder of the agent [default: the shipped one]
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
@@ -42,6 +55,11 @@ pub struct Explore {
     /// The seed of the house and of chance
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+}
+
+/// How the explorer is shown.
+#[derive(Args)]
+pub struct Display {
     /// How to show pictures
     #[arg(long, value_enum, default_value = "auto")]
     graphics: GraphicsName,
@@ -51,9 +69,59 @@ pub struct Explore {
     /// Wait for a key before the first step
     #[arg(long)]
     paused: bool,
-    /// Who acts at first
-    #[arg(long, value_enum, default_value = "agent")]
-    policy: PolicyName,
+}
+
+impl Display {
+    /// Explores until the person leaves.
+    ///
+    /// # Errors
+    /// When the engine cannot be opened, or there is no terminal.
+    pub fn show(
+        self,
+        kind: PolicyKind,
+        manual: bool,
+        open: impl FnOnce() -> anyhow::Result<Engine> + Send + 'static,
+    ) -> anyhow::Result<Ending> {
+        if self.plain {
+            let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
+            plain::run(open()?, kind, input, out)?;
+            return Ok(Ending::Ok);
+        }
+        if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
+        }
+        let protocol = match self.graphics {
+            GraphicsName::Auto => None,
+            GraphicsName::Kitty => Some(Protocol::Kitty),
+            GraphicsName::Iterm2 => Some(Protocol::Iterm2),
+            GraphicsName::Sixel => Some(Protocol::Sixel),
+            GraphicsName::Halfblocks => Some(Protocol::HalfBlocks),
+            GraphicsName::Ascii => Some(Protocol::Ascii),
+        };
+        let log = logging::open().ok();
+        let (config, memory) = (settings()?, Some(logging::path().with_file_name("terminals.json")));
+        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, config, memory, log };
+        match screen::run(screen, open)? {
+            Farewell::Signal(_) => Ok(Ending::Interrupted),
+            Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
+        }
+    }
+
+    /// The same, but waiting for a key before the first step.
+    pub fn paused(self) -> Display {
+        Display { paused: true, ..self }
+    }
+}
+
+/// What the person has set in `sprint/explorer.toml` of the configuration folder.
+fn settings() -> anyhow::Result<Config> {
+    let Ok(base) = etcetera::choose_base_strategy() else { return Ok(Config::default()) };
+    let path = base.config_dir().join("sprint").join("explorer.toml");
+    match std::fs::read_to_string(&path) {
+        Ok(text) => Config::parse(&text).with_context(|| path.display().to_string()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Config::default()),
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -97,46 +165,16 @@ impl Explore {
             PolicyName::Expert => PolicyKind::Expert,
             PolicyName::Random => PolicyKind::Random,
         };
-        let protocol = match self.graphics {
-            GraphicsName::Auto => None,
-            GraphicsName::Kitty => Some(Protocol::Kitty),
-            GraphicsName::Iterm2 => Some(Protocol::Iterm2),
-            GraphicsName::Sixel => Some(Protocol::Sixel),
-            GraphicsName::Halfblocks => Some(Protocol::HalfBlocks),
-            GraphicsName::Ascii => Some(Protocol::Ascii),
-        };
-        if self.plain {
-            let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
-            plain::run(self.engine(kind)?, kind, input, out)?;
-            return Ok(Ending::Ok);
-        }
-        if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-            bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
-        }
-        let log = logging::open().ok();
-        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, log };
-        match screen::run(screen, move || self.engine(kind))? {
-            Farewell::Signal(_) => Ok(Ending::Interrupted),
-            Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
-        }
+        let Explore { display, from, .. } = self;
+        display.show(kind, manual, move || from.engine(kind))
     }
+}
 
+impl Origin {
     fn engine(&self, kind: PolicyKind) -> anyhow::Result<Engine> {
         let (start, scenes) = self.start()?;
         let openings = Openings::new(start, self.seed, scenes);
-        let checkpoint = self.checkpoint.clone();
-        let loaded = OnceCell::new();
-        let policies = Policies::new(Box::new(move || {
-            let agent = match loaded.get() {
-                Some(agent) => agent,
-                None => {
-                    let folder = checkpoint.clone().map_or_else(policies::shipped, Ok)?;
-                    let agent = policies::learned(folder)?;
-                    loaded.get_or_init(|| agent)
-                }
-            };
-            (agent.make)()
-        }));
+        let policies = Policies::new(policies::agents(self.checkpoint.as_deref()));
         Engine::new(openings, policies, kind, self.instruction.as_deref())
     }
 

@@ -12,10 +12,12 @@ mod embed;
 mod encode;
 mod explore;
 mod eval;
+mod export;
 mod import;
 mod logging;
 mod plot;
 mod merge;
+mod open;
 mod policies;
 mod pretrain;
 mod relabel;
@@ -25,6 +27,7 @@ mod schema;
 mod shell;
 mod stop;
 mod tasks;
+mod verify;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]
@@ -51,6 +54,12 @@ enum Command {
     Report(report::Report),
     /// Print the JSON Schema of a file that the program reads or writes
     Schema(schema::Schema),
+    /// Show a recorded episode in the explorer, at any of its steps
+    Open(open::Open),
+    /// Play a run's episodes again, and say whether they come out the same
+    Verify(verify::Verify),
+    /// Write a recorded episode as a picture, a film, a strip, a transcript, or a page
+    Export(export::Export),
     /// Sample, check and show task sets
     Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
@@ -123,6 +132,9 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Merge(merge) => merge.run(),
         Command::Report(report) => report.run(),
         Command::Schema(schema) => schema.run(),
+        Command::Open(open) => open.run(),
+        Command::Verify(verify) => verify.run(),
+        Command::Export(export) => export.run(),
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),

@@ -1,5 +1,6 @@
 //! Which policy acts, from the command line.
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -13,6 +14,7 @@ use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
 use crate::run::player::MakeTeam;
+use crate::tui::policies::{Agent, Loaded};
 
 /// Makes a policy.
 pub type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Sync;
@@ -147,6 +149,34 @@ fn sampled(folder: PathBuf, sampling: bool) -> anyhow::Result<Chosen> {
         }),
         folder: Some(folder),
     })
+}
+
+/// The agents that an explorer may let act: the named one first, then those that are found.
+pub fn agents(named: Option<&Path>) -> Vec<Agent> {
+    let mut folders: Vec<PathBuf> = named.map(Path::to_owned).into_iter().chain(checkpoints()).collect();
+    let mut seen = Vec::new();
+    folders.retain(|folder| {
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        let new = !seen.contains(&whole);
+        seen.push(whole);
+        new
+    });
+    let agent = |folder: PathBuf| {
+        let name = folder.file_name().map_or_else(|| "agent".into(), |name| name.to_string_lossy().into_owned());
+        let loaded = OnceCell::new();
+        let load = move || -> anyhow::Result<Loaded> {
+            let chosen = match loaded.get() {
+                Some(chosen) => chosen,
+                None => {
+                    let chosen = learned(folder.clone())?;
+                    loaded.get_or_init(|| chosen)
+                }
+            };
+            Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
+        };
+        Agent { name, load: Box::new(load) }
+    };
+    folders.into_iter().map(agent).collect()
 }
 
 /// The agent that acts when none is named: the first that is found.

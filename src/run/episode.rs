@@ -120,6 +120,43 @@ pub struct Step {
     /// The subtask that it completed, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subtask: Option<u32>,
+    /// What the agent was told from this step on, where that changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub told: Option<String>,
+    /// Who chose from this step on, where that changed; without any, the run's policy did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<Author>,
+}
+
+/// Who chose a step of an explored episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Author {
+    /// `hand` for a person, else the policy's name.
+    pub policy: String,
+    /// SHA-256 of its checkpoint, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<String>,
+    /// The seed of its chance.
+    pub seed: u64,
+    /// It drew its actions by chance instead of taking the likeliest.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub samples: bool,
+}
+
+impl Author {
+    /// The name of a person who acts.
+    pub const HAND: &str = "hand";
+
+    /// A person.
+    pub fn hand() -> Author {
+        Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, samples: false }
+    }
+
+    /// Whether a person chose.
+    pub fn is_hand(&self) -> bool {
+        self.policy == Author::HAND
+    }
 }
 
 impl Step {
@@ -133,6 +170,8 @@ impl Step {
             class: action.target.and_then(|target| house.world().class_of(house.scene(), target)),
             outcome: tick.outcome,
             subtask: tick.completed_one.then(|| completed.saturating_sub(1)),
+            told: None,
+            by: None,
         }
     }
 }

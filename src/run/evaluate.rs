@@ -274,8 +274,8 @@ pub fn finish(manifest: &Manifest, tasks: &[Task], all: &[Booking], folder: &mut
 }
 
 /// What drives a policy's chance in an episode: the task's position and the seed, and nothing else.
-pub(super) fn policy_seed(booking: &Booking) -> u64 {
-    chance::mix(booking.task as u64, booking.seed)
+pub fn policy_seed(task: usize, seed: u64) -> u64 {
+    chance::mix(task as u64, seed)
 }
 
 #[cfg(test)]

@@ -137,7 +137,7 @@ impl Player<'_> {
     fn seat(&self, at: usize, booking: Booking) -> Seated {
         let evaluation = self.evaluation;
         let task = &evaluation.tasks[booking.task];
-        let chance = policy_seed(&booking);
+        let chance = policy_seed(booking.task, booking.seed);
         let said =
             wording::say(&evaluation.tasks, booking.task, booking.wording, evaluation.options.step_by_step, chance);
         let episode = Episode {
@@ -260,7 +260,7 @@ impl Table<'_> {
     fn sit(&mut self, seat: usize, at: usize, booking: Booking) {
         let mut seated = self.player.seat(at, booking);
         let ready = guarded(|| {
-            self.team()?.begin(seat, policy_seed(&booking));
+            self.team()?.begin(seat, policy_seed(booking.task, booking.seed));
             Ok(())
         });
         seated.episode.error = seated.episode.error.or(ready.err());

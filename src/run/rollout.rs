@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::agent::{Decision, Policy, Situation};
-use crate::domain::Action;
+use crate::domain::{Action, World};
 use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
 
@@ -78,6 +78,13 @@ impl Rollout {
             step: self.steps,
             grader: self.grader.as_ref(),
         }
+    }
+
+    /// Goes on from another state, `steps` into the episode.
+    pub fn resume(&mut self, world: World, grader: Option<Grader>, steps: u32) {
+        self.house.restore(world);
+        self.grader = grader;
+        self.steps = steps;
     }
 
     /// Takes one step by `policy`'s choice.

@@ -33,6 +33,11 @@ impl Editor {
         self.area.lines().first().map_or("", String::as_str)
     }
 
+    /// What was given before, oldest first.
+    pub fn history(&self) -> &[String] {
+        &self.history
+    }
+
     /// The widget's state.
     pub fn area(&self) -> &TextArea<'static> {
         &self.area

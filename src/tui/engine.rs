@@ -1,17 +1,30 @@
-//! The episode under exploration, without any screen: house, task, policy, and the verbs that act on them. The worker
-//! thread and the plain mode both drive it.
+//! The episode under exploration, without any screen: house, task, policy, everything that was tried, and the verbs that act
+//! on them. The worker thread and the plain mode both drive it.
 
 use std::sync::Arc;
 
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::breakpoints::{Facts, gap};
 use super::openings::{Opening, Openings};
-use super::policies::{Policies, PolicyKind};
-use crate::agent::{Decision, Policy};
+use super::policies::{Loaded, Policies, PolicyKind};
+use super::timeline::{Divergence, Timeline};
+use crate::agent::{Carried, Decision, Policy, Reading, Values};
+use crate::domain::task::SceneRef;
 use crate::domain::{Action, Cell, Scene, Task, World};
 use crate::house::grading::{Grader, Grading, describe};
 use crate::house::view::{Candidate, Frame, View};
 use crate::house::{House, Outcome};
-use crate::language::instruction;
+use crate::language::{instruction, phrases};
+use crate::run::branches::{self, FRAMES, Growth, Moment, Taken, Tree};
+use crate::run::chain::{self, Chain};
+use crate::run::contrast::{self, Contrast};
+use crate::run::episode::{Author, Episode, Step};
+use crate::run::explored::{self, Explored};
+use crate::run::recording::Recording;
 use crate::run::rollout::{End, Rollout, Tick};
+use crate::run::scenes::Setting;
 
 /// Everything that a screen shows of the present state.
 #[derive(Clone, Debug)]
@@ -46,6 +59,18 @@ pub struct Snapshot {
     pub path: Vec<Cell>,
     /// Which policy decides.
     pub policy: PolicyKind,
+    /// The policy's own name; a checkpoint's.
+    pub acts: String,
+    /// What was tried.
+    pub time: Arc<Timeline>,
+    /// The frames before this one that the agent sees too, newest first; only where they are asked for.
+    pub recent: Vec<Arc<Frame>>,
+    /// What the sentence encoder makes of the instruction.
+    pub reading: Option<Reading>,
+    /// Instructions that make sense in this house.
+    pub examples: Arc<Vec<String>>,
+    /// The checkpoints that may act.
+    pub checkpoints: Arc<Vec<String>>,
 }
 
 /// How far a task has come.
@@ -72,24 +97,30 @@ pub struct Event {
     pub by_hand: bool,
     /// The subtask that it completed.
     pub completed: Option<String>,
+    /// The branch that it began, by name and why.
+    pub forked: Option<String>,
 }
 
 /// The episode under exploration.
 pub struct Engine {
     openings: Openings,
     policies: Policies,
+    checkpoints: Arc<Vec<String>>,
     kind: PolicyKind,
     policy: Option<Box<dyn Policy>>,
+    author: Author,
     rollout: Rollout,
-    start: World,
     task: Option<Task>,
+    reference: SceneRef,
     limited: bool,
     seed: u64,
     episode: u32,
-    path: Vec<Cell>,
-    completed_at: Vec<u32>,
-    decision: Option<Decision>,
+    tree: Tree,
+    decision: Option<(Decision, Option<Values>)>,
     frame: Option<Arc<Frame>>,
+    examples: Arc<Vec<String>>,
+    /// The screen shows the frames before the present one.
+    looks_back: bool,
 }
 
 impl Engine {
@@ -104,40 +135,106 @@ impl Engine {
         instruction: Option<&str>,
     ) -> anyhow::Result<Engine> {
         let opening = openings.open()?;
+        let rollout = rollout_of(&opening);
+        let author = Author { policy: kind.name().into(), checkpoint: None, seed: openings.seed(), samples: false };
         let mut engine = Engine {
+            checkpoints: Arc::new(policies.agents()),
             policies,
             kind,
             policy: None,
-            rollout: rollout_of(&opening),
-            start: opening.world,
+            tree: Tree::new(Moment::of(&rollout, &author, Carried::Nothing)),
+            author,
+            rollout,
             seed: openings.seed(),
             openings,
             task: opening.task,
+            reference: opening.reference,
             limited: opening.limited,
             episode: 1,
-            path: Vec::new(),
-            completed_at: Vec::new(),
             decision: None,
             frame: None,
+            examples: Arc::default(),
+            looks_back: false,
         };
-        engine.path.push(engine.start.agent.cell);
+        engine.examples = Arc::new(engine.suggest());
         if let Some(text) = instruction {
             engine.instruct(text)?;
+            engine.plant();
         }
         Ok(engine)
     }
 
-    /// Loads the chosen policy; slow the first time for the agent.
+    /// The present state becomes the start, while nothing was tried.
+    fn plant(&mut self) {
+        self.tree.begin_with(self.moment());
+    }
+
+    fn moment(&self) -> Moment {
+        let carried = self.policy.as_ref().map_or(Carried::Nothing, |policy| policy.carried());
+        Moment::of(&self.rollout, &self.author, carried)
+    }
+
+    /// Loads the chosen policy; slow the first time for the agent. It decides from here on, having seen the last frames.
     ///
     /// # Errors
     /// When it cannot be loaded; the one before stays.
     pub fn choose(&mut self, kind: PolicyKind) -> anyhow::Result<()> {
-        let mut policy = self.policies.make(kind)?;
-        policy.begin(self.seed);
+        let Loaded { policy, checkpoint } = self.policies.make(kind)?;
+        self.author.policy = policy.name().to_string();
+        self.author.checkpoint = checkpoint;
         self.policy = Some(policy);
         self.kind = kind;
-        self.decision = None;
+        self.look_back();
+        self.plant();
         Ok(())
+    }
+
+    /// Lets another checkpoint be the agent, by name or number, and loads it.
+    ///
+    /// # Errors
+    /// When there is none such, or it cannot be loaded; the one before stays.
+    pub fn checkpoint(&mut self, wanted: &str) -> anyhow::Result<()> {
+        let before = self.policies.chosen();
+        self.policies.choose(wanted)?;
+        let chosen = self.choose(PolicyKind::Agent);
+        if chosen.is_err() {
+            self.policies.choose(&(before + 1).to_string())?;
+        }
+        chosen
+    }
+
+    /// The names of the checkpoints that may act.
+    pub fn checkpoints(&self) -> &[String] {
+        &self.checkpoints
+    }
+
+    /// Another policy of the present kind, for work beside the episode.
+    ///
+    /// # Errors
+    /// When it cannot be loaded.
+    pub fn another_policy(&self) -> anyhow::Result<Box<dyn Policy>> {
+        Ok(self.policies.make(self.kind)?.policy)
+    }
+
+    /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
+    pub fn reseed(&mut self, seed: u64, samples: bool) {
+        self.author.seed = seed;
+        self.author.samples = samples;
+        self.look_back();
+        self.plant();
+    }
+
+    /// Who decides, and by which chance.
+    pub fn author(&self) -> &Author {
+        &self.author
+    }
+
+    /// The policy begins anew here, having seen the frames before this one.
+    fn look_back(&mut self) {
+        self.decision = None;
+        let Some(policy) = self.policy.as_deref_mut() else { return };
+        let before: Vec<Moment> = self.tree.past().rev().skip(1).take(FRAMES - 1).cloned().collect();
+        branches::look_back(policy, &self.author, &mut self.rollout, &before, self.tree.at());
     }
 
     /// Which policy decides.
@@ -154,18 +251,20 @@ impl Engine {
     ///
     /// # Errors
     /// When the policy cannot go on, or none is loaded.
-    pub fn think(&mut self) -> anyhow::Result<&Decision> {
-        let decision = match self.decision.take() {
-            Some(decision) => decision,
+    pub fn think(&mut self) -> anyhow::Result<&(Decision, Option<Values>)> {
+        let thought = match self.decision.take() {
+            Some(thought) => thought,
             None => {
                 let policy = self.policy.as_deref_mut().ok_or_else(|| anyhow::anyhow!("no policy is loaded"))?;
                 if self.kind == PolicyKind::Expert && self.rollout.grader.is_none() {
                     anyhow::bail!("the expert needs a task: it reads the subtasks, not the instruction");
                 }
-                self.rollout.decide(policy)?
+                let decision = self.rollout.decide(policy)?;
+                let values = policy.values(&mut self.rollout.situation())?;
+                (decision, values)
             }
         };
-        Ok(self.decision.insert(decision))
+        Ok(self.decision.insert(thought))
     }
 
     /// Takes one step by the policy's choice.
@@ -173,31 +272,55 @@ impl Engine {
     /// # Errors
     /// When the policy cannot go on; nothing was done then.
     pub fn step(&mut self) -> anyhow::Result<Event> {
-        let decision = self.think()?.clone();
-        Ok(self.carry_out(decision, false))
+        anyhow::ensure!(!self.tree.is_full(), "no more steps are remembered in this episode: N opens the next one");
+        let decision = self.think()?.0.clone();
+        Ok(self.carry_out(decision, self.author.clone()))
     }
 
-    /// Takes one step that a person chose.
+    /// Takes one step that a person chose. The policy sees that state too, so that it has seen every frame.
     pub fn act(&mut self, action: Action) -> Event {
-        self.carry_out(Decision { action, mind: None }, true)
+        let _ = self.think();
+        self.carry_out(Decision { action, mind: None }, Author::hand())
     }
 
-    fn carry_out(&mut self, decision: Decision, by_hand: bool) -> Event {
+    fn carry_out(&mut self, decision: Decision, author: Author) -> Event {
         let words = self.words(decision.action);
         let current = self.current_subtask();
-        let Tick { step, outcome, completed_one, .. } = self.rollout.carry_out(decision);
-        self.decision = None;
-        if outcome.is_done() {
-            self.frame = None;
+        let (mind, values) = self.decision.take().map_or((None, None), |(thought, values)| (thought.mind, values));
+        let tick = self.rollout.carry_out(decision.clone());
+        let taken = Taken {
+            decision: Decision { action: decision.action, mind: decision.mind.or(mind) },
+            step: Step::of(&tick, &self.rollout),
+            instruction: self.rollout.instruction.as_str().into(),
+            author,
+            values,
+        };
+        let Tick { step, outcome, completed_one, .. } = tick;
+        self.frame = None;
+        let by_hand = taken.author.is_hand();
+        let why = self.why(&taken, &words);
+        let moment = self.moment();
+        let growth = self.tree.grow(taken, || moment, || why);
+        if growth == Growth::Known {
+            self.tree.moment().restore(&mut self.rollout, step);
         }
-        let cell = self.rollout.house.world().agent.cell;
-        if self.path.last() != Some(&cell) {
-            self.path.push(cell);
+        let forked = match growth {
+            Growth::Forked(branch) => self.tree.branches().get(branch).map(|b| format!("{}: {}", b.name, b.why)),
+            Growth::Longer | Growth::Known => None,
+        };
+        Event { step, action: words, outcome, by_hand, completed: current.filter(|_| completed_one), forked }
+    }
+
+    /// What is new about a step that is not the one which is there already.
+    fn why(&self, taken: &Taken, words: &str) -> String {
+        let Some(next) = self.tree.next() else { return "went on".into() };
+        if next.instruction != taken.instruction {
+            format!("told: {}", taken.instruction)
+        } else if next.decision.action != taken.decision.action {
+            format!("{words} ({})", who(&taken.author))
+        } else {
+            format!("{} acts", who(&taken.author))
         }
-        if completed_one {
-            self.completed_at.push(step);
-        }
-        Event { step, action: words, outcome, by_hand, completed: current.filter(|_| completed_one) }
     }
 
     fn current_subtask(&self) -> Option<String> {
@@ -249,20 +372,254 @@ impl Engine {
         &self.rollout.instruction
     }
 
-    /// Puts the house back to its start, with the present instruction.
+    /// The task of this episode, whether it still applies or not.
+    pub fn task(&self) -> Option<&Task> {
+        self.task.as_ref()
+    }
+
+    /// The present state of the house.
+    pub fn rollout(&self) -> &Rollout {
+        &self.rollout
+    }
+
+    /// Back to the start, with the present instruction. What was tried stays.
     pub fn reset(&mut self) {
-        let instruction = std::mem::take(&mut self.rollout.instruction);
-        let opening = Opening {
+        let instruction = self.rollout.instruction.clone();
+        self.seek(0);
+        let fresh = rollout_of(&Opening {
             scene: self.rollout.house.scene().clone(),
-            world: self.start.clone(),
-            task: self.task.take(),
+            world: self.rollout.house.world().clone(),
+            task: self.task.clone(),
+            reference: self.reference.clone(),
             limited: self.limited,
+        });
+        self.rollout.grader = fresh.grader;
+        self.rollout.horizon = fresh.horizon;
+        // The text was checked when it came in.
+        let _ = self.instruct(&instruction);
+        self.plant();
+    }
+
+    /// Goes to a step of the branch in hand, or to its end.
+    pub fn seek(&mut self, step: u32) {
+        self.tree.seek(step);
+        self.settle();
+    }
+
+    /// Takes another branch in hand.
+    ///
+    /// # Errors
+    /// When there is none of that number.
+    pub fn switch(&mut self, branch: usize) -> anyhow::Result<()> {
+        anyhow::ensure!(self.tree.switch(branch), "there is no branch {}", branch + 1);
+        self.settle();
+        Ok(())
+    }
+
+    /// The branch of that name, or of that number from 1.
+    ///
+    /// # Errors
+    /// When there is none; says which there are.
+    pub fn branch(&self, wanted: &str) -> anyhow::Result<usize> {
+        let branches = self.tree.branches();
+        let numbered = || wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let found = branches.iter().position(|branch| branch.name == wanted).or_else(numbered);
+        found.filter(|&at| at < branches.len()).ok_or_else(|| {
+            let names: Vec<&str> = branches.iter().map(|branch| branch.name.as_str()).collect();
+            anyhow::anyhow!("there is no branch {wanted:?}; there are: {}", names.join(", "))
+        })
+    }
+
+    /// What conditions ask of the present state.
+    pub fn facts(&mut self) -> Facts {
+        let classes = |engine: &mut Engine| {
+            let seen = engine.rollout.house.view().sightings.clone();
+            let house = &engine.rollout.house;
+            seen.iter().filter_map(|seen| house.world().class_of(house.scene(), seen.instance)).collect()
         };
-        self.enter(opening);
-        if let Ok(words) = instruction::parse(&instruction) {
-            // The text was checked when it came in.
-            let _ = self.instruct(&words);
+        let (mind, values) = match &self.decision {
+            Some((decision, values)) => (decision.mind.as_ref(), values.as_ref()),
+            None => (None, None),
+        };
+        Facts {
+            step: self.tree.at(),
+            completed: self.rollout.grader.as_ref().map_or(0, |grader| grader.completed() as u32),
+            failed: self.tree.last_taken().is_some_and(|taken| !taken.step.outcome.is_done()),
+            value: values.map(|values| values.state),
+            gap: gap(mind, values),
+            entropy: mind.map(|mind| mind.entropy),
+            seen: classes(self),
         }
+    }
+
+    /// The instruction in force and another, in the present state.
+    ///
+    /// # Errors
+    /// When the other text is no instruction, or the policy has no distribution.
+    pub fn contrast(&mut self, other: &str) -> anyhow::Result<Contrast> {
+        // The policy has looked at this state once, as always.
+        self.think()?;
+        let policy = self.policy.as_deref_mut().ok_or_else(|| anyhow::anyhow!("no policy is loaded"))?;
+        contrast::contrast(policy, &mut self.rollout, other)
+    }
+
+    /// A chain from the present state: the links of `text`, or without any the task's own sentences. Subtasks grade it where
+    /// there is one for each link.
+    ///
+    /// # Errors
+    /// When there is neither text nor task.
+    pub fn chain(&self, text: &str) -> anyhow::Result<Chain> {
+        let house = &self.rollout.house;
+        let left = self.rollout.grader.as_ref().map(|grader| {
+            let mut roles = grader.roles().to_vec();
+            for (at, role) in (0u8..).zip(&mut roles) {
+                role.bound = grader.binding(at);
+            }
+            (roles, grader.subtasks().get(grader.completed()..).unwrap_or_default().to_vec())
+        });
+        let mut links = chain::split(text);
+        if links.is_empty() {
+            let (roles, subtasks) = left.as_ref().filter(|(_, subtasks)| !subtasks.is_empty()).ok_or_else(|| {
+                anyhow::anyhow!("there is no task whose steps would be a chain: type one, with ; between the links")
+            })?;
+            let task = self.task.as_ref().filter(|task| !task.sentences.is_empty());
+            let mut rng = ChaCha8Rng::seed_from_u64(0);
+            links = match task {
+                Some(task) => task.sentences.iter().rev().take(subtasks.len()).rev().cloned().collect(),
+                None => subtasks.iter().map(|subtask| phrases::sentence(roles, subtask, &mut rng)).collect(),
+            };
+            links = links.iter().map(|link| instruction::normalise(link)).collect();
+        }
+        let graded = left.filter(|(_, subtasks)| subtasks.len() == links.len());
+        Ok(Chain { scene: house.scene().clone(), start: house.world().clone(), links, graded })
+    }
+
+    /// Everything that was tried.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Gives a branch another name.
+    ///
+    /// # Errors
+    /// When the name is empty or taken.
+    pub fn rename(&mut self, branch: usize, name: &str) -> anyhow::Result<()> {
+        anyhow::ensure!(self.tree.rename(branch, name), "{name:?} is empty, or another branch's name");
+        Ok(())
+    }
+
+    /// Where another branch and the one in hand part, and what they do from there.
+    pub fn divergence(&self, other: usize) -> Divergence {
+        Divergence::of(&self.tree, self.tree.branch(), other)
+    }
+
+    /// Brings house and policy to the state in hand.
+    fn settle(&mut self) {
+        let moment = self.tree.moment().clone();
+        moment.restore(&mut self.rollout, self.tree.at());
+        self.frame = None;
+        self.decision = None;
+        if moment.author == self.author && !matches!(moment.carried, Carried::Nothing) {
+            if let Some(policy) = self.policy.as_deref_mut() {
+                policy.put_back(moment.carried);
+            }
+        } else {
+            self.look_back();
+        }
+    }
+
+    /// Takes the steps of a recorded episode again, and stays at its end. The policy looks at every state where `thinks`;
+    /// returns the first step at which it would not choose what was recorded.
+    ///
+    /// # Errors
+    /// When a step does not come to what was recorded.
+    pub fn retrace(&mut self, episode: &Episode, author: &Author, thinks: bool) -> anyhow::Result<Option<u32>> {
+        self.instruct(&episode.instruction)?;
+        self.plant();
+        let mut author = author.clone();
+        let mut parted = None;
+        for (number, recorded) in (1..).zip(&episode.trace) {
+            if let Some(told) = &recorded.told {
+                self.instruct(told)?;
+            }
+            if let Some(by) = &recorded.by {
+                author = by.clone();
+            }
+            let action = Action { kind: recorded.kind, target: recorded.target };
+            if thinks {
+                let would = self.think().map(|(decision, _)| decision.action);
+                if !author.is_hand() && author == self.author && would.ok() != Some(action) {
+                    parted = parted.or(Some(number));
+                }
+            }
+            self.carry_out(Decision { action, mind: None }, author.clone());
+            let found = self.tree.steps().nth(number as usize - 1).map(|taken| taken.step.outcome);
+            anyhow::ensure!(
+                found == Some(recorded.outcome),
+                "step {number} ({}) came to {:?}; recorded is {:?}: the simulator or the scene is another one",
+                recorded.kind,
+                found.map(|outcome| outcome.to_string()).unwrap_or_default(),
+                recorded.outcome.to_string()
+            );
+        }
+        Ok(parted)
+    }
+
+    /// Everything that was tried as a run's tasks and episodes, a branch each.
+    pub fn explored(&self) -> Explored {
+        let tasks = self.tree.branches().iter().map(|branch| self.task_at(self.tree.start(), &branch.name)).collect();
+        let episodes = self.tree.branches().iter().enumerate();
+        Explored {
+            scene: self.rollout.house.scene().clone(),
+            tasks,
+            episodes: episodes.map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
+        }
+    }
+
+    /// The branch in hand as a recording.
+    ///
+    /// # Errors
+    /// Never for what the simulator itself did.
+    pub fn recording(&self) -> anyhow::Result<Recording> {
+        let start = self.tree.start();
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
+        Recording::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
+    }
+
+    /// The present state and instruction as a task: what is left of the subtasks, with the expert's own number of steps.
+    ///
+    /// # Errors
+    /// When nobody grades the instruction, nothing is left to do, or the expert sees no way.
+    pub fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let id = format!("{}-{name}-{}", self.rollout.house.scene().name, self.tree.at());
+        let base = self.task_at(self.tree.moment(), &id);
+        Ok((explored::rest_of(base, &self.rollout)?, self.rollout.house.scene().clone()))
+    }
+
+    /// The task that begins at a moment; without subtasks where nobody grades the instruction.
+    fn task_at(&self, moment: &Moment, id: &str) -> Task {
+        let graded = self.task.as_ref().filter(|_| moment.grader.is_some());
+        let mut task = graded.cloned().unwrap_or_else(|| explored::ungraded(self.reference.clone()));
+        task.id = id.into();
+        task.start = Some((*moment.world).clone());
+        task.instruction.clone_from(&moment.instruction);
+        task
+    }
+
+    /// The episode has no end but success.
+    pub fn unlimited(&mut self) {
+        self.limited = false;
+        self.rollout.horizon = None;
+        self.plant();
+    }
+
+    /// Lets that author's policy begin here: its chance, and whether it draws.
+    pub fn begin_as(&mut self, author: Author) {
+        self.author = author;
+        self.look_back();
+        self.plant();
     }
 
     /// Opens the next house, or the next task of the set.
@@ -286,33 +643,78 @@ impl Engine {
     fn enter_opened(&mut self) -> anyhow::Result<()> {
         let opening = self.openings.open()?;
         self.seed = self.openings.seed();
-        self.start = opening.world.clone();
-        self.enter(opening);
-        Ok(())
-    }
-
-    fn enter(&mut self, opening: Opening) {
+        self.author.seed = self.seed;
         self.rollout = rollout_of(&opening);
         self.task = opening.task;
+        self.reference = opening.reference;
         self.limited = opening.limited;
         self.episode += 1;
-        self.path = vec![opening.world.agent.cell];
-        self.completed_at.clear();
         self.decision = None;
         self.frame = None;
         if let Some(policy) = &mut self.policy {
             policy.begin(self.seed);
         }
+        self.tree = Tree::new(self.moment());
+        self.examples = Arc::new(self.suggest());
+        Ok(())
+    }
+
+    /// Instructions that make sense in this house: the task's own, its steps in training's words, and a pickup of each thing.
+    fn suggest(&self) -> Vec<String> {
+        let mut found: Vec<String> = Vec::new();
+        if let Some(task) = &self.task {
+            found.push(instruction::normalise(&task.instruction));
+            found.extend(task.sentences.iter().map(|sentence| instruction::normalise(sentence)));
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            for subtask in &task.subtasks {
+                found.push(instruction::normalise(&phrases::sentence(&task.roles, subtask, &mut rng)));
+            }
+        }
+        let objects = &self.rollout.house.world().objects;
+        let mut names: Vec<&str> =
+            objects.iter().filter(|o| o.class.info().pickupable).map(|object| object.class.spoken()).collect();
+        names.sort_unstable();
+        names.dedup();
+        found.extend(names.into_iter().map(|name| format!("Pick up the {name}.")));
+        found.dedup();
+        found
     }
 
     /// How far the task has come, where one applies.
     pub fn progress(&self) -> Option<Progress> {
         let (grader, house) = (self.rollout.grader.as_ref()?, &self.rollout.house);
+        let steps = (1..=self.tree.at()).zip(self.tree.steps());
         Some(Progress {
             subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
-            completed_at: self.completed_at.clone(),
+            completed_at: steps.filter(|(_, taken)| taken.step.subtask.is_some()).map(|(step, _)| step).collect(),
             waits_for: grader.waits_for(house.scene(), house.world()),
         })
+    }
+
+    /// Whether snapshots hold the frames before the present one.
+    pub fn set_looking_back(&mut self, looks_back: bool) {
+        self.looks_back = looks_back;
+    }
+
+    /// The frames before the present one that a trained agent sees too, newest first.
+    fn recent(&mut self) -> Vec<Arc<Frame>> {
+        if !self.looks_back {
+            return Vec::new();
+        }
+        let scene = self.rollout.house.scene().clone();
+        let mut worlds: Vec<Arc<World>> =
+            self.tree.past().rev().skip(1).take(FRAMES - 1).map(|m| m.world.clone()).collect();
+        // Before the first frame there was the first one.
+        let first = self.tree.past().next().map(|moment| moment.world.clone());
+        worlds.extend(std::iter::repeat_n(first, FRAMES).flatten());
+        worlds.truncate(FRAMES - 1);
+        let Some(start) = worlds.first() else { return Vec::new() };
+        let mut house = House::new(scene, (**start).clone());
+        let mut draw = |world: Arc<World>| {
+            house.restore((*world).clone());
+            Arc::new(house.frame().clone())
+        };
+        worlds.into_iter().map(&mut draw).collect()
     }
 
     /// The present state for a screen; draws the frame when it changed.
@@ -324,7 +726,10 @@ impl Engine {
         };
         let view = self.rollout.house.view().clone();
         let progress = self.progress();
+        let recent = self.recent();
         let house = &self.rollout.house;
+        let mut path: Vec<Cell> = self.tree.past().map(|moment| moment.world.agent.cell).collect();
+        path.dedup();
         Snapshot {
             episode: self.episode,
             scene: house.scene().clone(),
@@ -339,15 +744,32 @@ impl Engine {
             expert_steps: self.task.as_ref().filter(|_| self.rollout.grader.is_some()).map(|task| task.expert_steps),
             progress,
             end: self.rollout.end(),
-            path: self.path.clone(),
+            path,
             policy: self.kind,
+            acts: self.author.policy.clone(),
+            time: Arc::new(Timeline::of(&self.tree)),
+            recent,
+            reading: self.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
+            examples: self.examples.clone(),
+            checkpoints: self.checkpoints.clone(),
         }
+    }
+}
+
+/// Who chose, in a few words.
+fn who(author: &Author) -> String {
+    match (author.is_hand(), author.samples) {
+        (true, _) => "you".into(),
+        (false, true) => format!("{}, drawn with seed {}", author.policy, author.seed),
+        (false, false) => author.policy.clone(),
     }
 }
 
 fn rollout_of(opening: &Opening) -> Rollout {
     let house = House::new(opening.scene.clone(), opening.world.clone());
     match &opening.task {
+        // What a person made up is not graded.
+        Some(task) if task.subtasks.is_empty() => Rollout::new(house, task.instruction.clone(), None, None),
         Some(task) => {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
             Rollout::new(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
@@ -408,8 +830,8 @@ mod tests {
     fn a_state_is_decided_once_and_the_decision_is_what_happens() {
         let mut engine = testing::engine();
         engine.choose(PolicyKind::Random).unwrap();
-        let first = engine.think().unwrap().action;
-        assert_eq!(engine.think().unwrap().action, first);
+        let first = engine.think().unwrap().0.action;
+        assert_eq!(engine.think().unwrap().0.action, first);
         let words = engine.words(first);
         assert_eq!(engine.step().unwrap().action, words);
     }
@@ -424,6 +846,73 @@ mod tests {
         engine.reset();
         let again = engine.snapshot();
         assert_eq!((again.world, again.step, again.path.len()), (start.world, 0, 1));
-        assert_eq!(again.episode, 2);
+        assert_eq!((again.episode, again.time.beats.len()), (1, 2), "what was tried stays");
+    }
+
+    /// Everything that decides what comes next, as text.
+    fn state(engine: &mut Engine) -> String {
+        let frame = engine.snapshot().frame;
+        let thought = engine.think().map(|(decision, _)| format!("{decision:?}")).unwrap_or_default();
+        let moment = engine.moment();
+        let (world, told) = (moment.world.digest(), &moment.instruction);
+        let sum: u64 = frame.rgb.iter().zip(1u64..).map(|(&value, at)| u64::from(value) * at).sum();
+        format!(
+            "{world} {told} {:?} {:?} {thought} {sum} {:?}",
+            moment.grader,
+            moment.horizon,
+            engine.policy.as_ref().unwrap().carried()
+        )
+    }
+
+    #[test]
+    fn going_back_and_forth_restores_everything_bit_for_bit() {
+        for kind in [PolicyKind::Random, PolicyKind::Expert] {
+            let mut engine = testing::engine();
+            engine.choose(kind).unwrap();
+            let mut states = vec![state(&mut engine)];
+            while states.len() < 10 && engine.end().is_none() {
+                engine.step().unwrap();
+                states.push(state(&mut engine));
+            }
+            let last = states.len() - 1;
+            for step in [last - 1, last / 3, last, 0, last / 2, 1, last - 1] {
+                engine.seek(step as u32);
+                assert_eq!(state(&mut engine), states[step], "{kind:?}, step {step}");
+            }
+            engine.seek(1);
+            for wanted in &states[2..] {
+                engine.step().unwrap();
+                assert_eq!(&state(&mut engine), wanted, "the policy goes the same way again");
+            }
+            assert_eq!(engine.tree().branches().len(), 1, "and no branch began");
+        }
+    }
+
+    #[test]
+    fn another_action_instruction_seed_or_policy_forks() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Random).unwrap();
+        for _ in 0..4 {
+            engine.step().unwrap();
+        }
+        engine.seek(1);
+        let event = engine.act(Action::navigate(ActionType::LookDown));
+        assert!(event.forked.unwrap().starts_with("b1: "));
+        engine.switch(0).unwrap();
+        engine.seek(2);
+        engine.instruct("dance").unwrap();
+        assert!(engine.step().unwrap().forked.unwrap().contains("told: Dance."));
+        engine.switch(0).unwrap();
+        engine.seek(1);
+        assert!(engine.rollout.grader.is_some(), "the task is back where it applied");
+        engine.reseed(77, false);
+        assert!(engine.step().unwrap().forked.unwrap().starts_with("b3: "));
+        engine.switch(0).unwrap();
+        engine.seek(0);
+        engine.choose(PolicyKind::Expert).unwrap();
+        assert!(engine.step().unwrap().forked.is_some());
+        assert_eq!(engine.tree().branches().len(), 5);
+        let divergence = engine.divergence(0);
+        assert_eq!(divergence.shared, 0);
     }
 }

@@ -19,6 +19,7 @@ pub const LEGEND: u16 = 3;
 /// |                        |             |            |
 /// +- In reach -------------+- Log -------+            |
 /// |                        |             |            |
+/// time: the steps of the branch in hand
 /// instruction
 /// status: keys, graphics
 /// ```
@@ -38,6 +39,10 @@ pub struct Layout {
     pub log: Rect,
     /// The floor plan.
     pub map: Rect,
+    /// The timeline.
+    pub time: Rect,
+    /// What a page fills: everything between the header and the timeline.
+    pub page: Rect,
     /// The instruction.
     pub instruction: Rect,
     /// The last row.
@@ -55,7 +60,7 @@ impl Layout {
         }
         let rect = |x: u16, y: u16, width: u16, height: u16| Rect { x: screen.x + x, y: screen.y + y, width, height };
         let (width, height) = (screen.width, screen.height);
-        let body = height - 3;
+        let body = height - 4;
         // The picture is square, two columns to a row; what remains of its column lists the interactions.
         let listed = if body < 30 { 5 } else { 8 };
         let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
@@ -75,6 +80,8 @@ impl Layout {
             task: rect(x, 1 + mind, words, task),
             log: rect(x, 1 + mind + task, words, below - task),
             map: rect(x + words + 2, 1 + mind, map, below),
+            time: rect(0, height - 3, width, 1),
+            page: rect(0, 1, width, body),
             instruction: rect(0, height - 2, width, 1),
             status: rect(0, height - 1, width, 1),
         })
@@ -116,6 +123,7 @@ mod tests {
                 layout.task,
                 layout.log,
                 layout.map,
+                layout.time,
                 layout.instruction,
                 layout.status,
             ];

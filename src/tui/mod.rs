@@ -1,12 +1,19 @@
 //! The explorer: a house, an agent in it, and a person at a terminal who tells it what to do.
 //!
-//! A [`app::Msg`] changes the [`app::App`] by [`app::update`], which is pure and returns effects; `screen` performs them. One
+//! A [`update::Msg`] changes the [`app::App`] by [`update::update`], which is pure and returns effects; `screen` performs them. One
 //! worker thread owns house and policy; a second one encodes pictures. [`view`] draws the state and nothing else.
 
 pub mod app;
+pub mod breakpoints;
+pub mod chained;
+pub mod choices;
+pub mod config;
 pub mod editor;
 pub mod engine;
 pub mod graphics;
+pub mod hear;
+pub mod inspect;
+pub mod keep;
 pub mod keys;
 pub mod layout;
 pub mod openings;
@@ -17,6 +24,8 @@ pub mod terminal;
 #[cfg(test)]
 mod testing;
 pub mod theme;
+pub mod timeline;
+pub mod update;
 pub mod verb;
 pub mod view;
 pub mod worker;

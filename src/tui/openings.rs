@@ -19,6 +19,8 @@ pub struct Opening {
     pub scene: Arc<Scene>,
     /// The state at the start.
     pub world: World,
+    /// How tasks refer to the floor plan.
+    pub reference: SceneRef,
     /// What is asked.
     pub task: Option<Task>,
     /// The episode ends at the task's horizon.
@@ -96,18 +98,20 @@ impl Openings {
                     .rev()
                     .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
                 let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
-                Ok(Opening { scene: Arc::new(scene), world, task, limited: false })
+                Ok(Opening { scene: Arc::new(scene), world, reference, task, limited: false })
             }
             Start::Recorded { scene, trajectories } => {
                 let at = self.seed as usize % trajectories.len().max(1);
                 let trajectory = trajectories.get(at).context("no demonstration was recorded in this scene")?;
                 let world = trajectory.start.clone();
-                Ok(Opening { scene: scene.clone(), world, task: Some(task_of(trajectory)), limited: false })
+                let (reference, task) = (trajectory.scene.clone(), Some(task_of(trajectory)));
+                Ok(Opening { scene: scene.clone(), world, reference, task, limited: false })
             }
             Start::Tasks { tasks, index } => {
                 let task = tasks.get(*index).context("the task set is empty")?;
                 let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
-                Ok(Opening { scene: setting.scene, world: setting.world, task: Some(task.clone()), limited: true })
+                let (scene, world, reference) = (setting.scene, setting.world, task.scene.clone());
+                Ok(Opening { scene, world, reference, task: Some(task.clone()), limited: true })
             }
         }
     }

@@ -33,29 +33,78 @@ impl PolicyKind {
     }
 }
 
-/// Loads the agent, wherever its checkpoint lies.
-pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Box<dyn Policy>>>;
+/// A policy that acts, and what identifies it beside its name.
+pub struct Loaded {
+    /// The policy.
+    pub policy: Box<dyn Policy>,
+    /// SHA-256 of its checkpoint, where it has one.
+    pub checkpoint: Option<String>,
+}
+
+/// Loads an agent, wherever its checkpoint lies.
+pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Loaded>>;
+
+/// An agent that may act.
+pub struct Agent {
+    /// The name of its checkpoint.
+    pub name: String,
+    /// Loads it.
+    pub load: LoadAgent,
+}
 
 /// Makes policies.
 pub struct Policies {
-    agent: LoadAgent,
+    agents: Vec<Agent>,
+    chosen: usize,
 }
 
 impl Policies {
-    /// With what loads the agent.
-    pub fn new(agent: LoadAgent) -> Policies {
-        Policies { agent }
+    /// With these agents; the first acts.
+    pub fn new(agents: Vec<Agent>) -> Policies {
+        Policies { agents, chosen: 0 }
+    }
+
+    /// The names of the agents.
+    pub fn agents(&self) -> Vec<String> {
+        self.agents.iter().map(|agent| agent.name.clone()).collect()
+    }
+
+    /// Which of them is meant by "the agent".
+    pub fn chosen(&self) -> usize {
+        self.chosen
+    }
+
+    /// From now on another agent is meant by "the agent": by its name, or its number from 1.
+    ///
+    /// # Errors
+    /// When there is no such agent; says which there are.
+    pub fn choose(&mut self, wanted: &str) -> anyhow::Result<()> {
+        let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let found = self.agents.iter().position(|agent| agent.name == wanted).or(numbered);
+        match found.filter(|&at| at < self.agents.len()) {
+            Some(at) => {
+                self.chosen = at;
+                Ok(())
+            }
+            None => anyhow::bail!("there is no checkpoint {wanted:?}; there are: {}", self.agents().join(", ")),
+        }
     }
 
     /// A policy of that kind.
     ///
     /// # Errors
     /// When the agent cannot be loaded.
-    pub fn make(&self, kind: PolicyKind) -> anyhow::Result<Box<dyn Policy>> {
+    pub fn make(&self, kind: PolicyKind) -> anyhow::Result<Loaded> {
+        let plain = |policy| Ok(Loaded { policy, checkpoint: None });
         match kind {
-            PolicyKind::Agent => (self.agent)(),
-            PolicyKind::Expert => Ok(Box::new(ExpertPolicy::new())),
-            PolicyKind::Random => Ok(Box::new(RandomPolicy::new())),
+            PolicyKind::Agent => match self.agents.get(self.chosen) {
+                Some(agent) => (agent.load)(),
+                None => anyhow::bail!(
+                    "there is no checkpoint in checkpoints/: name one with --checkpoint, or let the expert (e) or chance (x) act"
+                ),
+            },
+            PolicyKind::Expert => plain(Box::new(ExpertPolicy::new())),
+            PolicyKind::Random => plain(Box::new(RandomPolicy::new())),
         }
     }
 }

@@ -1,27 +1,32 @@
 //! The loop of the explorer's screen: messages in, one `update`, effects out, one drawing for all that came.
 
 use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::Event;
 use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
-use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 use ratatui::layout::Size;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::app::{App, Effect, Farewell, Graphics, Msg, update};
+use super::app::{App, Graphics};
+use super::config::Config;
 use super::engine::Engine;
+use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::Encoder;
 use super::graphics::{Protocol, detect};
 use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
-use super::worker::{self, Command};
+use super::update::{Effect, Farewell, Msg, update};
+use super::worker::{self, Command, Going};
 
 /// What the screen is started with.
 pub struct Screen {
@@ -33,6 +38,10 @@ pub struct Screen {
     pub manual: bool,
     /// The policy runs as soon as it is there.
     pub runs: bool,
+    /// What a person has set.
+    pub config: Config,
+    /// Where it is remembered what a terminal answered.
+    pub memory: Option<PathBuf>,
     /// Where libtorch's messages go.
     pub log: Option<std::fs::File>,
 }
@@ -55,9 +64,10 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     watch_signals(tell.clone())?;
     let guard =
         terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let graphics = graphics(screen.protocol, ability);
+    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref());
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
-    let app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
+    let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
+    app.config = screen.config;
 
     let reports = tell.clone();
     let gone = Gone(tell.clone());
@@ -67,7 +77,7 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     })?;
     let pictures = tell.clone();
     if screen.runs && !screen.manual {
-        commands.send(Command::Run(true))?;
+        commands.send(Command::Go(Some(Going::Policy)))?;
     }
     let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
@@ -132,7 +142,10 @@ impl<W: Write> Conversation<W> {
                     // A worker that is gone says so itself.
                     Effect::Send(command) => drop(self.commands.send(command)),
                     Effect::Encode => encode = true,
-                    Effect::Repaint => self.display.clear()?,
+                    Effect::Copy(text) => {
+                        queue!(self.display.backend_mut(), CopyToClipboard::to_clipboard_from(text))?;
+                    }
+                    Effect::Repaint => self.repaint()?,
                     Effect::Quit(farewell) => return Ok(Some(farewell)),
                 }
             }
@@ -147,6 +160,24 @@ impl<W: Write> Conversation<W> {
         Ok(None)
     }
 
+    /// Clears the screen, so that the next drawing is a whole one. The display's own way would ask the terminal where its
+    /// cursor is, and its answer would be taken by whoever reads the keys.
+    fn repaint(&mut self) -> io::Result<()> {
+        self.display.backend_mut().clear_region(ClearType::All)?;
+        self.display.swap_buffers();
+        Ok(())
+    }
+
+    /// Makes pictures coarser or finer, so that steps keep to what they may cost.
+    fn budget(&mut self) {
+        let (Some(most), Some(cost)) = (self.app.bandwidth, self.app.bytes) else { return };
+        if cost > most {
+            self.app.coarseness = (self.app.coarseness + 1).min(COARSEST);
+        } else if 3 * cost < most {
+            self.app.coarseness = self.app.coarseness.saturating_sub(1);
+        }
+    }
+
     /// Notes what the newest steps cost on the wire.
     fn meter(&mut self) {
         let step = self.app.now.as_ref().map_or(0, |now| now.step);
@@ -155,6 +186,7 @@ impl<W: Write> Conversation<W> {
             let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
             self.app.bytes = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
             self.metered = (step, bytes);
+            self.budget();
         }
     }
 }
@@ -188,7 +220,7 @@ fn ability() -> Ability {
 }
 
 /// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
-fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
+fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) -> Graphics {
     let cell_pixels = match crossterm::terminal::window_size() {
         Ok(window) if window.width > 0 && window.height > 0 => {
             ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
@@ -200,7 +232,10 @@ fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
         None => {
             let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
             let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
-            if reason == detect::UNKNOWN && detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false) {
+            let ask = || detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false);
+            let name =
+                ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
+            if reason == detect::UNKNOWN && detect::remembered(memory, &name, ask) {
                 (Protocol::Sixel, "the terminal says that it has sixels".into())
             } else if protocol == Protocol::HalfBlocks && !ability.shades() {
                 (Protocol::Ascii, "the terminal has few colours".into())
@@ -209,7 +244,8 @@ fn graphics(asked: Option<Protocol>, ability: Ability) -> Graphics {
             }
         }
     };
-    Graphics { protocol, reason, cell_pixels }
+    let in_tmux = std::env::var_os("TMUX").is_some();
+    Graphics { protocol, reason, cell_pixels, in_tmux }
 }
 
 fn read_keys(tell: SyncSender<Msg>) -> io::Result<()> {

@@ -6,12 +6,13 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::layout::Size;
 
-use super::app::{App, Graphics, Msg, update};
+use super::app::{App, Graphics};
 use super::engine::{Engine, Snapshot};
 use super::graphics::{Picture, Protocol};
 use super::openings::{Openings, Start};
 use super::policies::{Policies, PolicyKind};
 use super::theme::Ability;
+use super::update::{Msg, update};
 use super::worker::Report;
 use crate::agent::{Decision, Mind};
 use crate::domain::task::SceneRef;
@@ -44,7 +45,7 @@ pub fn engine() -> Engine {
     };
     let start = Start::Recorded { scene, trajectories: vec![trajectory] };
     let openings = Openings::new(start, 5, Scenes::in_folder(None));
-    let policies = Policies::new(Box::new(|| anyhow::bail!("there is no checkpoint")));
+    let policies = Policies::new(Vec::new());
     Engine::new(openings, policies, PolicyKind::Random, None).unwrap()
 }
 
@@ -113,16 +114,18 @@ pub fn thought(now: &Snapshot) -> Report {
     Report::Thought(
         Decision { action, mind: Some(Mind { actions, objects, entropy: 1.13, greedy: action }) },
         "Pickup Mug".into(),
+        None,
     )
 }
 
 /// A screen of that size in which the agent has just begun.
 pub fn app(width: u16, height: u16, protocol: Protocol, ability: Ability) -> App {
-    let graphics = Graphics { protocol, reason: "inside tmux".into(), cell_pixels: (8, 16) };
+    let graphics = Graphics { protocol, reason: "inside tmux".into(), cell_pixels: (8, 16), in_tmux: false };
     let mut app = App::new(Size { width, height }, graphics, ability, PolicyKind::Agent, false);
     let mut engine = engine();
     let mut now = snapshot(&mut engine);
     now.policy = PolicyKind::Agent;
+    now.acts = "first".into();
     let thought = thought(&now);
     update(&mut app, Msg::Report(Report::Seen(Box::new(now))));
     update(&mut app, Msg::Report(Report::Busy(None)));

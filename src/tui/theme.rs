@@ -3,6 +3,7 @@
 
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
+use serde::Deserialize;
 use termprofile::TermProfile;
 
 /// The styles of the screen, by meaning.
@@ -42,6 +43,54 @@ pub const THEME: Theme = Theme {
     note: Style::new().fg(Color::Magenta),
     instruction: Style::new().add_modifier(Modifier::BOLD),
 };
+
+/// Colours for different eyes and backgrounds. They bend the terminal's sixteen; pictures and the map keep their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// For dark backgrounds.
+    #[default]
+    Dark,
+    /// For light backgrounds: yellow and grey would fade there.
+    Light,
+    /// Nothing faint.
+    HighContrast,
+    /// No colour; the letters alone say it.
+    NoColour,
+}
+
+impl Scheme {
+    /// Brings a drawn screen into these colours.
+    pub fn paint(self, buf: &mut Buffer) {
+        let bend: fn(Color) -> Color = match self {
+            Scheme::Dark => return,
+            Scheme::Light => |colour| match colour {
+                Color::Yellow => Color::Rgb(140, 90, 0),
+                Color::DarkGray => Color::Rgb(105, 105, 105),
+                Color::Cyan => Color::Rgb(0, 95, 115),
+                Color::Green => Color::Rgb(0, 110, 40),
+                other => other,
+            },
+            Scheme::HighContrast => |colour| match colour {
+                Color::DarkGray | Color::Gray => Color::Reset,
+                Color::Blue => Color::LightBlue,
+                Color::Red => Color::LightRed,
+                Color::Green => Color::LightGreen,
+                Color::Magenta => Color::LightMagenta,
+                Color::Cyan => Color::LightCyan,
+                Color::Yellow => Color::LightYellow,
+                other => other,
+            },
+            Scheme::NoColour => |colour| match colour {
+                Color::Rgb(..) | Color::Indexed(_) => colour,
+                _ => Color::Reset,
+            },
+        };
+        for cell in &mut buf.content {
+            (cell.fg, cell.bg) = (bend(cell.fg), bend(cell.bg));
+        }
+    }
+}
 
 /// What the terminal can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,6 +189,16 @@ fn plain(symbol: char) -> char {
     match symbol {
         '─' => '-',
         '·' | '•' => '.',
+        '●' => '@',
+        '○' => 'o',
+        '×' => 'x',
+        '┬' => 'Y',
+        '└' => '`',
+        '┌' | '┐' | '┘' => '+',
+        '│' => '|',
+        '▁' | '▂' => '_',
+        '▃' | '▅' => '-',
+        '▆' | '▇' => '=',
         '█' | '▉' | '▊' | '▋' | '▌' | '▀' | '▄' => '#',
         '▍' | '▎' | '▏' => '|',
         '▲' => '^',

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::io::{self, BufWriter, Write};
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
@@ -12,27 +13,99 @@ use ratatui::layout::{Rect, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 use sprint_explorer::domain::scene::Room;
 use sprint_explorer::run::scenes::Scenes;
-use sprint_explorer::tui::app::{App, Graphics, Msg};
+use sprint_explorer::tui::app::{App, Graphics};
 use sprint_explorer::tui::engine::Engine;
-use sprint_explorer::tui::graphics::Protocol;
+use sprint_explorer::tui::graphics::classes::{self, Letters};
 use sprint_explorer::tui::graphics::encoder::Encoder;
+use sprint_explorer::tui::graphics::overlay::Overlay;
+use sprint_explorer::tui::graphics::{Job, Picture, Protocol};
 use sprint_explorer::tui::openings::{Openings, Start};
 use sprint_explorer::tui::policies::{Policies, PolicyKind};
 use sprint_explorer::tui::screen::Conversation;
-use sprint_explorer::tui::terminal::Counted;
+use sprint_explorer::tui::terminal::{Counted, WRITTEN};
 use sprint_explorer::tui::theme::Ability;
-use sprint_explorer::tui::worker::{self, Command, Pace};
+use sprint_explorer::tui::update::Msg;
+use sprint_explorer::tui::worker::{self, Command, Going, Pace};
 
 const KEYS: usize = 600;
 const BETWEEN: Duration = Duration::from_millis(11);
 const LIMIT: Duration = Duration::from_micros(16_700);
 
+/// Steps over which bytes and times of frames are taken.
+const STEPS: usize = 60;
+
+fn engine() -> anyhow::Result<Engine> {
+    let openings = Openings::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
+    Engine::new(openings, Policies::new(Vec::new()), PolicyKind::Expert, None)
+}
+
+/// The typical cost of a step's picture, in bytes and encoding time, while the expert does a task.
+fn frames() -> anyhow::Result<()> {
+    // Half-blocks at 40 x 20 cells; sixels at 300 x 300 pixels; kitty sends the frame as it is.
+    let sizes = [
+        (Protocol::HalfBlocks, (40, 20)),
+        (Protocol::Kitty, (40, 20)),
+        (Protocol::Sixel, (30, 15)),
+        (Protocol::Ascii, (40, 20)),
+    ];
+    for (protocol, (width, height)) in sizes {
+        let mut engine = engine()?;
+        engine.choose(PolicyKind::Expert)?;
+        let cells = Size { width, height };
+        let area = Rect::from((ratatui::layout::Position::ORIGIN, cells));
+        let viewport = Viewport::Fixed(area);
+        let backend = CrosstermBackend::new(Counted::new(io::sink()));
+        let mut display = Terminal::with_options(backend, TerminalOptions { viewport })?;
+        let (mut sizes, mut times) = (Vec::new(), Vec::new());
+        for _ in 0..STEPS {
+            let now = engine.snapshot();
+            let job = Job {
+                frame: now.frame.clone(),
+                overlay: Overlay::Colour,
+                coarseness: 0,
+                in_tmux: false,
+                recent: Vec::new(),
+                letters: Arc::new(Letters::of(&now.scene, &now.world)),
+                classes: Arc::new(classes::names(&now.scene, &now.world)),
+                labels: Vec::new(),
+                protocol,
+                cells,
+                cell_pixels: (10, 20),
+            };
+            let since = Instant::now();
+            let picture = Picture::encode(&job);
+            times.push(since.elapsed());
+            let before = WRITTEN.load(std::sync::atomic::Ordering::Relaxed);
+            display.draw(|frame| frame.render_widget(&picture, area))?;
+            Write::flush(display.backend_mut())?;
+            sizes.push(WRITTEN.load(std::sync::atomic::Ordering::Relaxed) - before);
+            if engine.end().is_some() || engine.step().is_err() {
+                engine.next_episode()?;
+            }
+        }
+        sizes.sort_unstable();
+        times.sort_unstable();
+        let middle = STEPS / 2;
+        let (name, kilobytes) = (protocol.name(), |at: usize| sizes[at] as f64 / 1000.0);
+        writeln!(
+            io::stdout(),
+            "{name}: median step {:.1} kB, largest {:.1} kB; encoding {:?}, longest {:?}",
+            kilobytes(middle),
+            kilobytes(STEPS - 1),
+            times[middle],
+            times[STEPS - 1]
+        )?;
+    }
+    Ok(())
+}
+
 fn main() -> anyhow::Result<()> {
+    frames()?;
     let (tell, messages) = sync_channel(64);
     let reports = tell.clone();
     let open = || {
         let openings = Openings::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
-        let policies = Policies::new(Box::new(|| anyhow::bail!("not in this bench")));
+        let policies = Policies::new(Vec::new());
         Engine::new(openings, policies, PolicyKind::Random, Some("look around"))
     };
     let commands = worker::start(open, move |report| reports.send((None, Msg::Report(report))).is_ok())?;
@@ -42,10 +115,11 @@ fn main() -> anyhow::Result<()> {
     let viewport = Viewport::Fixed(Rect::from((ratatui::layout::Position::ORIGIN, size)));
     let backend = CrosstermBackend::new(BufWriter::new(Counted::new(io::sink())));
     let display = Terminal::with_options(backend, TerminalOptions { viewport })?;
-    let graphics = Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16) };
+    let graphics =
+        Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16), in_tmux: false };
     let app = App::new(size, graphics, Ability::FULL, PolicyKind::Random, false);
     commands.send(Command::Pace((0..9).fold(Pace::START, |pace, _| pace.faster())))?;
-    commands.send(Command::Run(true))?;
+    commands.send(Command::Go(Some(Going::Policy)))?;
     let mut conversation = Conversation::new(app, display, commands, encoder);
 
     std::thread::spawn(move || {

@@ -52,6 +52,14 @@ pub struct Expert {
     last: Option<Action>,
 }
 
+/// What an expert is about to do, to come back to.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    steps: VecDeque<Action>,
+    expected: Option<(World, usize)>,
+    last: Option<Action>,
+}
+
 impl Default for Expert {
     fn default() -> Expert {
         Expert::new()
@@ -68,6 +76,16 @@ impl Expert {
     pub fn forget(&mut self) {
         self.plan.clear();
         self.expected = None;
+    }
+
+    /// What it is about to do.
+    pub fn plan(&self) -> Plan {
+        Plan { steps: self.plan.clone(), expected: self.expected.clone(), last: self.last }
+    }
+
+    /// Goes on with what it was about to do at another time in this scene.
+    pub fn follow(&mut self, plan: Plan) {
+        Plan { steps: self.plan, expected: self.expected, last: self.last } = plan;
     }
 
     /// The next action for the grader's current subtask.

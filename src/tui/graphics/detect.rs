@@ -1,11 +1,16 @@
 //! A guess at how the terminal can show pictures: from the environment, and from one question that every terminal answers.
 
+use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
+use serde::{Deserialize, Serialize};
+
 use super::Protocol;
+use crate::data::json;
 
 /// The likeliest protocol and why, given the environment's variables.
 pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
@@ -64,6 +69,31 @@ pub fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
 
 /// The reason for half-blocks where nothing tells the terminal apart.
 pub const UNKNOWN: &str = "no sign of picture support";
+
+/// What terminals answered, by their names.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Answers {
+    format_version: u32,
+    has_sixel: BTreeMap<String, bool>,
+}
+
+/// What a terminal of that name answered before; `ask`s it only the first time. A memory that cannot be read or written is
+/// passed over.
+pub fn remembered(memory: Option<&Path>, name: &str, ask: impl FnOnce() -> bool) -> bool {
+    let Some(path) = memory else { return ask() };
+    let mut answers = json::read::<Answers>(path, 1).map(|found| found.value).unwrap_or_default();
+    if let Some(&known) = answers.has_sixel.get(name) {
+        return known;
+    }
+    let answer = ask();
+    answers.format_version = 1;
+    answers.has_sixel.insert(name.to_string(), answer);
+    if let Err(error) = json::write(path, &answers) {
+        tracing::info!("{error:#}");
+    }
+    answer
+}
 
 /// Asks the terminal what it is ("primary device attributes") and reads its answer until `patience` is over. Attribute 4
 /// means sixel. A later answer does no harm: crossterm knows this one and drops it.
@@ -130,6 +160,17 @@ mod tests {
         check(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "WezTerm"), utf8], Protocol::Iterm2);
         check(&[("TERM", "xterm-256color"), ("WT_SESSION", "1"), utf8], Protocol::Sixel);
         check(&[("TERM", "xterm-256color")], Protocol::HalfBlocks);
+    }
+
+    #[test]
+    fn a_terminal_is_asked_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("terminals.json");
+        assert!(remembered(Some(&path), "xterm", || true));
+        assert!(remembered(Some(&path), "xterm", || panic!("asked again")));
+        assert!(!remembered(Some(&path), "vt100", || false));
+        std::fs::write(&path, "nonsense").unwrap();
+        assert!(!remembered(Some(&path), "xterm", || false), "what cannot be read is asked anew");
     }
 
     #[test]

@@ -1,12 +1,9 @@
-//! Pictures as escape sequences: the frame at its own size, scaled by the terminal (kitty, iTerm2), or sixels.
+//! Pictures as escape sequences: the frame at its own size, scaled by the terminal (kitty, iTerm2).
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, RgbImage};
-use ratatui_image::picker::{Picker, ProtocolType};
-use ratatui_image::protocol::Protocol as Encoded;
-use ratatui_image::{FilterType as Scaling, FontSize, Resize};
+use image::{ExtendedColorType, ImageEncoder};
 
 use super::{Job, labels};
 
@@ -24,10 +21,16 @@ pub fn kitty(job: &Job) -> String {
     let mut control = format!("a=T,U=1,f=100,i={KITTY_ID},c={columns},r={rows},q=2,");
     while let Some(piece) = pieces.next() {
         let more = u8::from(pieces.peek().is_some());
-        sequence.push_str(&format!("\x1b_G{control}m={more};{}\x1b\\", String::from_utf8_lossy(piece)));
+        let piece = format!("\x1b_G{control}m={more};{}\x1b\\", String::from_utf8_lossy(piece));
+        sequence.push_str(&if job.in_tmux { through_tmux(&piece) } else { piece });
         control = "q=2,".into();
     }
     sequence
+}
+
+/// A sequence that tmux hands on to its terminal (where `allow-passthrough` is on).
+fn through_tmux(sequence: &str) -> String {
+    format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }
 
 /// Makes kitty forget the frame.
@@ -49,21 +52,6 @@ pub fn iterm2(job: &Job) -> String {
     format!(
         "\x1b]1337;File=inline=1;size={size};width={columns};height={rows};preserveAspectRatio=0;doNotMoveCursor=1:{data}\x07"
     )
-}
-
-/// Draws the frame where the cursor is, as sixels of the cells' size in pixels. Empty when it cannot be encoded.
-pub fn sixel(job: &Job) -> String {
-    let (width, height) = (job.frame.width as u32, job.frame.height as u32);
-    let Some(image) = RgbImage::from_raw(width, height, labels::over_pixels(job)) else { return String::new() };
-    let (across, down) = job.cell_pixels;
-    #[allow(deprecated)] // The other ways to make one ask the terminal, which we have done already.
-    let mut picker = Picker::from_fontsize(FontSize::new(across, down));
-    picker.set_protocol_type(ProtocolType::Sixel);
-    let resize = Resize::Scale(Some(Scaling::Nearest));
-    match picker.new_protocol(DynamicImage::ImageRgb8(image), job.cells, resize) {
-        Ok(Encoded::Sixel(sixel)) => sixel.data,
-        _ => String::new(),
-    }
 }
 
 fn png(job: &Job) -> Vec<u8> {
@@ -418,12 +406,19 @@ mod tests {
     }
 
     #[test]
-    fn iterm2_scales_to_cells_and_sixel_starts_a_device_control_string() {
+    fn tmux_hands_on_every_piece() {
+        let mut job = job(Protocol::Kitty);
+        job.in_tmux = true;
+        let sequence = kitty(&job);
+        assert!(sequence.starts_with("\x1bPtmux;\x1b\x1b_Ga=T") && sequence.ends_with("\x1b\x1b\\\x1b\\"));
+    }
+
+    #[test]
+    fn iterm2_scales_to_cells() {
         let job_of = job(Protocol::Iterm2);
         let sequence = iterm2(&job_of);
         assert!(sequence.starts_with("\x1b]1337;File=inline=1;size=") && sequence.ends_with('\x07'));
         let size = format!(";width={};height={};", job_of.cells.width, job_of.cells.height);
         assert!(sequence.contains(&size), "{}", &sequence[..90]);
-        assert!(sixel(&job(Protocol::Sixel)).contains("\x1bP"));
     }
 }

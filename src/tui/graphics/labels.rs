@@ -3,13 +3,14 @@
 use ratatui::style::{Color, Modifier, Style};
 
 use super::Job;
+use crate::run::export::lettering::{ADVANCE, glyph};
 
 /// A numbered thing in the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Label {
     /// Its edges in the frame: left, top, right, bottom, in pixels.
     pub bounds: [u16; 4],
-    /// The numbers of the interactions with it, e.g. `1` or `1,4`.
+    /// The numbers of the interactions with it, and its name where there is room: `1`, or `1,4 mug`.
     pub text: String,
     /// The policy is about to act on it.
     pub chosen: bool,
@@ -79,38 +80,20 @@ impl Canvas {
     }
 
     fn plate(&mut self, label: &Label) {
-        const SCALE: i32 = 2;
-        let advance = 4 * SCALE;
-        let width = label.text.chars().count() as i32 * advance + SCALE;
+        let scale = if label.text.len() <= 3 { 2 } else { 1 };
+        let (advance, height) = (ADVANCE as i32 * scale, 7 * scale);
+        let width = label.text.chars().count() as i32 * advance + scale;
         let [left, top, right, bottom] = label.bounds.map(i32::from);
         let x = ((left + right - width) / 2).clamp(0, (self.width as i32 - width).max(0));
-        let y = ((top + bottom) / 2 - 3 * SCALE).clamp(0, (self.height as i32 - 7 * SCALE).max(0));
-        self.fill(x, y, x + width - 1, y + 7 * SCALE - 1, colour(label));
+        let y = ((top + bottom - height) / 2 - scale).clamp(0, (self.height as i32 - height - 2 * scale).max(0));
+        self.fill(x, y, x + width - 1, y + height + 2 * scale - 1, colour(label));
         for (place, symbol) in (0..).zip(label.text.chars()) {
             for (row, bits) in (0..).zip(glyph(symbol)) {
-                for column in (0..3).filter(|column| bits >> (2 - column) & 1 == 1) {
-                    let (px, py) = (x + SCALE + place * advance + column * SCALE, y + SCALE + row * SCALE);
-                    self.fill(px, py, px + SCALE - 1, py + SCALE - 1, INK);
+                for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
+                    let (px, py) = (x + scale + place * advance + column * scale, y + scale + row * scale);
+                    self.fill(px, py, px + scale - 1, py + scale - 1, INK);
                 }
             }
         }
-    }
-}
-
-/// A digit (or comma) in three by five pixels, a row each, the left pixel in the highest of three bits.
-fn glyph(symbol: char) -> [u8; 5] {
-    match symbol {
-        '0' => [7, 5, 5, 5, 7],
-        '1' => [2, 6, 2, 2, 7],
-        '2' => [7, 1, 7, 4, 7],
-        '3' => [7, 1, 7, 1, 7],
-        '4' => [5, 5, 7, 1, 1],
-        '5' => [7, 4, 7, 1, 7],
-        '6' => [7, 4, 7, 5, 7],
-        '7' => [7, 1, 1, 2, 2],
-        '8' => [7, 5, 7, 5, 7],
-        '9' => [7, 5, 7, 1, 7],
-        '*' => [0, 5, 2, 5, 0],
-        _ => [0, 0, 0, 2, 4],
     }
 }

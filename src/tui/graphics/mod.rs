@@ -2,10 +2,13 @@
 
 pub mod blocks;
 pub mod classes;
+pub mod coarse;
 pub mod detect;
 pub mod encoder;
 pub mod inline;
 pub mod labels;
+pub mod overlay;
+pub mod sixel;
 
 use std::num::NonZeroU16;
 use std::sync::Arc;
@@ -18,6 +21,7 @@ use ratatui::widgets::Widget;
 use crate::house::view::Frame;
 use classes::Letters;
 use labels::Label;
+use overlay::Overlay;
 
 /// How a picture can be shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +72,14 @@ impl Protocol {
 pub struct Job {
     /// The frame.
     pub frame: Arc<Frame>,
+    /// What is shown of it.
+    pub overlay: Overlay,
+    /// How coarse it may be, from 0.
+    pub coarseness: u8,
+    /// Sequences have to pass through tmux.
+    pub in_tmux: bool,
+    /// The frames before it, newest first, where the overlay shows them.
+    pub recent: Vec<Arc<Frame>>,
     /// The letters of the scene's classes.
     pub letters: Arc<Letters>,
     /// For each instance code in the frame, its class letter's key; see [`classes::draw`].
@@ -107,12 +119,14 @@ pub enum Content {
 impl Picture {
     /// Encodes a frame.
     pub fn encode(job: &Job) -> Picture {
+        let frame = coarse::coarse(overlay::shown(job), job.coarseness);
+        let job = &Job { frame, recent: Vec::new(), ..job.clone() };
         let content = match job.protocol {
             Protocol::HalfBlocks => Content::Cells(blocks::draw(job)),
             Protocol::Ascii => Content::Cells(classes::draw(job)),
             Protocol::Kitty => Content::Placed(inline::kitty(job)),
             Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),
-            Protocol::Sixel => Content::Drawn(inline::sixel(job)),
+            Protocol::Sixel => Content::Drawn(sixel::draw(job)),
         };
         Picture { protocol: job.protocol, cells: job.cells, content }
     }

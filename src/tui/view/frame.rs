@@ -30,7 +30,7 @@ impl Widget for Sees<'_> {
             }
             None => String::new(),
         };
-        let inner = panel(buf, area, "Sees", &right);
+        let inner = panel(buf, area, app.overlay.title(), &right);
         let Some(picture_area) = app.picture_area() else { return };
         let covered = app.mode == Mode::Help && app.graphics.protocol.floats();
         match &app.picture {

@@ -5,12 +5,16 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Padding, Widget};
 
+use super::fit;
 use crate::tui::app::App;
 use crate::tui::keys::{self, Mode};
 use crate::tui::theme::THEME;
 
 /// The overlay with the keys.
 pub struct Help<'a>(pub &'a App);
+
+/// Columns that the names of keys take.
+const LABEL: usize = 13;
 
 impl Widget for Help<'_> {
     fn render(self, screen: Rect, buf: &mut Buffer) {
@@ -19,15 +23,21 @@ impl Widget for Help<'_> {
             Mode::Manual => " Keys while you act ",
             _ => " Keys while a policy acts ",
         };
-        let lines: Vec<Line> = keys::bindings(mode)
-            .map(|binding| {
-                Line::from(vec![
-                    Span::styled(format!("{:<13}", binding.label), THEME.chosen),
-                    Span::raw(binding.verb.doc()),
-                ])
-            })
-            .collect();
-        let (width, height) = (58.min(screen.width), (lines.len() as u16 + 2).min(screen.height));
+        let bindings: Vec<_> = keys::bindings(mode, self.0.page).collect();
+        // Two columns where one would not fit.
+        let columns = if bindings.len() + 2 > usize::from(screen.height) { 2 } else { 1 };
+        let rows = bindings.len().div_ceil(columns);
+        let width = (58 * columns as u16).min(screen.width);
+        let room = usize::from(width.saturating_sub(4)) / columns;
+        let lines = (0..rows).map(|row| {
+            let shown = bindings.iter().skip(row).step_by(rows.max(1)).take(columns);
+            Line::from_iter(shown.flat_map(|binding| {
+                let doc = fit(binding.verb.doc(), room.saturating_sub(LABEL + 1));
+                let words = format!("{doc:<width$}", width = room.saturating_sub(LABEL));
+                [Span::styled(format!("{:<LABEL$}", binding.label), THEME.chosen), Span::raw(words)]
+            }))
+        });
+        let height = (rows as u16 + 2).min(screen.height);
         let area = Rect {
             x: screen.x + (screen.width - width) / 2,
             y: screen.y + (screen.height - height) / 2,

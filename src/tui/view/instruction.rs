@@ -17,12 +17,20 @@ pub struct Instruction<'a>(pub &'a App);
 impl Widget for Instruction<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
+        if app.mode == Mode::Palette {
+            buf.set_string(area.x, area.y, ": ", THEME.title);
+            app.palette.area().render(Rect { x: area.x + 2, width: area.width - 2, ..area }, buf);
+            return;
+        }
         let now = app.now.as_ref().map_or("", |now| now.instruction.as_str());
         let prompt = "Instruction > ";
         buf.set_string(area.x, area.y, prompt, THEME.title);
         let rest = Rect { x: area.x + prompt.width() as u16, width: area.width - prompt.width() as u16, ..area };
         if app.mode == Mode::Typing {
-            let hint = format!("  now: {}", fit(now, usize::from(area.width) / 3));
+            let hint = match app.completions().first().filter(|_| !app.editor.text().is_empty()) {
+                Some(whole) => format!("  tab: {}", fit(whole, usize::from(area.width) / 3)),
+                None => format!("  now: {}", fit(now, usize::from(area.width) / 3)),
+            };
             let typed = rest.width.saturating_sub(hint.width() as u16);
             app.editor.area().render(Rect { width: typed, ..rest }, buf);
             buf.set_string(rest.x + typed, rest.y, hint, THEME.quiet);

@@ -1,17 +1,23 @@
 //! The floor plan from above: where the agent is, where it has been, and what stands around it. North is up.
 
+use std::collections::HashMap;
+
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
+use super::chain::warmth;
 use super::{fit, panel};
 use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Instance, Pose};
+use crate::run::landscape::Landscape;
 use crate::tui::app::App;
 use crate::tui::engine::Snapshot;
+use crate::tui::inspect::things;
 use crate::tui::theme::THEME;
+use crate::tui::verb::Page;
 
 /// The panel with the floor plan.
 pub struct Map<'a>(pub &'a App);
@@ -46,17 +52,36 @@ impl Widget for Map<'_> {
             .as_ref()
             .and_then(|(decision, words)| Some((decision.action.target?, words)))
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
-        let right = target.map_or(String::new(), |(_, words)| words.clone());
+        let right = match (&app.landscape, target) {
+            (Some(values), _) => legend(values),
+            (None, Some((_, words))) => words.clone(),
+            (None, None) => String::new(),
+        };
         let inner = panel(buf, area, "Map", &right);
-        let ground = Ground::of(now);
+        let inspected = match app.page {
+            Page::World => things(now).get(app.selected).map(|thing| thing.instance),
+            _ => None,
+        };
+        let ground = Ground::of(now, app.landscape.as_deref());
         let Some(plan) = Plan::fitting(&ground, inner) else { return };
         if app.ability.shades() {
             plan.shaded(&ground, buf)
         } else {
             plan.lettered(app, &ground, buf)
         }
-        plan.marks(app, now, target.map(|(target, _)| target), buf);
+        plan.marks(app, now, inspected.or(target.map(|(target, _)| target)), buf);
     }
+}
+
+/// What the painted values are, and their range.
+fn legend(values: &Landscape) -> String {
+    let far = if values.heights.len() < values.of {
+        format!(" {}/{}", values.heights.len(), values.of)
+    } else {
+        String::new()
+    };
+    let range = values.range().map_or(String::new(), |(low, high)| format!(" {low:.2} to {high:.2}"));
+    format!("{}{range}{far}", values.measure.words())
 }
 
 /// How millimetres become characters. A character is two squares high, one above the other.
@@ -169,6 +194,8 @@ impl Plan {
                     app.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
                     '#'
+                } else if let Some(share) = ground.values.get(&cell) {
+                    char::from_digit((share * 9.0).round() as u32, 10).unwrap_or('9')
                 } else if now.path.contains(&cell) {
                     'o'
                 } else if now.scene.has_cell(cell) {
@@ -230,6 +257,8 @@ struct Piece {
 /// What is where on the floor.
 struct Ground<'a> {
     now: &'a Snapshot,
+    /// The share of each cell's value, where values are painted.
+    values: HashMap<Cell, f32>,
     /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
     furniture: Vec<Piece>,
     /// What the whole plan covers.
@@ -237,7 +266,8 @@ struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    fn of(now: &'a Snapshot) -> Ground<'a> {
+    fn of(now: &'a Snapshot, values: Option<&Landscape>) -> Ground<'a> {
+        let values = values.map_or_else(HashMap::new, Landscape::shares);
         let floor = now.scene.floor();
         let fixtures = (0u16..).zip(&now.scene.fixtures);
         let mut parts: Vec<_> = fixtures
@@ -256,7 +286,7 @@ impl<'a> Ground<'a> {
             min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1])],
             max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1])],
         });
-        Ground { now, furniture, bounds }
+        Ground { now, values, furniture, bounds }
     }
 
     /// The furniture at a point, the highest of it.
@@ -278,6 +308,9 @@ impl<'a> Ground<'a> {
         let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
         if !now.scene.has_cell(cell) {
             return Some(GROUND);
+        }
+        if let Some(&share) = self.values.get(&cell) {
+            return Some(warmth(share));
         }
         if now.path.contains(&cell) {
             return Some(PATH);

@@ -44,7 +44,8 @@ impl Widget for Reach<'_> {
                 Span::styled(name, if chosen == Some(candidate.action()) { THEME.chosen } else { Default::default() }),
             ];
             if usize::from(at) + 1 == page.len() && more {
-                spans.push(Span::styled(format!("  tab {}/{}", app.page + 1, app.pages()), THEME.quiet));
+                spans
+                    .push(Span::styled(format!("  tab {}/{}", app.page_of_interactions + 1, app.pages()), THEME.quiet));
             } else {
                 spans.push(Span::styled(format!("  {:.1} m", candidate.distance / 1000.0), THEME.quiet));
             }

@@ -10,6 +10,8 @@ use super::fit;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
+use crate::tui::verb::Page;
+use crate::tui::worker::Going;
 
 /// The first row.
 pub struct Header<'a>(pub &'a App);
@@ -32,14 +34,16 @@ impl Widget for Header<'_> {
             words.push(format!("seed {}", now.seed));
         }
         words.push(if app.by_hand() {
-            format!("you act ({} advises)", app.policy.name())
+            format!("you act ({} advises)", app.acts())
         } else {
-            format!("{} acts", app.policy.name())
+            format!("{} acts", app.acts())
         });
-        let (state, style) = match (&app.busy, app.running) {
+        let (state, style) = match (&app.busy, app.going) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
-            (None, true) => (format!("running {}", app.pace.name()), THEME.good),
-            (None, false) => (format!("paused ({})", app.pace.name()), THEME.quiet),
+            (None, Some(Going::Policy)) => (format!("running {}", app.pace.name()), THEME.good),
+            (None, Some(Going::Replay)) => (format!("replaying {}", app.pace.name()), THEME.good),
+            (None, None) if app.working.is_some() => (app.working.clone().unwrap_or_default(), THEME.note),
+            (None, None) => (format!("paused ({})", app.pace.name()), THEME.quiet),
         };
         let left = format!("SPRINT  {}", words.join(" · "));
         let room = usize::from(area.width).saturating_sub(state.width() + 2);
@@ -62,11 +66,25 @@ pub struct Status<'a>(pub &'a App);
 impl Widget for Status<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let hints: &[(&str, &str)] = match app.mode {
-            Mode::Watch => {
-                &[("space", "run"), ("n", "step"), ("i", "instruct"), ("m", "take over"), ("?", "keys"), ("q", "quit")]
+        let hints: &[(&str, &str)] = match (app.mode, app.page) {
+            (Mode::Watch, Page::Main) => &[
+                ("space", "run"),
+                ("n", "step"),
+                ("h l", "back, forward"),
+                ("i", "instruct"),
+                ("m", "take over"),
+                ("?", "keys"),
+            ],
+            (Mode::Watch, Page::Branches) => {
+                &[("j k", "select"), ("enter", "go there"), ("R", "name"), ("T", "save as task"), ("esc", "panels")]
             }
-            Mode::Manual => &[
+            (Mode::Watch, Page::Mind) => &[("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")],
+            (Mode::Watch, Page::World) => &[("j k", "select"), ("V", "value map"), ("esc", "panels"), ("?", "keys")],
+            (Mode::Watch, Page::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
+            (Mode::Watch, Page::Chain) => {
+                &[("enter", "new chain"), ("w", "which link breaks"), ("s", "stop"), ("esc", "panels")]
+            }
+            (Mode::Manual, _) => &[
                 ("arrows", "move"),
                 ("1-9", "act"),
                 ("enter", "policy's choice"),
@@ -74,13 +92,16 @@ impl Widget for Status<'_> {
                 ("m", "give back"),
                 ("?", "keys"),
             ],
-            Mode::Typing => &[("enter", "tell the agent"), ("esc", "leave"), ("up", "earlier instructions")],
-            Mode::Help => &[("esc", "close the help")],
+            (Mode::Typing, _) => {
+                &[("enter", "tell the agent"), ("esc", "leave"), ("up", "earlier instructions"), ("tab", "complete")]
+            }
+            (Mode::Palette, _) => &[("enter", "do it"), ("tab", "fill in"), ("up down", "select"), ("esc", "leave")],
+            (Mode::Help, _) => &[("esc", "close the help")],
         };
         let mut spans = Vec::new();
         let mut used = 0;
         for (key, word) in hints {
-            let word = if *key == "space" && app.running { "pause" } else { word };
+            let word = if *key == "space" && app.going.is_some() { "pause" } else { word };
             used += key.width() + word.width() + 3;
             spans.extend([Span::styled(*key, THEME.key), Span::styled(format!(" {word}  "), THEME.quiet)]);
         }

@@ -1,0 +1,74 @@
+//! `sprint verify`: plays a run's episodes again and says whether they come out the same.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Ending, policies};
+use crate::agent::Policy;
+use crate::run::episode::Author;
+use crate::run::verify::{self, Recorded};
+use crate::tui::policies::{Policies, PolicyKind};
+
+/// Which run.
+#[derive(Args)]
+pub struct Verify {
+    /// The run folder
+    run: PathBuf,
+    /// The task file that the run was made from, where the folder does not hold it
+    #[arg(long, value_name = "FILE")]
+    tasks: Option<PathBuf>,
+    /// The checkpoint folder of the run's agent [default: the one of the run's hash among checkpoints/]
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Print the verdict as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Verify {
+    /// Verifies the run; the exit code tells whether it came out the same.
+    ///
+    /// # Errors
+    /// When the run or its tasks cannot be read.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        let run = Recorded::open(&self.run, self.tasks.as_deref())?;
+        let mut policies = Policies::new(policies::agents(self.checkpoint.as_deref()));
+        let mut summon = |author: &Author| -> anyhow::Result<Option<Box<dyn Policy>>> {
+            match author.policy.as_str() {
+                "expert" => Ok(Some(policies.make(PolicyKind::Expert)?.policy)),
+                "random" => Ok(Some(policies.make(PolicyKind::Random)?.policy)),
+                _ => {
+                    for number in 1..=policies.agents().len() {
+                        policies.choose(&number.to_string())?;
+                        let loaded = policies.make(PolicyKind::Agent)?;
+                        if loaded.checkpoint == author.checkpoint {
+                            return Ok(Some(loaded.policy));
+                        }
+                    }
+                    Ok(None)
+                }
+            }
+        };
+        let bar = indicatif::ProgressBar::new(run.episodes.len() as u64);
+        let verdict = verify::verify(&run, &mut summon, &mut |done| bar.set_position(done as u64))?;
+        bar.finish_and_clear();
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&verdict)?)?;
+        } else {
+            let (steps, choices) = (verdict.steps, verdict.choices);
+            writeln!(out, "{} episodes, {steps} steps the same, {choices} of them chosen again", verdict.episodes)?;
+            for policy in &verdict.missing {
+                writeln!(out, "{policy:?} is not at hand: only what its actions came to was compared")?;
+            }
+            for d in &verdict.differences {
+                let (number, task, step, what) = (d.episode, &d.task, d.step, d.what);
+                writeln!(out, "episode {number} ({task}), step {step}: {what} was {}, is {}", d.recorded, d.found)?;
+            }
+            writeln!(out, "{}", if verdict.differences.is_empty() { "equal" } else { "different" })?;
+        }
+        Ok(if verdict.differences.is_empty() { Ending::Ok } else { Ending::SomeFailed })
+    }
+}

@@ -1,0 +1,165 @@
+//! Takes in what the worker says.
+
+use std::sync::Arc;
+
+use super::app::{App, Entry, Tone};
+use super::chained::Chained;
+use super::graphics::classes::{self, Letters};
+use super::update::{Effect, turn_to};
+use super::verb::Page;
+use super::worker::Report;
+use crate::run::rollout::End;
+
+/// Changes the state by what the worker says.
+pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
+    match report {
+        Report::Seen(snapshot) => {
+            let new_episode = app.now.as_ref().is_none_or(|now| now.episode != snapshot.episode);
+            if new_episode {
+                app.letters = Arc::new(Letters::of(&snapshot.scene, &snapshot.world));
+                app.examples.clone_from(&snapshot.examples);
+                app.replaced = None;
+                app.thought = None;
+                app.divergence = None;
+                app.contrast = None;
+                app.landscape = None;
+                app.chain = None;
+                app.chain_before = None;
+                let known = app.now.as_ref().is_some_and(|now| now.instruction == snapshot.instruction);
+                if !known {
+                    app.editor.remember(&snapshot.instruction);
+                }
+            }
+            app.names = Arc::new(classes::names(&snapshot.scene, &snapshot.world));
+            app.trouble = None;
+            app.policy = snapshot.policy;
+            app.page_of_interactions = 0;
+            let before = app.now.replace(snapshot);
+            if let Some(note) = app.now.as_ref().and_then(|now| arrival(before.as_deref(), now, new_episode)) {
+                app.note(Tone::Note, note);
+            }
+            vec![Effect::Encode]
+        }
+        Report::Stepped(event) => {
+            let action = if event.by_hand { format!("{} (you)", event.action) } else { event.action };
+            let tone = if event.outcome.is_done() { Tone::Done } else { Tone::Impossible };
+            let step = Some(event.step);
+            if let Some(forked) = event.forked {
+                let text = format!("branch {forked}");
+                app.write(Entry { step: step.map(|step| step - 1), text, outcome: String::new(), tone: Tone::Note });
+            }
+            app.write(Entry { step, text: action, outcome: event.outcome.to_string(), tone });
+            if let Some(subtask) = event.completed {
+                app.write(Entry { step, text: format!("done: {subtask}"), outcome: String::new(), tone: Tone::Good });
+            }
+            vec![]
+        }
+        Report::Thought(decision, words, values) => {
+            app.thought = Some((decision, words));
+            app.values = values;
+            if app.going.is_some() { vec![] } else { vec![Effect::Encode] }
+        }
+        Report::Going(going) => {
+            app.going = going;
+            vec![Effect::Encode]
+        }
+        Report::Busy(busy) => {
+            app.busy = busy;
+            vec![]
+        }
+        Report::Instructed { old, new, note } => {
+            app.editor.remember(&new);
+            app.note(Tone::Note, format!("told: {new} ({note})"));
+            app.replaced = (old != new).then_some(old);
+            app.thought = None;
+            vec![]
+        }
+        Report::Ended(end) => {
+            let task = app.now.as_ref().and_then(|now| now.progress.as_ref());
+            let (done, of) = task.map_or((0, 0), |task| (task.completed_at.len(), task.subtasks.len()));
+            match end {
+                End::Success => app.note(Tone::Good, format!("success: {done} of {of} subtasks; r resets, N goes on")),
+                End::Timeout => {
+                    app.note(Tone::Bad, format!("out of time: {done} of {of} subtasks; r resets, N goes on"));
+                }
+            }
+            app.thought = None;
+            vec![]
+        }
+        Report::Stopped(why) => {
+            app.note(Tone::Note, format!("stopped: {why}"));
+            vec![]
+        }
+        Report::Diverged(divergence) => {
+            if app.page == Page::Branches {
+                app.divergence = Some(divergence);
+            }
+            vec![]
+        }
+        Report::Compared(contrast) => {
+            app.contrast = Some(*contrast);
+            turn_to(app, Page::Compare)
+        }
+        Report::Surveyed(landscape) => {
+            app.landscape = Some(landscape);
+            vec![]
+        }
+        Report::Chained(chained) => {
+            let of = |chain: &Chained| chain.by_link.as_ref().map(|play| play.acts.clone());
+            let other = app.chain.take().filter(|before| before.links == chained.links && of(before).is_some());
+            if let Some(before) = other
+                && of(&before) != of(&chained)
+                && (of(&chained).is_some() || app.chain_before.is_none())
+            {
+                app.chain_before = Some(before);
+            }
+            if app
+                .chain_before
+                .as_ref()
+                .is_some_and(|before| before.links != chained.links || of(before) == of(&chained))
+            {
+                app.chain_before = None;
+            }
+            app.chain = Some(*chained);
+            vec![]
+        }
+        Report::Working(working) => {
+            app.working = working;
+            vec![]
+        }
+        Report::Noted(text) => {
+            app.note(Tone::Good, text);
+            vec![]
+        }
+        Report::Refused(reason) => {
+            app.note(Tone::Bad, reason);
+            vec![]
+        }
+        Report::Failed(reason) => {
+            app.busy = None;
+            app.note(Tone::Bad, reason.clone());
+            app.trouble = Some(reason);
+            vec![]
+        }
+    }
+}
+
+/// What is worth saying about a new state that was not stepped to.
+fn arrival(
+    before: Option<&super::engine::Snapshot>,
+    now: &super::engine::Snapshot,
+    new_episode: bool,
+) -> Option<String> {
+    let Some(before) = before else { return Some(now.scene.name.clone()) };
+    if new_episode {
+        return Some(now.scene.name.clone());
+    }
+    let name = |snapshot: &super::engine::Snapshot| {
+        snapshot.time.branches.get(snapshot.time.branch).map_or_else(String::new, |branch| branch.name.clone())
+    };
+    let forked = now.time.branches.len() > before.time.branches.len();
+    if before.time.branch != now.time.branch && !forked {
+        return Some(format!("on {}", name(now)));
+    }
+    (now.step < before.step && now.step == 0).then(|| "back at the start".into())
+}

@@ -1,0 +1,151 @@
+//! Why a thing can be acted on now, or cannot: what the inspector says of everything in a house.
+
+use super::engine::Snapshot;
+use crate::domain::world::Parent;
+use crate::domain::{Action, ActionType, Class, Instance};
+use crate::house::{rules, view};
+
+/// A thing, as the inspector shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thing {
+    /// Which.
+    pub instance: Instance,
+    /// Its class.
+    pub class: Class,
+    /// Its state in words: open, on, clean, ...
+    pub state: String,
+    /// What holds it.
+    pub place: String,
+    /// How far away it is, in metres, horizontally.
+    pub metres: f32,
+    /// It is in view.
+    pub seen: bool,
+    /// What could be done to it now.
+    pub possible: Vec<ActionType>,
+    /// For every other interaction that its class knows, why not.
+    pub impossible: Vec<(ActionType, String)>,
+}
+
+impl Thing {
+    /// The verdict in a few words.
+    pub fn verdict(&self) -> String {
+        if !self.possible.is_empty() {
+            return self.possible.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+        }
+        match self.impossible.first() {
+            Some((kind, reason)) => format!("no {kind}: {reason}"),
+            None => "nothing is ever done to it".into(),
+        }
+    }
+}
+
+/// Everything in the house: what can be acted on first, then what is in view, the nearest first.
+pub fn things(now: &Snapshot) -> Vec<Thing> {
+    let fixtures = (0..now.scene.fixtures.len() as u16).map(Instance::Fixture);
+    let objects = (0..now.world.objects.len() as u16).map(Instance::Object);
+    let mut found: Vec<Thing> = fixtures.chain(objects).filter_map(|instance| thing(now, instance)).collect();
+    found.sort_by(|a, b| {
+        let rank = |thing: &Thing| (thing.possible.is_empty(), !thing.seen);
+        rank(a).cmp(&rank(b)).then(a.metres.total_cmp(&b.metres))
+    });
+    found
+}
+
+fn thing(now: &Snapshot, instance: Instance) -> Option<Thing> {
+    let (scene, world) = (&now.scene, &now.world);
+    let class = world.class_of(scene, instance)?;
+    let reachable = view::reachable(scene, world, &now.view, instance);
+    let (mut possible, mut impossible) = (Vec::new(), Vec::new());
+    for kind in ActionType::ALL.into_iter().filter(|kind| applies(*kind, class, now)) {
+        let may = rules::check(scene, world, Action::interact(kind, instance));
+        match may.and(reachable) {
+            Ok(()) if class.in_vocabulary() => possible.push(kind),
+            Ok(()) => impossible.push((kind, "the agent has no word for it".into())),
+            Err(reason) => impossible.push((kind, reason.to_string())),
+        }
+    }
+    Some(Thing {
+        instance,
+        class,
+        state: state(now, instance),
+        place: place(now, instance),
+        metres: view::distance(scene, world, instance).unwrap_or(0.0) / 1000.0,
+        seen: now.view.sighting(instance).is_some(),
+        possible,
+        impossible,
+    })
+}
+
+/// Whether an interaction makes sense for a class, whatever its state. The likeliest reason to ask comes first in the order of
+/// actions.
+fn applies(kind: ActionType, class: Class, now: &Snapshot) -> bool {
+    let info = class.info();
+    match kind {
+        ActionType::Pickup => info.pickupable,
+        ActionType::Put => info.receptacle && now.world.held.is_some(),
+        ActionType::Open | ActionType::Close => info.openable,
+        ActionType::ToggleOn | ActionType::ToggleOff => info.toggleable,
+        ActionType::Slice => info.slices > 0,
+        _ => false,
+    }
+}
+
+/// The state of a thing in words, where it differs from the usual.
+pub fn state(now: &Snapshot, instance: Instance) -> String {
+    let mut words = Vec::new();
+    if now.world.is_open(instance) {
+        words.push("open");
+    }
+    if now.world.is_on(instance) {
+        words.push("on");
+    }
+    if let Instance::Object(index) = instance
+        && let Some(object) = now.world.object(index)
+    {
+        for (is, word) in [
+            (object.slice_of.is_some(), "a slice"),
+            (object.sliced, "cut up"),
+            (object.clean, "clean"),
+            (object.hot, "hot"),
+            (object.cold, "cold"),
+        ] {
+            if is {
+                words.push(word);
+            }
+        }
+    }
+    words.join(", ")
+}
+
+fn place(now: &Snapshot, instance: Instance) -> String {
+    let Instance::Object(index) = instance else { return String::new() };
+    match now.world.object(index).map(|object| object.parent) {
+        Some(Parent::Hand) => "in the hand".into(),
+        Some(Parent::In(container)) => {
+            let class = now.world.class_of(&now.scene, container);
+            class.map_or_else(String::new, |class| format!("on/in {}", class.spoken()))
+        }
+        Some(Parent::Floor) => "on the floor".into(),
+        None => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::testing;
+
+    #[test]
+    fn every_thing_says_what_can_be_done_or_why_not() {
+        let mut engine = testing::engine();
+        let now = engine.snapshot();
+        let things = things(&now);
+        assert_eq!(things.len(), now.scene.fixtures.len() + now.world.objects.len());
+        let could: usize = things.iter().map(|thing| thing.possible.len()).sum();
+        assert_eq!(could, now.candidates.len(), "what is possible here is what is a candidate there");
+        let first_without = things.iter().position(|thing| thing.possible.is_empty()).unwrap();
+        assert!(things[first_without..].iter().all(|thing| thing.possible.is_empty()), "candidates come first");
+        let far = things.iter().find(|thing| !thing.seen && !thing.impossible.is_empty()).unwrap();
+        assert!(far.verdict().contains("not in view") || far.verdict().contains("no "), "{}", far.verdict());
+    }
+}

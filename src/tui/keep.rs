@@ -1,0 +1,101 @@
+//! Keeping what was explored: as a run, as a task, or as something to look at. Each says in a line what it wrote.
+
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use super::engine::Engine;
+use crate::run::{explored, export, folder};
+
+impl Engine {
+    /// Writes every branch as an episode of a run, into `path` or a new folder.
+    ///
+    /// # Errors
+    /// When the folder holds something else, or cannot be written to.
+    pub fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
+        let path = path.unwrap_or_else(|| {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+            folder::default_path("explored", since, &|path| path.exists())
+        });
+        let explored = self.explored();
+        explored::write(&explored, &path)?;
+        let many = explored.episodes.len();
+        let what = if many == 1 { "branch".to_string() } else { format!("{many} branches") };
+        Ok(format!("wrote the {what} as {}; sprint open shows it again", path.display()))
+    }
+
+    /// Adds the present state, instruction and remaining subtasks as a task to a task file.
+    ///
+    /// # Errors
+    /// When nobody grades the instruction, or the file cannot be written.
+    pub fn keep_task(&self, path: &Path) -> anyhow::Result<String> {
+        let (task, scene) = self.as_task()?;
+        let steps = task.expert_steps;
+        let (id, many) = explored::add_task(path, task, &scene)?;
+        Ok(format!("{id} is task {} of {} (expert: {steps} steps)", many - 1, path.display()))
+    }
+
+    /// Writes the branch in hand in the form that the file's ending asks for.
+    ///
+    /// # Errors
+    /// When the ending is unknown, or the file cannot be written.
+    pub fn export(&self, path: &Path) -> anyhow::Result<String> {
+        let size = export::write(&self.recording()?, self.tree().at(), path)?;
+        Ok(format!("wrote {}, {:.1} kB", path.display(), size as f64 / 1000.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::data::taskset;
+    use crate::domain::{Action, ActionType};
+    use crate::run::verify::{Recorded, verify};
+    use crate::tui::policies::PolicyKind;
+    use crate::tui::testing;
+
+    #[test]
+    fn an_exploration_with_forks_is_kept_and_verified_and_its_state_becomes_a_task() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Random).unwrap();
+        for _ in 0..6 {
+            engine.step().unwrap();
+        }
+        engine.seek(3);
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.instruct("dance").unwrap();
+        engine.step().unwrap();
+        let path = folder.path().join("run");
+        assert!(engine.keep(Some(path.clone())).unwrap().contains("2 branches"));
+        assert!(engine.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));
+        let run = Recorded::open(&path, None).unwrap();
+        let mut summon = |_: &crate::run::episode::Author| -> anyhow::Result<Option<Box<dyn crate::agent::Policy>>> {
+            Ok(Some(Box::new(crate::agent::RandomPolicy::new())))
+        };
+        let verdict = verify(&run, &mut summon, &mut |_| ()).unwrap();
+        assert!(verdict.differences.is_empty(), "{verdict:?}");
+        assert_eq!((verdict.episodes, verdict.steps, verdict.choices), (2, 6 + 5, 6 + 4));
+
+        let tasks = folder.path().join("tasks.json");
+        assert!(engine.keep_task(&tasks).unwrap_err().to_string().contains("nobody grades"));
+        engine.switch(0).unwrap();
+        engine.seek(4);
+        engine.keep_task(&tasks).unwrap();
+        assert!(engine.keep_task(&tasks).unwrap().contains("is task 1"));
+        let set = taskset::read(&tasks).unwrap().value;
+        assert_eq!(set.tasks.len(), 2);
+        assert!(set.tasks[0].expert_steps > 0 && set.tasks[0].start.is_some());
+    }
+
+    #[test]
+    fn a_branch_is_exported_by_its_ending() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = testing::engine();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        for name in ["a.gif", "a.strip.png", "a.txt", "a.html", "a.png"] {
+            assert!(engine.export(&folder.path().join(name)).unwrap().contains(name));
+        }
+        let text = std::fs::read_to_string(folder.path().join("a.txt")).unwrap();
+        assert!(text.contains("1  RotateLeft"), "{text}");
+        assert!(engine.export(&folder.path().join("a.mov")).is_err());
+    }
+}

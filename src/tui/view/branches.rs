@@ -1,0 +1,102 @@
+//! The page of branches: the tree of what was tried, and how the selected branch and the one in hand part.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+use super::{fit, panel, put};
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+use crate::tui::timeline::{Divergence, Timeline};
+
+/// The page.
+pub struct Branches<'a>(pub &'a App);
+
+impl Widget for Branches<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let Some(now) = &app.now else { return };
+        let many = now.time.branches.len();
+        let tall = (many as u16 + 2).clamp(4, area.height / 2);
+        let list = Rect { height: tall, ..area };
+        let below = Rect { y: area.y + tall, height: area.height - tall, ..area };
+        self.list(&now.time, list, buf);
+        match &app.divergence {
+            Some(divergence) => side_by_side(divergence, now.time.at, below, buf),
+            None => {
+                let inner = panel(buf, below, "Side by side", "");
+                let hint = match many {
+                    1 => "one branch so far: go back (h) and do something else, and a second one begins",
+                    _ => "select a branch (j k) to see where it parts from the one in hand",
+                };
+                put(buf, inner, 0, hint, THEME.quiet);
+            }
+        }
+    }
+}
+
+impl Branches<'_> {
+    fn list(&self, time: &Timeline, area: Rect, buf: &mut Buffer) {
+        let right = format!("{} in all, * is in hand", time.branches.len());
+        let inner = panel(buf, area, "Branches", &right);
+        let rows = usize::from(inner.height);
+        let first = (self.0.selected + 1).saturating_sub(rows);
+        for (row, (at, branch)) in time.branches.iter().enumerate().skip(first).take(rows).enumerate() {
+            let depth = depth(time, at);
+            let tree = if depth == 0 { String::new() } else { format!("{}└ ", "  ".repeat(depth - 1)) };
+            let mark = if at == time.branch { "*" } else { " " };
+            let from = branch.left.and_then(|(from, step)| Some((&time.branches.get(from)?.name, step)));
+            let from = from.map_or(String::new(), |(name, step)| format!("leaves {name} at {step}"));
+            let width = if inner.width < 100 { 14 } else { 24 };
+            let name = fit(&format!("{tree}{}", branch.name), width);
+            let text = format!(
+                "{mark} {:>2} {name:<width$} {:>4} steps {:>2} done  {from:<16} {}",
+                at + 1,
+                branch.last,
+                branch.completed,
+                branch.why
+            );
+            let style = if at == self.0.selected { THEME.chosen } else { Style::new() };
+            let prefix = if at == self.0.selected { ">" } else { " " };
+            put(buf, inner, row as u16, format!("{prefix}{text}"), style);
+        }
+    }
+}
+
+/// How many branches lie between a branch and the first.
+fn depth(time: &Timeline, branch: usize) -> usize {
+    let from = |&at: &usize| time.branches.get(at)?.left.map(|(from, _)| from);
+    std::iter::successors(Some(branch), from).skip(1).take(8).count()
+}
+
+fn side_by_side(divergence: &Divergence, at: u32, area: Rect, buf: &mut Buffer) {
+    let [one, other] = &divergence.names;
+    if one == other {
+        let inner = panel(buf, area, "Side by side", one);
+        put(buf, inner, 0, "this is the branch in hand; select another one", THEME.quiet);
+        return;
+    }
+    let right = format!("the same until step {}", divergence.shared);
+    let inner = panel(buf, area, "Side by side", &right);
+    let width = usize::from(inner.width.saturating_sub(9)) / 2;
+    put(buf, inner, 0, format!("{:>5}  {:<width$}  {}", "step", fit(one, width), fit(other, width)), THEME.quiet);
+    let rows = usize::from(inner.height).saturating_sub(1);
+    // The step in hand stays in sight.
+    let here = divergence.rows.iter().position(|row| row.step >= at).unwrap_or(divergence.rows.len());
+    let first = here.saturating_sub(rows / 2).min(divergence.rows.len().saturating_sub(rows));
+    for (row, parted) in (1..).zip(divergence.rows.iter().skip(first).take(rows)) {
+        let [left, right] = parted.sides.each_ref().map(|side| fit(side.as_deref().unwrap_or("-"), width));
+        let mark = if parted.step == at { '>' } else { ' ' };
+        let same = parted.sides[0] == parted.sides[1];
+        let style = if same { THEME.quiet } else { Style::new() };
+        let line = Line::from(vec![
+            Span::styled(format!("{mark}{:>4}  ", parted.step), THEME.quiet),
+            Span::styled(format!("{left:<width$}"), style),
+            Span::styled(if parted.same { "= " } else { "  " }, THEME.good),
+            Span::styled(right, style),
+        ]);
+        line.render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
+    }
+}

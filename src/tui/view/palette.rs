@@ -1,0 +1,40 @@
+//! The list of verbs over the screen, while one is typed.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Clear, Padding, Widget};
+
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+use crate::tui::verb::matching;
+
+/// The list, at the foot of an area.
+pub struct Palette<'a>(pub &'a App);
+
+/// Verbs that are listed at a time.
+const ROWS: usize = 12;
+
+impl Widget for Palette<'_> {
+    fn render(self, page: Rect, buf: &mut Buffer) {
+        let found = matching(self.0.palette.text());
+        let rows = found.len().clamp(1, ROWS.min(usize::from(page.height) - 2));
+        let height = rows as u16 + 2;
+        let area = Rect { y: page.bottom() - height, height, width: page.width.min(110), ..page };
+        Clear.render(area, buf);
+        let block = Block::bordered().title(Line::styled(" Verbs ", THEME.title)).padding(Padding::horizontal(1));
+        let inner = block.inner(area);
+        block.render(area, buf);
+        let first = (self.0.selected + 1).saturating_sub(rows);
+        if found.is_empty() {
+            Line::styled("no verb fits", THEME.quiet).render(inner, buf);
+        }
+        for (row, (at, said)) in inner.rows().zip(found.iter().enumerate().skip(first)) {
+            let style = if at == self.0.selected { THEME.chosen } else { Style::new() };
+            let verb = format!("{} {}", said.name, said.arguments);
+            let spans = vec![Span::styled(format!("{verb:<24} "), style), Span::styled(said.doc, THEME.quiet)];
+            Line::from(spans).render(row, buf);
+        }
+    }
+}

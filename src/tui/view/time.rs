@@ -1,0 +1,109 @@
+//! The timeline: every step of the branch in hand in one row, with marks where something happened.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
+
+use super::fit;
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+use crate::tui::timeline::{Beat, Timeline};
+
+/// The row with the timeline.
+pub struct Time<'a>(pub &'a App);
+
+impl Widget for Time<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let Some(now) = &self.0.now else { return };
+        let time = &now.time;
+        let name = time.branches.get(time.branch).map_or("", |branch| branch.name.as_str());
+        let others = match time.branches.len() {
+            0 | 1 => String::new(),
+            many => format!(" {many} branches"),
+        };
+        let title = "Time ";
+        let place = format!("{} {}/{} ", fit(name, usize::from(area.width) / 6), time.at, time.beats.len());
+        let room = usize::from(area.width).saturating_sub(title.width() + place.width() + others.width() + 1);
+        let mut spans = vec![Span::styled(title, THEME.title), Span::raw(place)];
+        spans.extend(strip(time, room).into_iter().map(|(symbol, style)| Span::styled(symbol.to_string(), style)));
+        Line::from(spans).render(area, buf);
+        let left = area.right().saturating_sub(others.width() as u16);
+        buf.set_string(left, area.y, others, THEME.quiet);
+    }
+}
+
+/// A character for each step, the start first; several steps share one where there is no room.
+fn strip(time: &Timeline, room: usize) -> Vec<(char, Style)> {
+    let places = time.beats.len() + 1;
+    let columns = places.min(room.max(1));
+    let column = |step: usize| step * columns / places;
+    let mut cells: Vec<(u8, char, Style)> = vec![(0, ' ', Style::new()); columns];
+    let mut put = |step: usize, rank: u8, symbol: char, style: Style| {
+        let cell = &mut cells[column(step)];
+        if rank >= cell.0 {
+            *cell = (rank, symbol, style);
+        }
+    };
+    put(0, 2, if time.forks_at_start { '┬' } else { '|' }, THEME.quiet);
+    for (step, beat) in (1..).zip(&time.beats) {
+        let future = step as u32 > time.at;
+        let (rank, symbol, style) = mark(beat);
+        put(step, rank, symbol, if future && rank < 6 { THEME.quiet } else { style });
+    }
+    put(time.at as usize, 9, '●', THEME.chosen);
+    cells.into_iter().map(|(_, symbol, style)| (symbol, style)).collect()
+}
+
+/// What a step looks like, and how much it matters where several share a character.
+fn mark(beat: &Beat) -> (u8, char, Style) {
+    match beat {
+        Beat { completed: Some(number), .. } => (7, char::from_digit(*number % 10, 10).unwrap_or('*'), THEME.good),
+        Beat { done: false, .. } => (5, '×', THEME.bad),
+        Beat { told: true, .. } => (6, 'i', THEME.note),
+        Beat { forks: true, .. } => (4, '┬', THEME.note),
+        Beat { by_hand: true, .. } => (3, '○', Style::new()),
+        Beat { .. } => (1, '·', Style::new()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::ActionType;
+
+    fn beat() -> Beat {
+        Beat {
+            kind: ActionType::MoveAhead,
+            done: true,
+            completed: None,
+            by_hand: false,
+            told: false,
+            forks: false,
+            entropy: None,
+            chosen: None,
+            value: None,
+            q: None,
+        }
+    }
+
+    fn check(room: usize, expected: &str) {
+        let mut beats = vec![beat(); 12];
+        beats[1].completed = Some(1);
+        beats[4].done = false;
+        beats[6].forks = true;
+        beats[8].by_hand = true;
+        let time = Timeline { at: 5, beats, ..Timeline::default() };
+        let text: String = strip(&time, room).into_iter().map(|(symbol, _)| symbol).collect();
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn every_step_has_its_mark_and_crowded_ones_give_way_to_what_matters() {
+        check(40, "|·1··●·┬·○···");
+        check(6, "1·●┬○·");
+        check(1, "●");
+    }
+}

@@ -1,0 +1,81 @@
+//! The page of the world: the floor plan, and an inspector that says of each thing what can be done to it and why not.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+
+use super::{fit, map, panel, put};
+use crate::tui::app::App;
+use crate::tui::inspect::{Thing, things};
+use crate::tui::theme::THEME;
+
+/// The page.
+pub struct World<'a>(pub &'a App);
+
+/// Rows that the details of the selected thing take.
+const DETAILS: u16 = 7;
+
+impl Widget for World<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let app = self.0;
+        let Some(now) = &app.now else { return };
+        let width = (area.width * 45 / 100).min(2 * area.height + 10);
+        map::Map(app).render(Rect { width, ..area }, buf);
+        let right = Rect { x: area.x + width + 2, width: area.width - width - 2, ..area };
+        let things = things(now);
+        let list = Rect { height: right.height - DETAILS, ..right };
+        self.list(&things, list, buf);
+        if let Some(thing) = things.get(app.selected) {
+            details(thing, Rect { y: list.bottom(), height: DETAILS, ..right }, buf);
+        }
+    }
+}
+
+impl World<'_> {
+    fn list(&self, things: &[Thing], area: Rect, buf: &mut Buffer) {
+        let could = things.iter().filter(|thing| !thing.possible.is_empty()).count();
+        let seen = things.iter().filter(|thing| thing.seen).count();
+        let right = format!("{could} to act on, {seen} in view, {} in all", things.len());
+        let inner = panel(buf, area, "Things", &right);
+        let rows = usize::from(inner.height);
+        let first = (self.0.selected + 1).saturating_sub(rows);
+        let room = usize::from(inner.width).saturating_sub(24);
+        for (row, (at, thing)) in inner.rows().zip(things.iter().enumerate().skip(first)) {
+            let selected = at == self.0.selected;
+            let style = match (selected, thing.possible.is_empty(), thing.seen) {
+                (true, ..) => THEME.chosen,
+                (false, false, _) => THEME.key,
+                (false, true, true) => Style::new(),
+                (false, true, false) => THEME.quiet,
+            };
+            let verdict = match (thing.possible.is_empty(), thing.seen) {
+                (true, false) => "not in view".into(),
+                _ => thing.verdict(),
+            };
+            Line::from(vec![
+                Span::styled(
+                    format!("{} {:<14}", if selected { ">" } else { " " }, fit(thing.class.spoken(), 14)),
+                    style,
+                ),
+                Span::styled(format!("{:>5.1} m ", thing.metres), THEME.quiet),
+                Span::styled(fit(&verdict, room), if thing.possible.is_empty() { THEME.quiet } else { THEME.good }),
+            ])
+            .render(row, buf);
+        }
+    }
+}
+
+fn details(thing: &Thing, area: Rect, buf: &mut Buffer) {
+    let seen = if thing.seen { "in view" } else { "not in view" };
+    let inner = panel(buf, area, thing.class.spoken(), &format!("{:.2} m, {seen}", thing.metres));
+    let mut words = [thing.place.as_str(), thing.state.as_str()].join(", ");
+    words = words.trim_matches([',', ' ']).to_string();
+    put(buf, inner, 0, words, Style::new());
+    let possible = thing.possible.iter().map(|kind| (kind, "possible now".to_string(), THEME.good));
+    let impossible = thing.impossible.iter().map(|(kind, reason)| (kind, reason.clone(), THEME.quiet));
+    for (row, (kind, text, style)) in (1..).zip(possible.chain(impossible)) {
+        put(buf, inner, row, format!("{:<10} {text}", kind.name()), style);
+    }
+}
