@@ -137,6 +137,48 @@ mod tests {
         assert!(loss(0.9) < loss(0.88) && loss(0.9) < loss(0.92));
     }
 
+    /// Two states: action 0 leads from state 0 to state 1 and from there to the end, action 1 back to state 0. Each is as frequent.
+    /// All is learned by tables, with every equation of this file, from zero.
+    #[test]
+    fn a_chain_of_two_states_is_learned_to_a_hundredth() {
+        const DISCOUNT: f64 = 0.9;
+        const EXPECTILE: f64 = 0.9;
+        const TEMPERATURE: f64 = 3.0;
+        let store = nn::VarStore::new(Device::Cpu);
+        let [q, logits] = ["q", "logits"].map(|name| store.root().zeros(name, &[4]));
+        let value = store.root().zeros("value", &[2]);
+        let [state, next, other] = [[0i64, 0, 1, 1], [1, 0, 0, 0], [1, 0, 3, 2]].map(|rows| Tensor::from_slice(&rows));
+        let terminal = tensor(&[0.0, 0.0, 1.0, 0.0]);
+        let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 0.5).unwrap();
+        for _ in 0..600 {
+            let here = value.index_select(0, &state);
+            let target = q_target(&terminal, &terminal, &value.index_select(0, &next), DISCOUNT);
+            let weights = advantage_weights(&q, &here, TEMPERATURE, 100.0);
+            // Of two actions, the logarithm of one's share.
+            let share = (&logits - logits.index_select(0, &other)).log_sigmoid();
+            let loss = q_loss(&q, &target) + value_loss(&here, &q, EXPECTILE) - weights * share * 0.5;
+            optimiser.backward_step(&loss.sum(Kind::Float));
+        }
+        // The right answers: of two numbers a > b the expectile is τ a + (1 − τ) b.
+        let (mut v, mut right) = ([0.0f64; 2], [0.0f64; 4]);
+        for _ in 0..1000 {
+            right = [DISCOUNT * v[1], DISCOUNT * v[0], 1.0, DISCOUNT * v[0]];
+            v = [0, 2].map(|i| {
+                let (high, low) = (right[i].max(right[i + 1]), right[i].min(right[i + 1]));
+                EXPECTILE * high + (1.0 - EXPECTILE) * low
+            });
+        }
+        let weight = |i: usize| (TEMPERATURE * (right[i] - v[i / 2])).exp();
+        let policy = [0, 1, 2, 3].map(|i: usize| weight(i) / (weight(i) + weight(i ^ 1)));
+        let near = |found: Tensor, right: &[f64]| {
+            let found = Vec::<f64>::try_from(found.detach().to_kind(Kind::Double)).unwrap();
+            assert!(found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-2), "{found:?} is not {right:?}");
+        };
+        near(q.shallow_clone(), &right);
+        near(value.shallow_clone(), &v);
+        near((&logits - logits.index_select(0, &other)).sigmoid(), &policy);
+    }
+
     #[test]
     fn a_target_follows_by_its_rate_and_copies_statistics() {
         let [online, target] = [2.0, 1.0].map(|value| {
