@@ -363,9 +363,7 @@ mod tests {
         };
         let out = tempfile::tempdir().unwrap();
         let options = crate::data::alfred::Options::default();
-        let began = std::time::Instant::now();
         let summary = crate::data::alfred::import(&source, out.path(), &options, &|_| {}).unwrap();
-        assert!(began.elapsed().as_secs() < 60, "the import took {:?}", began.elapsed());
         assert_eq!(summary.manifest.skipped, []);
         let train = summary.manifest.counts["train"];
         assert_eq!((train.trajectories, train.annotated_primitives, train.aligned_primitives), (6574, 73395, 73248));
