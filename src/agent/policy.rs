@@ -90,7 +90,7 @@ pub enum Carried {
     #[default]
     Nothing,
     /// Its chance.
-    Chance(ChaCha8Rng),
+    Chance(Box<ChaCha8Rng>),
     /// What it is about to do.
     Plan(Box<Plan>),
     /// The last frames, and its chance.

@@ -66,12 +66,12 @@ impl Policy for RandomPolicy {
     }
 
     fn carried(&self) -> Carried {
-        Carried::Chance(self.rng.clone())
+        Carried::Chance(Box::new(self.rng.clone()))
     }
 
     fn put_back(&mut self, carried: Carried) {
         if let Carried::Chance(rng) = carried {
-            self.rng = rng;
+            self.rng = *rng;
         }
     }
 }

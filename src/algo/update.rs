@@ -564,7 +564,7 @@ mod tests {
         let mut base = transitions(&CHAIN_OF_TWO);
         update.update(&Batch { base: transitions(&CHAIN_OF_TWO), pairs: None }, false).unwrap();
         let before: Tensors = update.state().into_iter().map(|(name, tensor)| (name, tensor.copy())).collect();
-        base.terminal = base.terminal * f64::NAN;
+        base.terminal *= f64::NAN;
         let error = update.update(&Batch { base, pairs: None }, false).unwrap_err();
         assert_eq!((error.step, error.term.as_str()), (2, "q_loss"));
         let statistics = |name: &str| name.ends_with("running_mean") || name.ends_with("running_var");

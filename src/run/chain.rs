@@ -135,14 +135,14 @@ impl Chain {
             in_force: Vec::new(),
         };
         let all: u32 = limits.iter().sum();
-        for link in 0..self.links.len() {
+        for (link, &limit) in limits.iter().enumerate() {
             let entry = rollout.house.world().clone();
             let begun = rollout.steps();
             rollout.instruction = told(link);
             let mut done = self.graded.is_some().then_some(false);
             let spent = |rollout: &Rollout| match whole {
                 true => rollout.steps() >= all,
-                false => rollout.steps() - begun >= limits[link],
+                false => rollout.steps() - begun >= limit,
             };
             let failed = play.outcomes.last().is_some_and(|before: &Outcome| before.done == Some(false));
             while !failed && !spent(&rollout) && !stop.load(Ordering::Relaxed) {

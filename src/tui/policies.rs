@@ -104,7 +104,7 @@ impl Policies {
                 ),
             },
             PolicyKind::Expert => plain(Box::new(ExpertPolicy::new())),
-            PolicyKind::Random => plain(Box::new(RandomPolicy::new())),
+            PolicyKind::Random => plain(Box::<RandomPolicy>::default()),
         }
     }
 }

@@ -67,11 +67,11 @@ pub fn build(
     // Basins are let into counters: where they are is known only now.
     let basins = fixtures.iter().filter(|fixture| matches!(fixture.class.name(), "Sink" | "Bathtub"));
     let basins: Vec<Rect> = basins.flat_map(|basin| &basin.body).map(Cuboid::footprint).collect();
-    for number in 0..fixtures.len() {
-        let slab = furniture::of(fixtures[number].class).build == Build::Slab;
-        let shared = |basin: &Rect| fixtures[number].body.iter().any(|part| overlap(&part.footprint(), basin));
+    for (number, made) in fixtures.iter_mut().enumerate() {
+        let slab = furniture::of(made.class).build == Build::Slab;
+        let shared = |basin: &Rect| made.body.iter().any(|part| overlap(&part.footprint(), basin));
         if slab && basins.iter().any(shared) {
-            fixtures[number] = fixture(number, &basins);
+            *made = fixture(number, &basins);
         }
     }
     let mut walls = walls::around(&cells, &fixtures, floor);

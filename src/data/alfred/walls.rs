@@ -56,7 +56,7 @@ pub fn under_counters(fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
             let min = Point::new(ground.min[0], floor, ground.min[1]);
             Cuboid { min, max: Point::new(ground.max[0], slab.min.y, ground.max[1]) }
         };
-        let mut pieces: Vec<Cuboid> = counter.body.iter().map(below).filter(|piece| thick(piece)).collect();
+        let mut pieces: Vec<Cuboid> = counter.body.iter().map(below).filter(thick).collect();
         for (_, other) in fixtures.iter().enumerate().filter(|(other, _)| *other != number) {
             let (dx, dz) = other.facing.step();
             for part in &other.body {

@@ -24,7 +24,7 @@ pub fn encode(rgb: &[u8], from_width: usize, from_height: usize, width: usize, h
     let mut sequence = String::with_capacity(width * height / 4 + 8192);
     // Aspect 1:1, and what is not drawn stays as it is.
     let _ = write!(sequence, "\x1bP0;1;0q\"1;1;{width};{height}");
-    let indices: Vec<u8> = rgb.chunks_exact(3).map(|pixel| nearest(pixel)).collect();
+    let indices: Vec<u8> = rgb.chunks_exact(3).map(nearest).collect();
     let columns: Vec<usize> = (0..width).map(|x| x * from_width / width.max(1)).collect();
     let mut defined = [false; COLOURS];
     let mut band: Vec<Vec<u8>> = vec![Vec::new(); COLOURS];

@@ -18,6 +18,9 @@ use crate::tui::timeline::Beat;
 /// The page.
 pub struct Thoughts<'a>(pub &'a App);
 
+/// A number of a step, where there is one.
+type Curve<'a> = &'a dyn Fn(&Beat) -> Option<f32>;
+
 /// Rows of the curves under the table: a title and a line each.
 const CURVES: u16 = 6;
 
@@ -124,8 +127,7 @@ fn curves(now: &Snapshot, area: Rect, buf: &mut Buffer) {
     let chosen = |beat: &Beat| beat.chosen;
     let value = |beat: &Beat| beat.value;
     let q = |beat: &Beat| beat.q;
-    let rows: [(&str, &dyn Fn(&Beat) -> Option<f32>); 4] =
-        [("V", &value), ("Q chosen", &q), ("p chosen", &chosen), ("entropy", &entropy)];
+    let rows: [(&str, Curve<'_>); 4] = [("V", &value), ("Q chosen", &q), ("p chosen", &chosen), ("entropy", &entropy)];
     for (row, (name, of)) in (0..).zip(rows) {
         let place = Rect { y: inner.y + row, height: 1, ..inner };
         if row < 2 && !has_values {
@@ -155,7 +157,7 @@ fn column(step: usize, steps: usize, room: usize) -> usize {
     if steps <= room { step } else { step * room / steps.max(1) }
 }
 
-fn spark(name: &str, beats: &[Beat], at: u32, of: &dyn Fn(&Beat) -> Option<f32>, area: Rect, buf: &mut Buffer) {
+fn spark(name: &str, beats: &[Beat], at: u32, of: Curve<'_>, area: Rect, buf: &mut Buffer) {
     const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let found: Vec<f32> = beats.iter().filter_map(of).collect();
     let (low, high) = found.iter().fold((f32::MAX, f32::MIN), |(low, high), &x| (low.min(x), high.max(x)));
