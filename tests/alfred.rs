@@ -7,7 +7,7 @@ use std::process::Command;
 use rayon::prelude::*;
 use sprint_explorer::data::alfred::import::parse_recording;
 use sprint_explorer::data::alfred::tasks;
-use sprint_explorer::data::items::{Composites, Items, Selection, Source, Span};
+use sprint_explorer::data::items::{Composites, Items, Label, Selection, Source, Span};
 use sprint_explorer::data::summaries::Summaries;
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Action, ActionType, SkillKind, Subtask, Trajectory, World};
@@ -75,9 +75,12 @@ fn the_train_split_has_as_many_spans_as_are_known_of_it() {
     let held_out: Vec<String> = chain.iter().map(|entry| entry.trajectory().to_owned()).collect();
     assert_eq!(held_out.len(), 20);
     let summaries = Summaries::default();
+    let label = Some(Label { action: 0, object: 0 });
+    let of_one = |one: &Trajectory| std::iter::repeat_n(label, one.actions.len()).chain([None]).collect::<Vec<_>>();
+    let labels: Vec<Option<Label>> = trajectories.iter().flat_map(of_one).collect();
     let items = |held_out: &[String]| {
         let source = Source { trajectories: &trajectories, held_out, summaries: &summaries };
-        Items::of(&source, Vec::new(), &Selection::of(Composites::Concat), 0).unwrap()
+        Items::of(&source, labels.clone(), &Selection::of(Composites::Concat), 0).unwrap()
     };
     let (all, without) = (items(&[]), items(&held_out));
     let count = |items: &Items, primitive| items.training.iter().filter(|s| s.is_primitive() == primitive).count();
@@ -106,7 +109,7 @@ fn the_train_split_has_as_many_spans_as_are_known_of_it() {
     assert_eq!(times(|skills| skills * (skills - 1) / 2), 111_339);
 
     // Drawn uniformly, two fifths are primitives.
-    let drawn = Items::draw(&without.training, 3, 0, 1000);
+    let drawn = without.draw(&without.training, 3, 0, 1000);
     assert!(drawn.iter().all(|item| item.first <= item.frame && item.frame < item.end));
     let share = count(&without, true) as f64 / without.training.len() as f64;
     assert!((0.39..0.41).contains(&share), "{share}");

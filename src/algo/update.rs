@@ -490,12 +490,13 @@ mod tests {
     }
 
     #[test]
-    fn small_networks_come_near_the_right_answers_of_a_chain_of_two_states() {
+    fn small_networks_learn_the_right_answers_of_a_chain_of_two_states_to_a_hundredth() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();
-        let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(8).collect();
+        // Many rows: over few, the running variance of a batch norm is larger than the batch's own by n / (n - 1).
+        let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(64).collect();
         let batch = Batch { base: transitions(&rows), pairs: None };
-        let mut update = update(&nets, 500, None);
+        let mut update = update(&nets, 800, None);
         while !update.is_done() {
             update.update(&batch, false).unwrap();
         }
@@ -508,7 +509,7 @@ mod tests {
         for (row, (state, action)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
             let row = row as i64;
             let check = |name: &str, found: f64, right: f64| {
-                assert!((found - right).abs() < 0.1, "{name} of {state}, {action}: {found}, not {right}");
+                assert!((found - right).abs() < 0.01, "{name} of {state}, {action}: {found}, not {right}");
             };
             check("Q", found.double_value(&[row]), q[state][action]);
             check("V", values.double_value(&[row]), v[state]);

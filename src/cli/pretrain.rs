@@ -18,6 +18,7 @@ use crate::run::appraise::appraise;
 use crate::run::card::card;
 use crate::run::presets::Preset;
 use crate::run::pretrain::{Pretraining, Trained};
+use crate::run::trials::Trials;
 
 /// Trains an agent.
 #[derive(Args)]
@@ -50,6 +51,15 @@ pub struct Pretrain {
     /// Steps of the policy's training, instead of the preset's
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Let the agent play these tasks while it trains: not those it will be judged by
+    #[arg(long, value_name = "FILE")]
+    trials: Option<PathBuf>,
+    /// Steps between two trials
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "trials", value_parser = clap::value_parser!(u64).range(1..))]
+    trials_every: u64,
+    /// Only the first N tasks of the trials
+    #[arg(long, value_name = "N", requires = "trials")]
+    trials_limit: Option<usize>,
     /// A sentence encoder's folder [default: all-MiniLM-L6-v2, which `make setup` fetched]
     #[arg(long, value_name = "DIR")]
     encoder: Option<PathBuf>,
@@ -79,6 +89,7 @@ impl Pretrain {
             resume: self.resume,
             visual_from: self.visual_from,
             policy_from: self.policy_from,
+            trials: self.trials.map(|tasks| Trials { tasks, limit: self.trials_limit, every: self.trials_every }),
             sentences: sentences.clone(),
             sentence_encoder: name(&folder),
             device,

@@ -92,7 +92,7 @@ impl Span {
 /// Every item of a dataset. Frames are numbered through: each trajectory has one more than it has actions.
 #[derive(Clone, Debug, Default)]
 pub struct Items {
-    /// One label a frame; the last frame of a trajectory has none.
+    /// One label a frame; the last frame of a trajectory has none, nor has one from which nothing can be learned.
     pub labels: Vec<Option<Label>>,
     /// Distinct texts, normalised.
     pub texts: Vec<String>,
@@ -119,8 +119,8 @@ pub struct Item {
 
 impl Items {
     /// All primitives, and the composites that are selected, once for each aligned annotation. Held out are every `hold_out`th
-    /// trajectory and the splits other than `train`; dropped are the wholes that [`Source::held_out`] names. `labels` are those
-    /// of all frames.
+    /// trajectory and the splits other than `train`; dropped are the wholes that [`Source::held_out`] names, and spans in which
+    /// nothing has a label. `labels` are those of all frames.
     ///
     /// # Errors
     /// When composites should have labels and one has none.
@@ -140,7 +140,8 @@ impl Items {
                     let (from, to) =
                         (trajectory.skill_range(skills.start).start, trajectory.skill_range(skills.end - 1).end);
                     let text = normalise(&text);
-                    if from >= to || text.is_empty() {
+                    let frames = first as usize + from..first as usize + to;
+                    if text.is_empty() || !frames.clone().any(|frame| items.is_labelled(frame)) {
                         continue;
                     }
                     let text = *numbers.entry(text).or_insert_with_key(|text| {
@@ -151,8 +152,8 @@ impl Items {
                         trajectory: position as u32,
                         skills: skills.start as u8..skills.end as u8,
                         first,
-                        start: first + from as u32,
-                        end: first + to as u32,
+                        start: frames.start as u32,
+                        end: frames.end as u32,
                         text,
                     };
                     if held_out { &mut items.held_out } else { &mut items.training }.push(span);
@@ -164,17 +165,27 @@ impl Items {
         Ok(items)
     }
 
-    /// A batch of items: spans uniformly, then a step uniformly. A function of seed and step alone, so that a resumed training
-    /// draws what the uninterrupted one would have.
-    pub fn draw(spans: &[Span], seed: u64, step: u64, batch: usize) -> Vec<Item> {
+    /// A batch of items: spans uniformly, then a labelled step uniformly. A function of seed and step alone, so that a resumed
+    /// training draws what the uninterrupted one would have.
+    pub fn draw(&self, spans: &[Span], seed: u64, step: u64, batch: usize) -> Vec<Item> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(step + 1);
-        let draw = |_| {
-            let span = &spans[rng.random_range(0..spans.len())];
-            let frame = rng.random_range(span.start..span.end);
-            Item { first: span.first, frame, end: span.end, text: span.text }
-        };
+        let draw = |_| self.step_of(&spans[rng.random_range(0..spans.len())], &mut rng);
         if spans.is_empty() { Vec::new() } else { (0..batch).map(draw).collect() }
+    }
+
+    /// A labelled step of a span of these items, uniformly: there is one in each.
+    pub fn step_of(&self, span: &Span, rng: &mut ChaCha8Rng) -> Item {
+        loop {
+            let frame = rng.random_range(span.start..span.end);
+            if self.is_labelled(frame as usize) {
+                return Item { first: span.first, frame, end: span.end, text: span.text };
+            }
+        }
+    }
+
+    fn is_labelled(&self, frame: usize) -> bool {
+        self.labels.get(frame).is_some_and(Option::is_some)
     }
 
     /// All frames of the trajectory that an item lies in.
@@ -279,7 +290,15 @@ mod tests {
     fn items(trajectories: &[Trajectory], composites: Composites, hold_out: usize, held_out: &[String]) -> Items {
         let summaries = Summaries::default();
         let source = Source { trajectories, held_out, summaries: &summaries };
-        Items::of(&source, Vec::new(), &Selection::of(composites), hold_out).unwrap()
+        Items::of(&source, labels(trajectories), &Selection::of(composites), hold_out).unwrap()
+    }
+
+    fn labels(trajectories: &[Trajectory]) -> Vec<Option<Label>> {
+        let of = |trajectory: &Trajectory| {
+            let label = Some(Label { action: 0, object: 0 });
+            std::iter::repeat_n(label, trajectory.actions.len()).chain([None])
+        };
+        trajectories.iter().flat_map(of).collect()
     }
 
     fn edges(items: &Items) -> Vec<(u32, u32, u32)> {
@@ -311,7 +330,9 @@ mod tests {
     fn a_span_without_its_label_is_an_error_that_says_what_to_do() {
         let summaries = Summaries::default();
         let source = Source { trajectories: &[trajectory(vec![0, 2], 5)], held_out: &[], summaries: &summaries };
-        let error = Items::of(&source, Vec::new(), &Selection::of(Composites::Labels), 0).unwrap_err().to_string();
+        let error = Items::of(&source, labels(source.trajectories), &Selection::of(Composites::Labels), 0)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("skills 0..2") && error.contains("sprint relabel"), "{error}");
     }
 
@@ -328,10 +349,26 @@ mod tests {
         seen.split = "valid_seen".into();
         let items = items(&[trajectory(vec![0], 4), trajectory(vec![0], 4), seen], Composites::None, 2, &[]);
         assert_eq!((items.training.len(), items.held_out.len()), (1, 2));
-        let draw = |step| Items::draw(&items.training, 7, step, 20);
+        let draw = |step| items.draw(&items.training, 7, step, 20);
         assert_eq!(draw(3), draw(3));
         assert_ne!(draw(3), draw(4));
         assert!(draw(3).iter().all(|item| item.frame < 4 && item.is_last() == (item.frame == 3)));
+    }
+
+    #[test]
+    fn a_step_without_a_label_is_never_drawn_and_a_span_of_them_is_left_out() {
+        let one = [trajectory(vec![0, 2], 5)];
+        let mut labels = labels(&one);
+        labels[..2].fill(None);
+        labels[3] = None;
+        let summaries = Summaries::default();
+        let source = Source { trajectories: &one, held_out: &[], summaries: &summaries };
+        let items = Items::of(&source, labels, &Selection::of(Composites::Whole), 0).unwrap();
+        assert_eq!(edges(&items), [(0, 2, 5), (0, 0, 5)]);
+        let mut frames: Vec<u32> = items.draw(&items.training, 1, 0, 50).iter().map(|item| item.frame).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        assert_eq!(frames, [2, 4]);
     }
 
     #[test]

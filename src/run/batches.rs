@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::material::{Material, Told};
 use crate::algo::chain::{Chaining, Pairs as Source};
 use crate::algo::update::{Batch, Pairs, Transitions};
-use crate::data::items::{Item, Items, Span};
+use crate::data::items::{Item, Span};
 use crate::nets::visual::SIDE;
 
 /// Keeps the stream of random numbers of chaining apart from that of the items.
@@ -54,7 +54,7 @@ impl<'a> Batches<'a> {
 
     /// Items of some spans, each told its own text or goal.
     fn draw(&self, spans: &[Span], step: u64, size: usize) -> Vec<Item> {
-        let mut items = Items::draw(spans, self.seed, step, size);
+        let mut items = self.material.items.draw(spans, self.seed, step, size);
         if let Told::Goals = self.material.told {
             let mut rng = self.chance(GOALS, step);
             for item in &mut items {
@@ -92,7 +92,7 @@ impl<'a> Batches<'a> {
         let (first, second, joint) = match (chaining.pairs, &self.material.pool) {
             (Source::Pool(_), Some(pool)) => {
                 let drawn: Vec<usize> = (0..chaining.batch).map(|_| rng.random_range(0..pool.pairs.len())).collect();
-                let mut of = |text: u32| pool.item(&self.material.items.training, text, &mut rng);
+                let mut of = |text: u32| pool.item(self.material.items, text, &mut rng);
                 let first: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].0)).collect();
                 let second: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].1)).collect();
                 (first, second, pool.joint.rows(drawn.into_iter(), self.device)?)

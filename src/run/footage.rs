@@ -127,12 +127,15 @@ impl Footage {
         self.labelled(Trajectory::choice)
     }
 
-    /// What was done in every frame and led to the next one: other than [`Footage::labels`] where chance disturbed the expert.
+    /// What the expert did and what led to the next frame: nothing where chance or a learner acted in its place, since that is
+    /// no demonstration, and what the expert would have done led nowhere.
     ///
     /// # Errors
     /// Never for a footage that was opened.
-    pub fn taken(&self) -> anyhow::Result<Vec<Option<Label>>> {
-        self.labelled(|trajectory, step| trajectory.actions.get(step).copied())
+    pub fn transitions(&self) -> anyhow::Result<Vec<Option<Label>>> {
+        self.labelled(|trajectory, step| {
+            trajectory.actions.get(step).copied().filter(|&taken| trajectory.choice(step) == Some(taken))
+        })
     }
 
     fn labelled(
@@ -172,14 +175,16 @@ mod tests {
     use crate::run::visual_training::testing::footage;
 
     #[test]
-    fn what_was_done_and_what_the_expert_would_have_done_are_told_apart() {
+    fn what_the_expert_only_would_have_done_is_a_label_and_no_transition() {
         let mut footage = footage();
-        footage.trajectories[0].choices = vec![Action::navigate(ActionType::MoveAhead); 4];
+        let mut choices = footage.trajectories[0].actions.clone();
+        choices[1..3].fill(Action::navigate(ActionType::MoveAhead));
+        footage.trajectories[0].choices = choices;
         let kinds = |labels: Vec<Option<super::Label>>| -> Vec<Option<usize>> {
             labels[..5].iter().map(|label| label.map(|label| usize::from(label.action))).collect()
         };
-        let four = |kind: ActionType| [[Some(kind.index()); 4].as_slice(), &[None]].concat();
-        assert_eq!(kinds(footage.labels().unwrap()), four(ActionType::MoveAhead));
-        assert_eq!(kinds(footage.taken().unwrap()), four(ActionType::RotateLeft));
+        let [left, ahead] = [ActionType::RotateLeft, ActionType::MoveAhead].map(|kind| Some(kind.index()));
+        assert_eq!(kinds(footage.labels().unwrap()), [left, ahead, ahead, left, None]);
+        assert_eq!(kinds(footage.transitions().unwrap()), [left, None, None, left, None]);
     }
 }

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
 use crate::data::features::Features;
-use crate::data::items::{Item, Items, Span};
+use crate::data::items::{Item, Items};
 
 /// Embeds texts.
 pub type Embed<'a> = dyn Fn(&[&str]) -> anyhow::Result<Tensor> + Sync + 'a;
@@ -150,7 +150,7 @@ pub struct Pool {
 impl Pool {
     /// So many pairs, texts as often as items bear them; drawn by the seed alone.
     pub fn draw(items: &Items, seed: u64, count: usize) -> Vec<(u32, u32)> {
-        let drawn = Items::draw(&items.training, seed, u64::MAX / 3, 2 * count);
+        let drawn = items.draw(&items.training, seed, u64::MAX / 3, 2 * count);
         drawn.chunks_exact(2).map(|pair| (pair[0].text, pair[1].text)).collect()
     }
 
@@ -168,10 +168,9 @@ impl Pool {
     }
 
     /// An item of a span that bears `text`.
-    pub fn item(&self, spans: &[Span], text: u32, rng: &mut ChaCha8Rng) -> Item {
+    pub fn item(&self, items: &Items, text: u32, rng: &mut ChaCha8Rng) -> Item {
         let bearers = &self.bearers[&text];
-        let span = &spans[bearers[rng.random_range(0..bearers.len())] as usize];
-        Item { first: span.first, frame: rng.random_range(span.start..span.end), end: span.end, text }
+        items.step_of(&items.training[bearers[rng.random_range(0..bearers.len())] as usize], rng)
     }
 }
 

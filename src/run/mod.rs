@@ -46,6 +46,7 @@ pub mod taskcheck;
 pub mod tasks;
 pub mod threshold;
 pub mod trainer;
+pub mod trials;
 pub mod verify;
 pub mod visual_training;
 pub mod wording;

@@ -15,6 +15,7 @@ use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
 use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
 use super::trainer::Trainer;
+use super::trials::{self, Trials};
 use super::visual_training;
 use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceSpec};
 use crate::agent::learned::SharedEmbedder;
@@ -40,6 +41,8 @@ pub struct Pretraining {
     pub visual_from: Option<PathBuf>,
     /// A checkpoint whose policy is the start, instead of a fresh one.
     pub policy_from: Option<PathBuf>,
+    /// Tasks that the agent tries while it trains.
+    pub trials: Option<Trials>,
     /// Embeds the instructions.
     pub sentences: SharedEmbedder,
     /// The name of the sentence encoder's folder.
@@ -96,7 +99,9 @@ impl Pretraining {
         };
         let summaries = self.summaries()?;
         let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
-        let items = Items::of(&source, footage.labels()?, &self.preset.data, self.preset.hold_out)?;
+        // A critic learns from what happened, a clone from what the expert would have done as well.
+        let labels = if self.preset.iql.is_some() { footage.transitions()? } else { footage.labels()? };
+        let items = Items::of(&source, labels, &self.preset.data, self.preset.hold_out)?;
         anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
         let words = self.preset.policy.attention.as_ref().map(|attention| {
             let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
@@ -127,8 +132,20 @@ impl Pretraining {
             (self.preset.seed, self.preset.training.batch),
             self.device,
         );
-        let mut save = |steps| networks.save(&self.out, &config(steps)?);
-        let finished = trainer.train(batches, &items.held_out, &mut report, stop, &mut save)?;
+        let trials =
+            self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
+        let mut tried = 0;
+        let mut keep = |step, scalars: &mut Scalars| -> anyhow::Result<()> {
+            networks.save(&self.out, &config(step)?)?;
+            match &trials {
+                Some((trials, evaluation)) if trials.are_due(tried, step) => {
+                    tried = step;
+                    trials::hold(evaluation, &self.out, &self.sentences, self.device, stop, scalars)
+                }
+                _ => Ok(()),
+            }
+        };
+        let finished = trainer.train(batches, &items.held_out, &mut report, stop, &mut keep)?;
         Ok(if finished { Trained::Finished } else { Trained::Stopped })
     }
 

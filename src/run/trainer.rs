@@ -37,8 +37,11 @@ pub struct Trainer<'a> {
     pub identity: &'a BTreeMap<String, String>,
 }
 
+/// Keeps the networks of a saved step, and may add to what is reported of it.
+pub type Keep<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
+
 impl Trainer<'_> {
-    /// Trains up to the preset's last step, from where the state left off if it is there. `save` is called whenever the state is
+    /// Trains up to the preset's last step, from where the state left off if it is there. `keep` is called whenever the state is
     /// saved. Returns false when it was stopped; its state is saved then.
     ///
     /// # Errors
@@ -49,7 +52,7 @@ impl Trainer<'_> {
         held_out: &[Span],
         report: &mut dyn Report,
         stop: &AtomicBool,
-        save: &mut dyn FnMut(u64) -> anyhow::Result<()>,
+        keep: &mut Keep<'_>,
     ) -> anyhow::Result<bool> {
         let mut update = self.update()?;
         if self.state.is_file() {
@@ -63,7 +66,7 @@ impl Trainer<'_> {
             scope.spawn(move || {
                 (first..steps).map(|step| batches.at(step)).all(|batch| sender.send(batch).is_ok());
             });
-            let finished = self.steps(&mut update, &gathered, &measured, report, stop, save);
+            let finished = self.steps(&mut update, &gathered, &measured, report, stop, keep);
             drop(gathered);
             finished
         })
@@ -76,13 +79,13 @@ impl Trainer<'_> {
         measured: &[Transitions],
         report: &mut dyn Report,
         stop: &AtomicBool,
-        save: &mut dyn FnMut(u64) -> anyhow::Result<()>,
+        keep: &mut Keep<'_>,
     ) -> anyhow::Result<bool> {
         let (mut pace, first) = (Pace::new(), update.step());
         while !update.is_done() {
             if stop.load(Ordering::Relaxed) {
                 self.save(update)?;
-                save(update.step())?;
+                keep(update.step(), &mut Scalars::new("policy", update.step(), self.preset.training.steps))?;
                 return Ok(false);
             }
             let begun = Instant::now();
@@ -100,11 +103,11 @@ impl Trainer<'_> {
             if due(self.preset.report_every * 5) {
                 self.measure(measured, &mut scalars);
             }
-            report.step(&scalars)?;
             if due(self.preset.save_every) {
                 self.save(update)?;
-                save(step)?;
+                keep(step, &mut scalars)?;
             }
+            report.step(&scalars)?;
         }
         Ok(true)
     }
@@ -321,8 +324,8 @@ mod tests {
             let trainer = Trainer { networks: &networks, preset, state: &state, identity: &identity };
             let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
             stop.store(false, Ordering::Relaxed);
-            let mut save = |_| Ok(());
-            if trainer.train(batches, &items.held_out, &mut watch, &stop, &mut save).unwrap() {
+            let mut keep = |_, _: &mut Scalars| Ok(());
+            if trainer.train(batches, &items.held_out, &mut watch, &stop, &mut keep).unwrap() {
                 return (weights::read(&state).unwrap(), watch.last);
             }
         }
