@@ -11,13 +11,15 @@ use super::memory::{Memory, SharedEmbedder};
 use super::policy::Situation;
 use super::team::{Decisions, Team};
 use super::told;
-use crate::nets::visual::SIDE;
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::{FrozenVisual, SIDE};
 
 /// A trained agent with several seats.
 pub struct LearnedTeam {
     name: String,
     config: Config,
     networks: Networks,
+    sight: FrozenVisual,
     sentences: SharedEmbedder,
     device: Device,
     samples: bool,
@@ -32,25 +34,24 @@ impl LearnedTeam {
 
     /// Seats for an agent.
     pub fn new(agent: LearnedPolicy, seats: usize) -> LearnedTeam {
-        let LearnedPolicy { name, config, networks, sentences, device, samples, memory: _ } = agent;
+        let LearnedPolicy { name, config, networks, sight, sentences, device, samples, memory: _ } = agent;
         let blank = vec![0; (3 * config.visual.input * config.visual.input) as usize];
         let seats = (0..seats.max(1)).map(|_| Memory::default()).collect();
-        LearnedTeam { name, config, networks, sentences, device, samples, seats, blank }
+        LearnedTeam { name, config, networks, sight, sentences, device, samples, seats, blank }
     }
 
     /// The maps [seats, features, 7, 7] of what each seat sees now.
     fn see(&mut self, situations: &mut [Option<Situation<'_>>]) -> Tensor {
-        let spec = self.networks.visual.spec();
         let image = |(situation, memory): (&mut Option<Situation<'_>>, &mut Memory)| match situation {
             Some(here) => {
-                let image = spec.image(here.house.frame());
+                let image = self.sight.image(here.house.frame());
                 memory.look(&image, here.step);
                 image
             }
             None => self.blank.clone(),
         };
         let images: Vec<Vec<u8>> = situations.iter_mut().zip(&mut self.seats).map(image).collect();
-        self.networks.visual.encode(&images)
+        self.sight.encode(&images)
     }
 }
 
@@ -78,7 +79,7 @@ impl Team for LearnedTeam {
             match situation {
                 Some(here) => {
                     observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
-                    let hear = || told::told(here, &self.config, &self.networks.visual, &self.sentences, self.device);
+                    let hear = || told::told(here, &self.config, &self.sight, &self.sentences, self.device);
                     told.push(memory.told(here.instruction, hear)?);
                 }
                 None => {

@@ -12,12 +12,16 @@ use super::told;
 use super::values::{ChoiceValue, Values};
 use crate::domain::{ActionType, Class};
 use crate::language::instruction::normalise;
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::FrozenVisual;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
     pub(super) name: String,
     pub(super) config: Config,
     pub(super) networks: Networks,
+    /// The visual encoder of the networks, for computing alone.
+    pub(super) sight: FrozenVisual,
     pub(super) sentences: SharedEmbedder,
     pub(super) device: Device,
     pub(super) samples: bool,
@@ -50,18 +54,23 @@ impl LearnedPolicy {
         }
         let networks = Networks::load(folder, &config, device)?;
         let name = folder.file_name().map_or_else(|| "agent".to_string(), |name| name.to_string_lossy().into_owned());
-        Ok(LearnedPolicy::with(name, config, networks, sentences, device))
+        LearnedPolicy::with(name, config, networks, sentences, device)
     }
 
     /// A policy of networks at hand.
+    ///
+    /// # Errors
+    /// When the visual encoder's weights cannot be read.
     pub fn with(
         name: String,
         config: Config,
         networks: Networks,
         sentences: SharedEmbedder,
         device: Device,
-    ) -> LearnedPolicy {
-        LearnedPolicy { name, config, networks, sentences, device, samples: false, memory: Memory::default() }
+    ) -> anyhow::Result<LearnedPolicy> {
+        let sight = networks.visual.frozen(&networks.visual_store)?;
+        let memory = Memory::default();
+        Ok(LearnedPolicy { name, config, networks, sight, sentences, device, samples: false, memory })
     }
 
     /// The checkpoint's configuration.
@@ -71,11 +80,11 @@ impl LearnedPolicy {
 
     /// The last frames' maps as one observation, and what the agent is told.
     fn perceive(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
-        let image = self.networks.visual.spec().image(situation.house.frame());
+        let image = self.sight.image(situation.house.frame());
+        let map = self.memory.map_of(&image).unwrap_or_else(|| self.sight.encode(std::slice::from_ref(&image)));
         self.memory.look(&image, situation.step);
-        let map = self.networks.visual.encode(std::slice::from_ref(&image));
         let observation = self.memory.observe(map, situation.step, self.config.policy.history as usize);
-        let hear = || told::told(situation, &self.config, &self.networks.visual, &self.sentences, self.device);
+        let hear = || told::told(situation, &self.config, &self.sight, &self.sentences, self.device);
         Ok((observation, self.memory.told(situation.instruction, hear)?))
     }
 }
@@ -200,7 +209,7 @@ mod tests {
             },
         };
         let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
-        Some(LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu))
+        LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
     }
 
     #[test]

@@ -73,6 +73,11 @@ impl Memory {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
     }
 
+    /// The map of an image that looks as the last one did; nothing where the image is new.
+    pub fn map_of(&self, image: &[u8]) -> Option<Tensor> {
+        self.seen.back().filter(|_| self.last_image == image).map(Tensor::shallow_clone)
+    }
+
     /// Notices when the last choice changed nothing: a wall, or the camera's limit. Until the view changes it is not tried again.
     pub fn look(&mut self, image: &[u8], step: u32) {
         let stepped = self.seen_at != Some(step);

@@ -11,7 +11,8 @@ use super::policy::Situation;
 use crate::house::House;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
-use crate::nets::visual::{SIDE, VisualEncoder};
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::SIDE;
 
 /// Words that an agent which reads words takes in; shorter instructions are padded, so that every pass has one shape.
 const WORDS: usize = 128;
@@ -23,7 +24,7 @@ const WORDS: usize = 128;
 pub fn told(
     situation: &Situation<'_>,
     config: &Config,
-    visual: &VisualEncoder,
+    visual: &dyn FrameEncoder,
     sentences: &SharedEmbedder,
     device: Device,
 ) -> anyhow::Result<Tensor> {
@@ -51,8 +52,8 @@ pub fn nothing(config: &Config, device: Device) -> Tensor {
     }
 }
 
-fn shown(situation: &Situation<'_>, history: usize, visual: &VisualEncoder) -> anyhow::Result<Tensor> {
-    let see = |world| visual.spec().image(House::new(Arc::clone(situation.house.scene()), world).frame());
+fn shown(situation: &Situation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
+    let see = |world| visual.image(House::new(Arc::clone(situation.house.scene()), world).frame());
     let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
     let missing = history - images.len();
     let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();

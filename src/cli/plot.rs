@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::Ending;
 use crate::agent::checkpoint::write_whole;
-use crate::run::curves::{self, Plot};
+use crate::run::curves;
 
 /// Draws the curves of trainings.
 #[derive(Args)]
@@ -32,7 +32,7 @@ impl PlotCurves {
     pub fn run(self) -> anyhow::Result<Ending> {
         let read = |folder: &PathBuf| Ok((folder.display().to_string(), curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
-        let plot = Plot::of(&trainings, &self.only)?;
+        let plot = curves::draw(&trainings, &self.only)?;
         let extension = self.out.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_lowercase();
         let files = match extension.as_str() {
             "svg" | "png" => vec![self.out.clone()],

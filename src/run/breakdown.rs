@@ -122,7 +122,7 @@ impl<'a> Grouped<'a> {
             episodes: all.len(),
             successes,
             success: if all.is_empty() { 0.0 } else { successes as f64 / all.len() as f64 },
-            success_interval: stats::wilson(successes, all.len()),
+            success_interval: stats::wilson_of_groups(&self.values(Episode::succeeded)),
             progress: Mean::of(&self.values(Episode::progress)),
         }
     }
@@ -191,20 +191,44 @@ pub fn starts(grouped: &Grouped<'_>) -> BTreeMap<u32, Start> {
     let last = own.pairs().iter().map(|(_, episode)| episode.from).max();
     let of = |from: u32| {
         let there = own.only(|episode| episode.from == from);
-        let mut first = SkillRate::default();
-        there.pairs().iter().for_each(|(_, episode)| first.count(episode.completed > 0));
+        let first = SkillRate::of(&there.values(|episode| f64::from(u8::from(episode.completed > 0))));
         Start { first, rest: there.group() }
     };
     last.map(|last| (0..=last).map(|from| (from, of(from))).collect()).unwrap_or_default()
 }
 
+/// How often a subtask whose turn came was completed, by its kind.
+pub fn skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    rates(grouped, |task, episode| {
+        let completed = episode.completed as usize;
+        let turns = task.subtasks.iter().enumerate().take(completed + 1);
+        turns.map(|(i, subtask)| (subtask.skill, i < completed)).collect()
+    })
+}
+
 /// How often the agent completed its very first subtask, by the subtask's kind.
 pub fn first_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
-    let mut rates: BTreeMap<SkillKind, SkillRate> = BTreeMap::new();
-    for (task, episode) in grouped.only(|episode| episode.wording.is_own()).pairs() {
-        if let Some(subtask) = task.subtasks.get(episode.from as usize) {
-            rates.entry(subtask.skill).or_default().count(episode.completed > 0);
+    let own = grouped.only(|episode| episode.wording.is_own());
+    rates(&own, |task, episode| {
+        let first = task.subtasks.get(episode.from as usize);
+        first.map(|subtask| (subtask.skill, episode.completed > 0)).into_iter().collect()
+    })
+}
+
+/// Rates by kind of skill, of what each episode's turns came to.
+fn rates(
+    grouped: &Grouped<'_>,
+    turns: impl Fn(&Task, &Episode) -> Vec<(SkillKind, bool)>,
+) -> BTreeMap<SkillKind, SkillRate> {
+    let mut by_kind: BTreeMap<SkillKind, Vec<Vec<f64>>> = BTreeMap::new();
+    for (task, group) in &grouped.groups {
+        let mut of_task: BTreeMap<SkillKind, Vec<f64>> = BTreeMap::new();
+        for (kind, completed) in group.iter().flat_map(|episode| turns(task, episode)) {
+            of_task.entry(kind).or_default().push(f64::from(u8::from(completed)));
+        }
+        for (kind, values) in of_task {
+            by_kind.entry(kind).or_default().push(values);
         }
     }
-    rates
+    by_kind.into_iter().map(|(kind, groups)| (kind, SkillRate::of(&groups))).collect()
 }

@@ -1,14 +1,10 @@
-//! Line charts as SVG and as PNG, drawn from one list of shapes.
+//! Charts of lines: axes, lines with their intervals, and their names.
 
-use std::io::Cursor;
-
-use anyhow::Context;
-use image::{ImageFormat, Rgb, RgbImage};
-
+use super::drawing::{Anchor, Colour, Drawing};
 use super::stats::Interval;
 
 /// A chart of lines.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
     /// Above it.
     pub title: String,
@@ -16,258 +12,108 @@ pub struct Chart {
     pub across: String,
     /// The lines.
     pub lines: Vec<Line>,
-    /// Where the vertical axis ends.
-    pub highest: f64,
+    /// The ends of the vertical axis; where there are none, those of the points.
+    pub vertical: Option<(f64, f64)>,
 }
 
 /// One line of a chart.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Line {
-    /// What it is of.
+    /// What it is of; written into the chart where it is not empty.
     pub name: String,
-    /// Its points, from left to right.
+    /// Its points, from left to right; those that are no numbers are passed over.
     pub points: Vec<(f64, f64)>,
-    /// The interval of each point, where there are any.
+    /// The interval of each point, where there are any; such points are marked.
     pub intervals: Vec<Interval>,
 }
 
-enum Shape {
-    Stroke { from: (f64, f64), to: (f64, f64), colour: [u8; 3], width: f64 },
-    Dot { at: (f64, f64), colour: [u8; 3] },
-    Text { at: (f64, f64), anchor: Anchor, text: String, colour: [u8; 3] },
-}
-
-#[derive(Clone, Copy)]
-enum Anchor {
-    Middle,
-    End,
-}
-
-const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 400.0;
-/// Left, top, right and bottom edges of the plane.
-const PLANE: [f64; 4] = [64.0, 40.0, 620.0, 340.0];
-const INK: [u8; 3] = [34, 34, 34];
-const FAINT: [u8; 3] = [221, 221, 221];
-/// Told apart by people who see few colours, too (Okabe and Ito).
-const COLOURS: [[u8; 3]; 6] =
-    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233]];
+/// Told apart by people who see few colours, too (Okabe and Ito, 2008).
+pub const COLOURS: [Colour; 7] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [90, 90, 90]];
+/// The colour of texts.
+pub const INK: Colour = [34, 34, 34];
+const FAINT: Colour = [221, 221, 221];
+/// What lies around the plane: left, above, right, below.
+const MARGINS: [f64; 4] = [64.0, 34.0, 18.0, 40.0];
+/// From the plane's sides to the first and the last point.
+const INSET: f64 = 8.0;
 
 impl Chart {
-    fn shapes(&self) -> Vec<Shape> {
-        let points = || self.lines.iter().flat_map(|line| line.points.iter().map(|point| point.0));
-        let (first, last) = points().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
-        let (first, last) = if first > last { (0.0, 1.0) } else { (first, last.max(first + 1e-9)) };
-        let [left, top, right, bottom] = PLANE;
-        let inset = 16.0;
-        let x = |value: f64| match last - first < 1e-6 {
-            true => f64::midpoint(left, right),
-            false => left + inset + (value - first) / (last - first) * (right - left - 2.0 * inset),
-        };
-        let y = |value: f64| bottom - (value / self.highest.max(1e-9)).clamp(0.0, 1.0) * (bottom - top);
-        let text = |at, anchor, text: String| Shape::Text { at, anchor, text, colour: INK };
-        let mut shapes = vec![
-            text((f64::midpoint(left, right), 24.0), Anchor::Middle, self.title.clone()),
-            text((f64::midpoint(left, right), 376.0), Anchor::Middle, self.across.clone()),
-        ];
-        for part in 0..=5 {
-            let value = self.highest * f64::from(part) / 5.0;
-            shapes.push(Shape::Stroke { from: (left, y(value)), to: (right, y(value)), colour: FAINT, width: 1.0 });
-            shapes.push(text((left - 8.0, y(value) + 4.0), Anchor::End, format!("{value:.2}")));
+    /// The chart as a drawing of its own.
+    pub fn drawing(&self, width: f64, height: f64) -> Drawing {
+        let mut drawing = Drawing::new(width, height, &self.title);
+        self.draw(&mut drawing, (0.0, 0.0), (width, height));
+        drawing
+    }
+
+    /// Draws the chart with its upper left corner at `corner`.
+    pub fn draw(&self, drawing: &mut Drawing, corner: (f64, f64), size: (f64, f64)) {
+        let [before, above, after, below] = MARGINS;
+        let (left, top) = (corner.0 + before, corner.1 + above);
+        let (right, bottom) = (corner.0 + size.0 - after, corner.1 + size.1 - below);
+        let values = || self.lines.iter().flat_map(Line::shown);
+        let (first, last) = ends(values().map(|(x, _)| x));
+        let (low, high) = self.vertical.unwrap_or_else(|| ends(values().map(|(_, y)| y)));
+        let x = |value: f64| left + INSET + (value - first) / (last - first) * (right - left - 2.0 * INSET);
+        let y = |value: f64| bottom - ((value - low) / (high - low)).clamp(0.0, 1.0) * (bottom - top);
+        let middle = f64::midpoint(left, right);
+        drawing.text((middle, corner.1 + 20.0), &self.title, Anchor::Middle, INK);
+        drawing.text((middle, corner.1 + size.1 - 8.0), &self.across, Anchor::Middle, INK);
+        for part in 0..=4 {
+            let value = low + (high - low) * f64::from(part) / 4.0;
+            drawing.line(&[(left, y(value)), (right, y(value))], FAINT, 1.0);
+            drawing.text((left - 6.0, y(value) + 4.0), &short(value), Anchor::End, INK);
         }
-        for value in ticks(&mut points().collect::<Vec<_>>()) {
-            shapes.push(text((x(value), bottom + 18.0), Anchor::Middle, format!("{value}")));
+        for value in ticks(values().map(|(x, _)| x).collect(), (first, last)) {
+            drawing.text((x(value), bottom + 16.0), &short(value), Anchor::Middle, INK);
         }
         for (number, line) in self.lines.iter().enumerate() {
             let colour = COLOURS[number % COLOURS.len()];
-            for (&(at, _), [low, high]) in line.points.iter().zip(&line.intervals) {
-                shapes.push(Shape::Stroke { from: (x(at), y(*low)), to: (x(at), y(*high)), colour, width: 1.0 });
+            for ((at, _), &[from, to]) in line.points.iter().zip(&line.intervals) {
+                drawing.line(&[(x(*at), y(from)), (x(*at), y(to))], colour, 1.0);
             }
-            for pair in line.points.windows(2) {
-                let place = |(across, up): (f64, f64)| (x(across), y(up));
-                shapes.push(Shape::Stroke { from: place(pair[0]), to: place(pair[1]), colour, width: 2.0 });
-            }
-            if line.points.len() <= 60 {
-                shapes.extend(line.points.iter().map(|&(at, up)| Shape::Dot { at: (x(at), y(up)), colour }));
-            }
-            let at = (right - 4.0, top + 14.0 + 16.0 * number as f64);
-            shapes.push(Shape::Text { at, anchor: Anchor::End, text: line.name.clone(), colour });
+            let points: Vec<(f64, f64)> = line.shown().map(|(across, up)| (x(across), y(up))).collect();
+            drawing.line(&points, colour, 2.0);
+            points.iter().take(line.intervals.len()).for_each(|&point| drawing.dot(point, colour));
+            drawing.text((right - 4.0, top + 14.0 + 16.0 * number as f64), &line.name, Anchor::End, colour);
         }
-        shapes
-    }
-
-    /// The chart as a file of its own, or as a part of a page.
-    pub fn svg(&self) -> String {
-        let colour = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
-             font-family=\"sans-serif\" font-size=\"13\" role=\"img\">\n<title>{}</title>\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-            escape(&self.title)
-        );
-        for shape in self.shapes() {
-            svg += &match shape {
-                Shape::Stroke { from, to, colour: c, width } => format!(
-                    "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{}\" stroke-width=\"{width}\"/>\n",
-                    from.0,
-                    from.1,
-                    to.0,
-                    to.1,
-                    colour(c)
-                ),
-                Shape::Dot { at, colour: c } => {
-                    format!("<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\" fill=\"{}\"/>\n", at.0, at.1, colour(c))
-                }
-                Shape::Text { at, anchor, text, colour: c } => {
-                    let anchor = match anchor {
-                        Anchor::Middle => "middle",
-                        Anchor::End => "end",
-                    };
-                    format!(
-                        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\" fill=\"{}\">{}</text>\n",
-                        at.0,
-                        at.1,
-                        colour(c),
-                        escape(&text)
-                    )
-                }
-            };
-        }
-        svg + "</svg>\n"
-    }
-
-    /// The chart as a PNG file, twice the size.
-    ///
-    /// # Errors
-    /// Never in practice: it writes to memory.
-    pub fn png(&self) -> anyhow::Result<Vec<u8>> {
-        let mut image = RgbImage::from_pixel(2 * WIDTH as u32, 2 * HEIGHT as u32, Rgb([255; 3]));
-        for shape in self.shapes() {
-            match shape {
-                Shape::Stroke { from, to, colour, width } => stroke(&mut image, from, to, colour, width),
-                Shape::Dot { at, colour } => disc(&mut image, at, 3.5, colour),
-                Shape::Text { at, anchor, text, colour } => write(&mut image, at, anchor, &text, colour),
-            }
-        }
-        let mut bytes = Cursor::new(Vec::new());
-        image.write_to(&mut bytes, ImageFormat::Png).context("a plot cannot be encoded")?;
-        Ok(bytes.into_inner())
     }
 }
 
-/// At most ten of the values that occur, so that their labels do not overlap.
-fn ticks(values: &mut Vec<f64>) -> Vec<f64> {
+impl Line {
+    fn shown(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
+    }
+}
+
+/// The lowest and highest of some numbers, kept apart.
+fn ends(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), n| (low.min(n), high.max(n)));
+    match high - low {
+        span if !span.is_finite() => (0.0, 1.0),
+        span if span < 1e-12 => (low - 0.5, high + 0.5),
+        _ => (low, high),
+    }
+}
+
+/// The values that are named below the plane: all, where they are few; else the ends and the middle.
+fn ticks(mut values: Vec<f64>, (first, last): (f64, f64)) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     values.dedup();
-    let step = values.len().div_ceil(10).max(1);
-    values.iter().copied().step_by(step).collect()
+    if values.len() <= 10 { values } else { vec![first, f64::midpoint(first, last), last] }
 }
 
-/// Text as it stands in SVG and HTML.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-fn put(image: &mut RgbImage, x: f64, y: f64, colour: [u8; 3]) {
-    if x >= 0.0
-        && y >= 0.0
-        && let Some(pixel) = image.get_pixel_mut_checked(x as u32, y as u32)
-    {
-        *pixel = Rgb(colour);
-    }
-}
-
-fn disc(image: &mut RgbImage, (x, y): (f64, f64), radius: f64, colour: [u8; 3]) {
-    let reach = (2.0 * radius).ceil() as i32;
-    for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (f64::from(dx), f64::from(dy)))) {
-        if dx.hypot(dy) <= 2.0 * radius {
-            put(image, 2.0 * x + dx, 2.0 * y + dy, colour);
-        }
-    }
-}
-
-fn stroke(image: &mut RgbImage, from: (f64, f64), to: (f64, f64), colour: [u8; 3], width: f64) {
-    let length = (to.0 - from.0).hypot(to.1 - from.1);
-    let parts = (2.0 * length).ceil().max(1.0);
-    for part in 0..=parts as u32 {
-        let t = f64::from(part) / parts;
-        disc(image, (from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1)), width / 2.0, colour);
-    }
-}
-
-/// Glyphs of 3 x 5 dots: a digit a row, its bits from left to right.
-const GLYPHS: [(char, u32); 49] = [
-    ('0', 0o75557),
-    ('1', 0o26227),
-    ('2', 0o71747),
-    ('3', 0o71717),
-    ('4', 0o55711),
-    ('5', 0o74717),
-    ('6', 0o74757),
-    ('7', 0o71111),
-    ('8', 0o75757),
-    ('9', 0o75717),
-    ('A', 0o25755),
-    ('B', 0o65656),
-    ('C', 0o34443),
-    ('D', 0o65556),
-    ('E', 0o74647),
-    ('F', 0o74644),
-    ('G', 0o34553),
-    ('H', 0o55755),
-    ('I', 0o72227),
-    ('J', 0o11152),
-    ('K', 0o55655),
-    ('L', 0o44447),
-    ('M', 0o57755),
-    ('N', 0o65555),
-    ('O', 0o25552),
-    ('P', 0o65644),
-    ('Q', 0o25563),
-    ('R', 0o65655),
-    ('S', 0o34216),
-    ('T', 0o72222),
-    ('U', 0o55557),
-    ('V', 0o55552),
-    ('W', 0o55775),
-    ('X', 0o55255),
-    ('Y', 0o55222),
-    ('Z', 0o71247),
-    ('.', 0o00002),
-    ('-', 0o00700),
-    ('%', 0o51245),
-    ('/', 0o11244),
-    (':', 0o02020),
-    ('(', 0o12221),
-    (')', 0o42224),
-    ('_', 0o00007),
-    (',', 0o00024),
-    ('+', 0o02720),
-    ('=', 0o07070),
-    ('#', 0o57575),
-    ('?', 0o71202),
-];
-
-fn write(image: &mut RgbImage, (x, y): (f64, f64), anchor: Anchor, text: &str, colour: [u8; 3]) {
-    // A dot is three pixels; a letter takes four dots across.
-    let dot = 3.0;
-    let width = 4.0 * dot * text.chars().count() as f64;
-    let left = 2.0 * x
-        - match anchor {
-            Anchor::Middle => width / 2.0,
-            Anchor::End => width,
-        };
-    let top = 2.0 * y - 5.0 * dot;
-    for (place, letter) in text.to_uppercase().chars().enumerate() {
-        let known = GLYPHS.iter().find(|(glyph, _)| *glyph == letter);
-        let rows = if letter == ' ' { 0 } else { known.map_or(0o71202, |(_, rows)| *rows) };
-        for bit in (0..15u32).filter(|bit| rows >> (14 - bit) & 1 == 1) {
-            let (across, down) = (f64::from(bit % 3), f64::from(bit / 3));
-            for (dx, dy) in (0..3).flat_map(|dx| (0..3).map(move |dy| (f64::from(dx), f64::from(dy)))) {
-                put(image, left + 4.0 * dot * place as f64 + dot * across + dx, top + dot * down + dy, colour);
-            }
-        }
-    }
+/// A number in few letters.
+fn short(number: f64) -> String {
+    let places = match number.abs() {
+        size if size >= 10_000.0 => return format!("{:.0}k", number / 1000.0),
+        size if size > 0.0 && size < 0.001 => return format!("{number:.1e}"),
+        size if size >= 100.0 => 0,
+        size if size >= 1.0 => 2,
+        _ => 3,
+    };
+    let text = format!("{number:.places$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 #[cfg(test)]
@@ -277,26 +123,35 @@ mod tests {
     fn chart() -> Chart {
         let line =
             Line { name: "a<b".into(), points: vec![(1.0, 0.2), (2.0, 0.8)], intervals: vec![[0.1, 0.3], [0.7, 0.9]] };
-        Chart { title: "Progress".into(), across: "subtasks".into(), lines: vec![line], highest: 1.0 }
+        Chart { title: "Progress".into(), across: "subtasks".into(), lines: vec![line], vertical: Some((0.0, 1.0)) }
     }
 
     #[test]
     fn a_chart_is_drawn_in_both_forms() {
-        let svg = chart().svg();
+        let drawing = chart().drawing(640.0, 400.0);
+        let svg = drawing.svg();
         assert!(svg.contains("a&lt;b") && svg.matches("<circle").count() == 2 && svg.ends_with("</svg>\n"), "{svg}");
-        let image = image::load_from_memory(&chart().png().unwrap()).unwrap().to_rgb8();
+        let image = image::load_from_memory(&drawing.png().unwrap()).unwrap().to_rgb8();
         assert_eq!(image.dimensions(), (1280, 800));
         let blue = image.pixels().filter(|pixel| pixel.0 == COLOURS[0]).count();
         assert!((1_000..60_000).contains(&blue), "{blue}");
     }
 
     #[test]
-    fn a_chart_of_nothing_or_of_one_point_is_still_a_chart() {
-        for points in [vec![], vec![(3.0, 0.5)]] {
-            let line = Line { name: String::new(), points, intervals: vec![] };
-            let chart = Chart { lines: vec![line], ..chart() };
-            assert!(!chart.svg().contains("NaN") && !chart.svg().contains("inf"));
-            assert!(chart.png().is_ok());
+    fn a_chart_of_nothing_of_one_point_or_of_no_numbers_is_still_a_chart() {
+        for points in [vec![], vec![(3.0, 0.5)], vec![(1.0, f64::NAN), (2.0, f64::INFINITY)]] {
+            for vertical in [None, Some((0.0, 1.0))] {
+                let line = Line { points: points.clone(), ..Line::default() };
+                let drawing = Chart { lines: vec![line], vertical, ..chart() }.drawing(640.0, 400.0);
+                assert!(!drawing.svg().contains("NaN") && !drawing.svg().contains("inf"), "{}", drawing.svg());
+                assert!(drawing.png().is_ok());
+            }
         }
+    }
+
+    #[test]
+    fn numbers_are_written_in_few_letters() {
+        let numbers = [0.0, 0.25, 1.0, 12.5, 240.0, 96_000.0, -0.5, 0.00012];
+        assert_eq!(numbers.map(short), ["0", "0.25", "1", "12.5", "240", "96k", "-0.5", "1.2e-4"]);
     }
 }

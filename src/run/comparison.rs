@@ -36,7 +36,7 @@ pub struct Standing {
     pub errors: usize,
     /// The share of successes.
     pub success: f64,
-    /// Its 95 % interval (Wilson).
+    /// Its 95 % interval.
     pub success_interval: Interval,
     /// Mean completed subtasks.
     pub completed_subtasks: f64,
@@ -92,8 +92,7 @@ impl Comparison {
             let completed = format!("{:.2}", run.completed_subtasks);
             [run.run.clone(), run.policy.clone(), episodes, errors, success, interval, completed, percent(run.progress)]
         });
-        let head =
-            ["run", "policy", "episodes", "errors", "success", "95 % interval (Wilson)", "completed", "progress"];
+        let head = ["run", "policy", "episodes", "errors", "success", "95 % interval", "completed", "progress"];
         let mut parts = vec![table(head, rows)];
         if self.pairs.len() > 1 {
             let first = &self.pairs[0].first;
@@ -117,7 +116,10 @@ impl Comparison {
         }
         parts.extend(self.pairs.iter().map(Paired::markdown));
         if let Some(pair) = self.pairs.first() {
-            parts.push(format!("Methods: {}.\n", pair.methods));
+            parts.push(format!(
+                "Methods: rates by Wilson's score, by tasks where they were played with several seeds; {}.\n",
+                pair.methods
+            ));
         }
         parts.join("\n")
     }

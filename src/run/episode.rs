@@ -82,6 +82,11 @@ impl Episode {
         Key { task: self.task.clone(), seed: self.seed, wording: self.wording, from: self.from }
     }
 
+    /// 1 for a success, else 0.
+    pub fn succeeded(&self) -> f64 {
+        f64::from(u8::from(self.success))
+    }
+
     /// Completed subtasks as a share of those that were asked.
     pub fn progress(&self) -> f64 {
         f64::from(self.completed) / f64::from(self.of.max(1))

@@ -171,3 +171,110 @@ impl Evidence {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::task::SceneRef;
+    use crate::domain::{Cell, Heading, Role};
+    use crate::house::testing::{kitchen, named, role, subtask};
+    use crate::run::explored::ungraded;
+
+    /// In front of the counter, with tomato, knife and counter in view and in reach.
+    const COUNTER: (Cell, Heading, i16) = (Cell { x: 4, z: 9 }, Heading::North, 45);
+    /// In front of the floor lamp, far from the counter.
+    const LAMP: (Cell, Heading, i16) = (Cell { x: 8, z: 1 }, Heading::East, 0);
+
+    fn one(skill: SkillKind, class: &str) -> (Vec<Role>, Vec<Subtask>) {
+        (vec![role(class)], vec![subtask(skill, 0)])
+    }
+
+    /// What kept an episode in the kitchen from success: the agent stands in `place` and does `what`, an action a word pair.
+    fn why(
+        (roles, subtasks): (Vec<Role>, Vec<Subtask>),
+        (cell, heading, horizon): (Cell, Heading, i16),
+        what: &[&str],
+    ) -> Failure {
+        let (scene, mut world) = kitchen();
+        world.agent = Pose { cell, heading, horizon };
+        let task = Task { roles, subtasks, ..ungraded(SceneRef::Named(scene.name.clone())) };
+        let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+        let house = House::new(scene.clone(), world.clone());
+        let mut rollout = Rollout::new(house, String::new(), Some(grader), None);
+        let mut trace = Vec::new();
+        for words in what {
+            let (kind, target) = words.split_once(' ').unwrap_or((words, ""));
+            let kind = ActionType::ALL.into_iter().find(|known| known.to_string() == kind).unwrap();
+            let action = match target {
+                "" => Action::navigate(kind),
+                _ => Action::interact(kind, named(&scene, &world, target)),
+            };
+            let tick = rollout.act(action);
+            assert!(tick.outcome.is_done() || target.is_empty(), "{words}: {}", tick.outcome);
+            trace.push(Step::of(&tick, &rollout));
+        }
+        assert!(rollout.end().is_none(), "the task was done after all");
+        classify(&task, Grading::Class, &Setting { scene, world }, &trace)
+    }
+
+    #[test]
+    fn whoever_walks_where_the_thing_is_not_never_reached_it() {
+        let away = ["RotateLeft", "RotateLeft", "MoveAhead", "MoveAhead", "MoveAhead", "RotateLeft", "MoveAhead"];
+        let failure = why(one(SkillKind::Pickup, "Tomato"), LAMP, &away);
+        assert_eq!((failure, failure.words()), (Failure::NeverReached, "never reached the object"));
+    }
+
+    #[test]
+    fn a_closed_door_keeps_a_thing_out_of_reach() {
+        let before_the_fridge = (Cell { x: 8, z: 6 }, Heading::East, 30);
+        let failure = why(one(SkillKind::Pickup, "Lettuce"), before_the_fridge, &["LookDown", "LookUp", "LookUp"]);
+        assert_eq!(failure, Failure::NeverReached);
+    }
+
+    #[test]
+    fn whoever_takes_another_thing_took_the_wrong_object() {
+        let failure = why(one(SkillKind::Pickup, "Mug"), COUNTER, &["Pickup Tomato", "RotateLeft"]);
+        assert_eq!((failure, failure.words()), (Failure::WrongObject, "wrong object"));
+    }
+
+    #[test]
+    fn whoever_takes_what_was_to_be_sliced_did_the_wrong_thing_to_the_right_object() {
+        let failure = why(one(SkillKind::Slice, "Tomato"), COUNTER, &["Pickup Tomato", "RotateLeft"]);
+        assert_eq!((failure, failure.words()), (Failure::WrongAction, "right object, wrong action"));
+    }
+
+    #[test]
+    fn whoever_does_the_second_thing_first_is_out_of_order() {
+        let both = vec![subtask(SkillKind::Pickup, 0), subtask(SkillKind::Toggle, 1)];
+        let failure = why((vec![role("Mug"), role("FloorLamp")], both), LAMP, &["ToggleOn FloorLamp", "RotateLeft"]);
+        assert_eq!((failure, failure.words()), (Failure::OutOfOrder, "out of order"));
+    }
+
+    #[test]
+    fn whoever_turns_on_the_spot_or_pushes_against_furniture_is_stuck() {
+        for what in ["RotateLeft", "MoveAhead"] {
+            // Whether the thing is in reach or not.
+            for wanted in ["Tomato", "Laptop"] {
+                let failure = why(one(SkillKind::Pickup, wanted), COUNTER, &[what; STUCK_STEPS]);
+                assert_eq!((failure, failure.words()), (Failure::Stuck, "stuck"), "{what} {wanted}");
+            }
+        }
+        let shorter = why(one(SkillKind::Pickup, "Tomato"), COUNTER, &["RotateLeft"; STUCK_STEPS - 1]);
+        assert_eq!(shorter, Failure::Timeout, "a few turns are a look around");
+    }
+
+    #[test]
+    fn whoever_had_it_in_reach_and_walked_on_ran_out_of_time() {
+        let on = ["RotateLeft", "MoveAhead", "RotateLeft", "MoveAhead", "MoveAhead", "MoveAhead", "RotateRight"];
+        let failure = why(one(SkillKind::Pickup, "Tomato"), COUNTER, &on);
+        assert_eq!((failure, failure.words()), (Failure::Timeout, "timeout"));
+    }
+
+    #[test]
+    fn only_what_happened_after_the_last_success_counts() {
+        // The tomato was asked for first and taken; then the mug was never reached.
+        let both = vec![subtask(SkillKind::Pickup, 0), subtask(SkillKind::Pickup, 1)];
+        let steps = ["Pickup Tomato", "RotateRight", "MoveAhead"];
+        assert_eq!(why((vec![role("Tomato"), role("Laptop")], both), COUNTER, &steps), Failure::NeverReached);
+    }
+}

@@ -9,7 +9,7 @@ use image::{ImageFormat, RgbImage, imageops};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::chart::escape;
+use super::drawing::escape;
 use super::episode::Episode;
 use super::finished::FinishedRun;
 use super::plot;

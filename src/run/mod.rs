@@ -12,6 +12,7 @@ pub mod collect;
 pub mod comparison;
 pub mod contrast;
 pub mod curves;
+pub mod drawing;
 pub mod encoding;
 pub mod episode;
 pub mod evaluate;

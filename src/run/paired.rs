@@ -125,7 +125,7 @@ impl Paired {
             pairs: all.len(),
             unpaired,
             other_starts,
-            success: difference(&groups, |episode| f64::from(u8::from(episode.success))),
+            success: difference(&groups, Episode::succeeded),
             completed_subtasks: difference(&groups, |episode| f64::from(episode.completed)),
             progress: difference(&groups, Episode::progress),
             mcnemar_p: stats::mcnemar(regressions.len(), fixes.len()),
@@ -133,8 +133,10 @@ impl Paired {
             fixes,
             methods: format!(
                 "differences by paired percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}; \
-                 success by McNemar's exact test, two-sided",
-                stats::RESAMPLES
+                 success by McNemar's exact test, two-sided{}",
+                stats::RESAMPLES,
+                // Several seeds of a task are alike, which the bootstrap knows of and the test does not.
+                if all.len() > groups.len() { ", which takes a task's seeds for independent" } else { "" }
             ),
         })
     }
@@ -154,6 +156,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
     use crate::run::folder::tests::{episode, manifest};
+
     use crate::run::scenes::Scenes;
 
     /// A run of the sample set in which these seeds of the first task succeeded.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::chart::{Chart, Line};
+use super::drawing::Drawing;
 use super::report::Summary;
 use crate::data::json;
 
@@ -10,26 +11,27 @@ use crate::data::json;
 pub const PROGRESS: &str = "progress_by_length";
 
 /// Progress by the number of subtasks, a line a run.
-pub fn progress_by_length(summaries: &[&Summary]) -> Chart {
+pub fn progress_by_length(summaries: &[&Summary]) -> Drawing {
     let line = |summary: &&Summary| Line {
         name: format!("{} ({})", summary.policy, summary.episodes),
         points: summary.progress_by_length.iter().map(|(&length, &share)| (f64::from(length), share)).collect(),
         intervals: summary.progress_interval_by_length.values().copied().collect(),
     };
     let set = summaries.first().map_or("", |summary| summary.task_set.as_str());
-    Chart {
+    let chart = Chart {
         title: format!("Progress on {set}"),
         across: "subtasks of the task".into(),
         lines: summaries.iter().map(line).collect(),
-        highest: 1.0,
-    }
+        vertical: Some((0.0, 1.0)),
+    };
+    chart.drawing(640.0, 400.0)
 }
 
-/// Writes a chart in both forms, each atomically.
+/// Writes a drawing in both forms, each atomically.
 ///
 /// # Errors
 /// When the folder cannot be written to.
-pub fn write(folder: &Path, name: &str, chart: &Chart) -> anyhow::Result<()> {
-    json::write_bytes(&folder.join(format!("{name}.svg")), chart.svg().as_bytes())?;
-    json::write_bytes(&folder.join(format!("{name}.png")), &chart.png()?)
+pub fn write(folder: &Path, name: &str, drawing: &Drawing) -> anyhow::Result<()> {
+    json::write_bytes(&folder.join(format!("{name}.svg")), drawing.svg().as_bytes())?;
+    json::write_bytes(&folder.join(format!("{name}.png")), &drawing.png()?)
 }

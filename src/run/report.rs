@@ -133,7 +133,6 @@ impl Summary {
         let every = Grouped::of(tasks, episodes);
         let main = every.only(|episode| episode.wording.is_own() && episode.from == 0);
         let all = main.pairs();
-        let successes = all.iter().filter(|(_, episode)| episode.success).count();
         let lengths: BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
         let by_length = |value: fn(&Episode) -> f64| -> BTreeMap<u32, f64> {
             let of_length = |length| all.iter().filter(move |(_, e)| e.of == length).map(move |(_, e)| value(e));
@@ -150,15 +149,15 @@ impl Summary {
             tasks: main.tasks(),
             episodes: all.len(),
             errors: every.pairs().iter().filter(|(_, episode)| episode.error.is_some()).count(),
-            success: stats::mean(all.iter().map(|(_, episode)| f64::from(u8::from(episode.success)))),
-            success_interval: stats::wilson(successes, all.len()),
+            success: stats::mean(all.iter().map(|(_, episode)| episode.succeeded())),
+            success_interval: stats::wilson_of_groups(&main.values(Episode::succeeded)),
             completed_subtasks: Mean::of(&main.values(|episode| f64::from(episode.completed))),
             progress: Mean::of(&main.values(Episode::progress)),
             progress_by_length: by_length(Episode::progress),
             progress_interval_by_length: lengths.iter().map(|&length| (length, interval(length))).collect(),
-            success_by_length: by_length(|episode| f64::from(u8::from(episode.success))),
+            success_by_length: by_length(Episode::succeeded),
             episodes_by_length: lengths.iter().map(|&length| (length, count(length))).collect(),
-            skills: skill_rates(&all),
+            skills: breakdown::skills(&main),
             scenes: main.by_scene(),
             steps_mean: stats::mean(all.iter().map(|(_, episode)| f64::from(episode.steps))),
             expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
@@ -170,7 +169,12 @@ impl Summary {
             first_skills: if manifest.every_start { breakdown::first_skills(&every) } else { BTreeMap::new() },
             episodes_hash: String::new(),
             interval_methods: IntervalMethods {
-                rates: "Wilson score, 95 %".into(),
+                rates: match all.len() > main.tasks() {
+                    false => "Wilson score, 95 %".into(),
+                    true => {
+                        "Wilson score, 95 %, over the effective number of episodes: a task's seeds are alike".into()
+                    }
+                },
                 means: format!(
                     "percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}",
                     stats::RESAMPLES
@@ -181,23 +185,12 @@ impl Summary {
 }
 
 impl SkillRate {
-    pub(super) fn count(&mut self, completed: bool) {
-        self.reached += 1;
-        self.completed += usize::from(completed);
-        self.rate = self.completed as f64 / self.reached as f64;
-        self.interval = stats::wilson(self.completed, self.reached);
+    /// Of each task's subtasks of the kind whose turn came: 1 where it was completed, else 0.
+    pub(super) fn of(groups: &[Vec<f64>]) -> SkillRate {
+        let (reached, completed) = (groups.iter().map(Vec::len).sum(), groups.iter().flatten().sum::<f64>() as usize);
+        let rate = if reached == 0 { 0.0 } else { completed as f64 / reached as f64 };
+        SkillRate { reached, completed, rate, interval: stats::wilson_of_groups(groups) }
     }
-}
-
-fn skill_rates(episodes: &[(&Task, &Episode)]) -> BTreeMap<SkillKind, SkillRate> {
-    let mut rates: BTreeMap<SkillKind, SkillRate> = BTreeMap::new();
-    for (task, episode) in episodes {
-        let completed = episode.completed as usize;
-        for (i, subtask) in task.subtasks.iter().enumerate().take(completed + 1) {
-            rates.entry(subtask.skill).or_default().count(i < completed);
-        }
-    }
-    rates
 }
 
 #[cfg(test)]

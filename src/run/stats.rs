@@ -14,16 +14,35 @@ pub type Interval = [f64; 2];
 
 /// Wilson's 95 % score interval of a rate; everything is possible when nothing was tried.
 pub fn wilson(successes: usize, trials: usize) -> Interval {
-    if trials == 0 {
+    score(successes as f64 / trials.max(1) as f64, trials as f64)
+}
+
+/// Wilson's interval of the rate of successes (1, else 0) in whole groups. Episodes of one task (different seeds) are alike, so
+/// they count for as many as are as informative, had they been drawn independently: the rate's variance between tasks says how
+/// many. That is no fewer than there are tasks and no more than there are episodes (Dean and Pagano, 2015, with a bound).
+pub fn wilson_of_groups(groups: &[Vec<f64>]) -> Interval {
+    let sums: Vec<(f64, f64)> =
+        groups.iter().filter(|group| !group.is_empty()).map(|group| (group.iter().sum(), group.len() as f64)).collect();
+    let (tasks, trials) = (sums.len() as f64, sums.iter().map(|(_, count)| count).sum::<f64>());
+    let rate = sums.iter().map(|(successes, _)| successes).sum::<f64>() / trials.max(1.0);
+    let spread: f64 = sums.iter().map(|(successes, count)| (successes - rate * count).powi(2)).sum();
+    // What one drawn episode varies, in units of the rate's own variance.
+    let effective = rate * (1.0 - rate) * trials * trials * (tasks - 1.0) / (tasks * spread);
+    // Where all are alike, or there is one task only, nothing is known of how alike its episodes are.
+    let effective = if effective.is_nan() { tasks } else { effective.clamp(tasks, trials) };
+    score(rate, effective)
+}
+
+/// Wilson's interval of a rate over `n` trials.
+fn score(rate: f64, n: f64) -> Interval {
+    if n <= 0.0 {
         return [0.0, 1.0];
     }
-    let n = trials as f64;
-    let rate = successes as f64 / n;
     let spread = Z * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
     let (middle, scale) = (rate + Z * Z / (2.0 * n), 1.0 + Z * Z / n);
     // At the edges the formula gives 0 and 1 but for rounding.
-    let low = if successes == 0 { 0.0 } else { (middle - spread) / scale };
-    let high = if successes == trials { 1.0 } else { (middle + spread) / scale };
+    let low = if rate <= 0.0 { 0.0 } else { (middle - spread) / scale };
+    let high = if rate >= 1.0 { 1.0 } else { (middle + spread) / scale };
     [low, high]
 }
 
@@ -101,6 +120,33 @@ mod tests {
             }
         }
         assert_eq!(wilson(0, 0), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn seeds_that_always_agree_say_no_more_than_one_does() {
+        let of = |seeds: usize| (0..40).map(|task| vec![f64::from(task % 4 / 3); seeds]).collect::<Vec<_>>();
+        assert_eq!(wilson_of_groups(&of(1)), wilson(10, 40));
+        assert_eq!(wilson_of_groups(&of(5)), wilson(10, 40));
+        for rate in [0.0, 1.0] {
+            let alike = vec![vec![rate; 7]; 12];
+            assert_eq!(wilson_of_groups(&alike), wilson(12 * rate as usize, 12), "all alike: no more than the tasks");
+        }
+        assert_eq!(wilson_of_groups(&[vec![1.0, 0.0, 1.0]]).map(|end| end > 0.0), [true, true]);
+        assert_eq!(wilson_of_groups(&[]), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn seeds_that_are_independent_count_in_full() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let groups: Vec<Vec<f64>> =
+            (0..400).map(|_| (0..5).map(|_| f64::from(u8::from(rng.random_bool(0.3)))).collect()).collect();
+        let successes = groups.iter().flatten().sum::<f64>() as usize;
+        assert!(close(wilson_of_groups(&groups), wilson(successes, 2000), 0.003), "{:?}", wilson_of_groups(&groups));
+        let mixed: Vec<Vec<f64>> =
+            groups.iter().enumerate().map(|(i, g)| if i % 2 == 0 { g.clone() } else { vec![g[0]; 5] }).collect();
+        let successes = mixed.iter().flatten().sum::<f64>() as usize;
+        let (width, naive) = (wilson_of_groups(&mixed), wilson(successes, 2000));
+        assert!(width[1] - width[0] > 1.3 * (naive[1] - naive[0]), "{width:?} {naive:?}");
     }
 
     #[test]
