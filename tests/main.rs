@@ -14,3 +14,4 @@ mod program;
 mod evaluator;
 mod faults;
 mod scenarios;
+mod training;

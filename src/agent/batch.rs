@@ -12,14 +12,14 @@ use super::policy::Situation;
 use super::team::{Decisions, Team};
 use super::told;
 use crate::nets::frozen::FrameEncoder;
-use crate::nets::visual::{FrozenVisual, SIDE};
+use crate::nets::visual::SIDE;
 
 /// A trained agent with several seats.
 pub struct LearnedTeam {
     name: String,
     config: Config,
     networks: Networks,
-    sight: FrozenVisual,
+    sight: Box<dyn FrameEncoder>,
     sentences: SharedEmbedder,
     device: Device,
     samples: bool,
@@ -35,7 +35,7 @@ impl LearnedTeam {
     /// Seats for an agent.
     pub fn new(agent: LearnedPolicy, seats: usize) -> LearnedTeam {
         let LearnedPolicy { name, config, networks, sight, sentences, device, samples, memory: _ } = agent;
-        let blank = vec![0; (3 * config.visual.input * config.visual.input) as usize];
+        let blank = vec![0; 3 * sight.side() * sight.side()];
         let seats = (0..seats.max(1)).map(|_| Memory::default()).collect();
         LearnedTeam { name, config, networks, sight, sentences, device, samples, seats, blank }
     }
@@ -71,7 +71,7 @@ impl Team for LearnedTeam {
     fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
         anyhow::ensure!(situations.len() == self.seats.len(), "{} situations are not one a seat", situations.len());
         let maps = self.see(situations);
-        let (history, features) = (self.config.policy.history, self.config.visual.features());
+        let (history, features) = (self.config.policy.history, self.config.features());
         let floats = (Kind::Float, self.device);
         let mut observations = Vec::new();
         let mut told = Vec::new();
@@ -79,7 +79,7 @@ impl Team for LearnedTeam {
             match situation {
                 Some(here) => {
                     observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
-                    let hear = || told::told(here, &self.config, &self.sight, &self.sentences, self.device);
+                    let hear = || told::told(here, &self.config, &*self.sight, &self.sentences, self.device);
                     told.push(memory.told(here.instruction, hear)?);
                 }
                 None => {

@@ -10,8 +10,10 @@ use tch::{Device, Tensor, nn};
 
 use crate::domain::{ActionType, Class};
 use crate::nets::critic::{Critic, CriticSpec, Senses};
+use crate::nets::eyes::Eyes;
 use crate::nets::policy::{PolicyNet, PolicySpec};
-use crate::nets::visual::{VisualEncoder, VisualSpec};
+use crate::nets::resnet18;
+use crate::nets::visual::VisualSpec;
 use crate::nets::weights::{self, Form};
 
 /// The classes and actions that a policy's heads stand for.
@@ -72,8 +74,12 @@ pub struct Config {
     pub format_version: u32,
     /// What the heads stand for.
     pub ontology: Ontology,
-    /// The visual encoder's size.
-    pub visual: VisualSpec,
+    /// The size of the House encoder, where the agent sees through one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visual: Option<VisualSpec>,
+    /// The digest of ResNet-18's weights, where the agent sees through that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resnet18: Option<String>,
     /// The method it was trained by: `bc`, `iql`, `sprint`, `am`, `et`; absent in older checkpoints, which are cloned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
@@ -133,11 +139,36 @@ impl Config {
         Ok(config)
     }
 
+    /// What the agent sees through: a House encoder with fresh weights, or ResNet-18 with the very weights it was trained on.
+    ///
+    /// # Errors
+    /// When ResNet-18's weights are missing, or others.
+    pub fn eyes(&self, device: Device) -> anyhow::Result<Eyes> {
+        match (&self.visual, &self.resnet18) {
+            (Some(spec), None) => Ok(Eyes::house(spec, device)),
+            (None, Some(digest)) => {
+                let file = Eyes::resnet18_file();
+                let eyes = Eyes::resnet18(&file, device)?;
+                let found = eyes.frozen()?.digest().to_owned();
+                anyhow::ensure!(
+                    found == *digest,
+                    "{}: these weights are {found}, the agent was trained on {digest}",
+                    file.display()
+                );
+                Ok(eyes)
+            }
+            _ => anyhow::bail!("an agent sees through either visual or resnet18, not both or none"),
+        }
+    }
+
+    /// Features in each of the 7 x 7 places of a map.
+    pub fn features(&self) -> i64 {
+        self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
+    }
+
     /// Sizes that no network can have are refused before anything is allocated for them.
     fn check(&self, path: &Path) -> anyhow::Result<()> {
         let sizes = [
-            ("visual.input", std::slice::from_ref(&self.visual.input), 1024),
-            ("visual.channels", &self.visual.channels[..], 4096),
             ("policy.history", std::slice::from_ref(&self.policy.history), 64),
             ("policy.embedding", std::slice::from_ref(&self.policy.embedding), 8192),
             ("policy.channels", &self.policy.channels[..], 4096),
@@ -151,6 +182,12 @@ impl Config {
                 ("critic.object_embedding", std::slice::from_ref(&critic.object_embedding), 8192),
             ]
         });
+        let visual = self.visual.iter().flat_map(|visual| {
+            [
+                ("visual.input", std::slice::from_ref(&visual.input), 1024),
+                ("visual.channels", &visual.channels[..], 4096),
+            ]
+        });
         let goal = self.policy.goal.iter().map(|goal| ("policy.goal", &goal[..], 4096));
         let attention = self.policy.attention.iter().flat_map(|attention| {
             [
@@ -160,7 +197,7 @@ impl Config {
                 ("policy.attention.inner", std::slice::from_ref(&attention.inner), 16384),
             ]
         });
-        for (field, values, most) in sizes.into_iter().chain(critic).chain(goal).chain(attention) {
+        for (field, values, most) in sizes.into_iter().chain(visual).chain(critic).chain(goal).chain(attention) {
             for &value in values {
                 anyhow::ensure!(
                     (1..=most).contains(&value),
@@ -170,12 +207,14 @@ impl Config {
             }
         }
         anyhow::ensure!(
-            self.visual.input == 16 * crate::nets::visual::SIDE,
-            "{}: visual.input is {}, not {}",
-            path.display(),
-            self.visual.input,
-            16 * crate::nets::visual::SIDE
+            self.visual.is_some() != self.resnet18.is_some(),
+            "{}: an agent sees through either visual or resnet18, not both or none",
+            path.display()
         );
+        if let Some(visual) = &self.visual {
+            let side = 16 * crate::nets::visual::SIDE;
+            anyhow::ensure!(visual.input == side, "{}: visual.input is {}, not {side}", path.display(), visual.input);
+        }
         if let Some(attention) = &self.policy.attention {
             attention.check(self.policy.embedding).with_context(|| format!("{}: policy", path.display()))?;
         }
@@ -195,9 +234,7 @@ impl Config {
 #[derive(Debug)]
 pub struct Networks {
     /// Sees.
-    pub visual: VisualEncoder,
-    /// The visual encoder's weights.
-    pub visual_store: nn::VarStore,
+    pub eyes: Eyes,
     /// Decides.
     pub policy: PolicyNet,
     /// The policy's weights.
@@ -220,14 +257,14 @@ pub struct Critics {
 }
 
 impl Networks {
-    /// Networks with fresh weights.
-    pub fn new(visual: &VisualSpec, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
-        let (visual_store, policy_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
-        let senses = Senses { channels: policy.history * visual.features(), told: policy.embedding, goal: policy.goal };
+    /// Networks with fresh weights behind the eyes.
+    pub fn new(eyes: Eyes, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
+        let policy_store = nn::VarStore::new(device);
+        let features = eyes.features();
+        let senses = Senses { channels: policy.history * features, told: policy.embedding, goal: policy.goal };
         Networks {
-            visual: VisualEncoder::new(&visual_store.root(), visual),
-            policy: PolicyNet::new(&policy_store.root(), policy, visual.features()),
-            visual_store,
+            eyes,
+            policy: PolicyNet::new(&policy_store.root(), policy, features),
             policy_store,
             critic: critic.map(|spec| {
                 let (online_store, target_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
@@ -243,7 +280,8 @@ impl Networks {
 
     /// Every tensor by its name in `model.safetensors`.
     pub fn tensors(&self) -> BTreeMap<String, Tensor> {
-        let mut stores = vec![("visual", &self.visual_store), ("policy", &self.policy_store)];
+        let mut stores = vec![("policy", &self.policy_store)];
+        stores.extend(self.eyes.store().map(|store| ("visual", store)));
         if let Some(critic) = &self.critic {
             stores.extend([("critic", &critic.online_store), ("target", &critic.target_store)]);
         }
@@ -260,7 +298,7 @@ impl Networks {
     pub fn load(folder: &Path, config: &Config, device: Device) -> anyhow::Result<Networks> {
         let path = folder.join("model.safetensors");
         let tensors = weights::read(&path)?;
-        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), device);
+        let networks = Networks::new(config.eyes(device)?, &config.policy, config.critic.as_ref(), device);
         let variables = networks.tensors();
         let forms = variables.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
         weights::check(&path, &tensors, &forms)?;
@@ -308,7 +346,8 @@ mod tests {
         Config {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
-            visual: VisualSpec { input: 112, channels: [4, 4, 4, 4] },
+            visual: Some(VisualSpec { input: 112, channels: [4, 4, 4, 4] }),
+            resnet18: None,
             policy: PolicySpec {
                 history: 5,
                 embedding: 8,
@@ -336,7 +375,8 @@ mod tests {
     fn saved() -> (tempfile::TempDir, Config) {
         let folder = tempfile::tempdir().unwrap();
         let config = small();
-        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
+        let networks =
+            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
         (folder, config)
     }
@@ -371,7 +411,8 @@ mod tests {
             object_embedding: 2,
             shared_trunk: true,
         });
-        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
+        let networks =
+            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
         let read = Config::read(folder.path()).unwrap();
         assert_eq!(read, config);
@@ -403,6 +444,9 @@ mod tests {
         let (folder, _) = saved();
         let error = edit(folder.path(), |value| value["policy"]["hidden"] = vec![1u64 << 40].into());
         assert!(error.contains("policy.hidden"), "{error}");
+        let (folder, _) = saved();
+        let error = edit(folder.path(), |value| value["resnet18"] = "abc".into());
+        assert!(error.contains("either visual or resnet18"), "{error}");
     }
 
     #[test]

@@ -13,7 +13,6 @@ use super::values::{ChoiceValue, Values};
 use crate::domain::{ActionType, Class};
 use crate::language::instruction::normalise;
 use crate::nets::frozen::FrameEncoder;
-use crate::nets::visual::FrozenVisual;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
@@ -21,7 +20,7 @@ pub struct LearnedPolicy {
     pub(super) config: Config,
     pub(super) networks: Networks,
     /// The visual encoder of the networks, for computing alone.
-    pub(super) sight: FrozenVisual,
+    pub(super) sight: Box<dyn FrameEncoder>,
     pub(super) sentences: SharedEmbedder,
     pub(super) device: Device,
     pub(super) samples: bool,
@@ -68,7 +67,7 @@ impl LearnedPolicy {
         sentences: SharedEmbedder,
         device: Device,
     ) -> anyhow::Result<LearnedPolicy> {
-        let sight = networks.visual.frozen(&networks.visual_store)?;
+        let sight = networks.eyes.frozen()?;
         let memory = Memory::default();
         Ok(LearnedPolicy { name, config, networks, sight, sentences, device, samples: false, memory })
     }
@@ -84,7 +83,7 @@ impl LearnedPolicy {
         let map = self.memory.map_of(&image).unwrap_or_else(|| self.sight.encode(std::slice::from_ref(&image)));
         self.memory.look(&image, situation.step);
         let observation = self.memory.observe(map, situation.step, self.config.policy.history as usize);
-        let hear = || told::told(situation, &self.config, &self.sight, &self.sentences, self.device);
+        let hear = || told::told(situation, &self.config, &*self.sight, &self.sentences, self.device);
         Ok((observation, self.memory.told(situation.instruction, hear)?))
     }
 }
@@ -178,7 +177,8 @@ mod tests {
         let config = Config {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
-            visual: VisualSpec { input: 112, channels: [4; 4] },
+            visual: Some(VisualSpec { input: 112, channels: [4; 4] }),
+            resnet18: None,
             method: None,
             words: None,
             policy: PolicySpec {
@@ -208,7 +208,8 @@ mod tests {
                 policy_steps: 0,
             },
         };
-        let networks = Networks::new(&config.visual, &config.policy, config.critic.as_ref(), Device::Cpu);
+        let networks =
+            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
         LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
     }
 

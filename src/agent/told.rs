@@ -44,7 +44,7 @@ pub fn told(
 
 /// Of the same shape, for nobody.
 pub fn nothing(config: &Config, device: Device) -> Tensor {
-    let (policy, features) = (&config.policy, config.visual.features());
+    let (policy, features) = (&config.policy, config.features());
     match (policy.goal, &policy.attention) {
         (Some(_), _) => Tensor::zeros([1, policy.history * features, SIDE, SIDE], (Kind::Float, device)),
         (None, Some(_)) => Tensor::zeros([1, WORDS as i64], (Kind::Int64, device)),

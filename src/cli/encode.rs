@@ -66,10 +66,7 @@ impl Encoder {
     fn load(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
         let device = best_device();
         match (&self.checkpoint, &self.resnet18) {
-            (Some(folder), _) => {
-                let networks = Networks::load(folder, &Config::read(folder)?, device)?;
-                Ok(Box::new(networks.visual.frozen(&networks.visual_store)?))
-            }
+            (Some(folder), _) => Networks::load(folder, &Config::read(folder)?, device)?.eyes.frozen(),
             (None, Some(file)) => Ok(Box::new(ResNet18::read(file, device)?)),
             (None, None) => anyhow::bail!("name --checkpoint or --resnet18"),
         }

@@ -6,6 +6,9 @@ use crate::house::view::Frame;
 
 /// A visual encoder that only computes.
 pub trait FrameEncoder: Send {
+    /// The side of the image it reads, in pixels.
+    fn side(&self) -> usize;
+
     /// What it reads of a frame: planes of bytes, red, green, blue.
     fn image(&self, frame: &Frame) -> Vec<u8>;
 

@@ -9,6 +9,7 @@ pub mod sentence;
 
 pub mod critic;
 pub mod episodic;
+pub mod eyes;
 pub mod film;
 pub mod frozen;
 pub mod policy;

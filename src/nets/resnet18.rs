@@ -132,6 +132,10 @@ impl Block {
 }
 
 impl FrameEncoder for ResNet18 {
+    fn side(&self) -> usize {
+        INPUT
+    }
+
     fn image(&self, frame: &Frame) -> Vec<u8> {
         shrink_bilinear(&frame.rgb, frame.width, INPUT)
     }
@@ -166,7 +170,7 @@ impl FrameEncoder for ResNet18 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// The number at a position of a tensor, between -0.5 and 0.5: an integer hash that `tests/resnet18_expected.py` computes too.
@@ -198,6 +202,11 @@ mod tests {
             (name, tensor)
         };
         forms().into_iter().map(make).collect()
+    }
+
+    /// Writes those weights as a file.
+    pub(in crate::nets) fn write_weights(path: &Path) {
+        weights::write(path, &tensors(), &BTreeMap::new()).unwrap();
     }
 
     #[test]

@@ -160,6 +160,10 @@ pub struct FrozenVisual {
 }
 
 impl FrameEncoder for FrozenVisual {
+    fn side(&self) -> usize {
+        self.spec.input as usize
+    }
+
     fn image(&self, frame: &Frame) -> Vec<u8> {
         self.spec.image(frame)
     }

@@ -16,6 +16,19 @@ fn method(config: &Config) -> &'static str {
     }
 }
 
+/// What it sees through, in words.
+fn eyes(config: &Config) -> String {
+    match &config.visual {
+        Some(visual) => format!(
+            "{input} x {input} pixels to {features} x 7 x 7, channels {channels:?}",
+            input = visual.input,
+            features = visual.features(),
+            channels = visual.channels
+        ),
+        None => "ResNet-18 as torchvision publishes it, 224 x 224 pixels to 512 x 7 x 7".into(),
+    }
+}
+
 /// What it is told, in words.
 fn told(config: &Config) -> String {
     let policy = &config.policy;
@@ -38,7 +51,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         text,
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
-         ({input} x {input} pixels to {features} x 7 x 7, channels {channels:?}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
+         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
          Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations in generated houses (dataset \
          `{dataset}`): {visual_steps} steps of the visual encoder, {policy_steps} of the policy, seed {seed}.\n\n\
          ## Measured in generated houses that no training saw\n\n\
@@ -47,9 +60,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
          | one-skill tasks solved, within twice the expert's steps | {agent} |\n\
          | the same tasks by chance | {random} |\n",
         history = config.policy.history,
-        input = config.visual.input,
-        features = config.visual.features(),
-        channels = config.visual.channels,
+        eyes = eyes(config),
         told = told(config),
         preset = from.preset,
         method = method(config),

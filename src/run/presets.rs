@@ -31,7 +31,10 @@ pub struct Preset {
     pub report_every: u64,
     /// What is learned from.
     pub data: Selection,
-    /// The visual encoder.
+    /// What the agent sees through.
+    #[serde(default)]
+    pub eyes: Sight,
+    /// The House encoder; ResNet-18 has one size.
     pub visual: VisualSpec,
     /// Its training.
     pub visual_training: VisualTraining,
@@ -52,7 +55,18 @@ pub struct Preset {
     pub appraisal: Appraisal,
 }
 
-/// How the visual encoder is trained.
+/// What an agent sees through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sight {
+    /// The House encoder, which is trained on drawn frames.
+    #[default]
+    House,
+    /// torchvision's ResNet-18, as it is.
+    ResNet18,
+}
+
+/// How the House encoder is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VisualTraining {
@@ -274,5 +288,6 @@ mod tests {
         refused("critic = false\niql = false", "chaining needs a critic");
         refused("[policy]\ngoal = [4, 4, 4, 4]", "goals have none");
         refused("[chaining]\nbatch = 0", "chaining.batch");
+        refused("eyes = \"ears\"", "resnet18");
     }
 }

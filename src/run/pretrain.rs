@@ -12,7 +12,7 @@ use super::encoding;
 use super::events::Events;
 use super::footage::Footage;
 use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
-use super::presets::Preset;
+use super::presets::{Preset, Sight};
 use super::progress::{Journal, Report, Scalars};
 use super::trainer::Trainer;
 use super::trials::{self, Trials};
@@ -25,7 +25,8 @@ use crate::data::features::Features;
 use crate::data::items::{Composites, Items, Source};
 use crate::data::summaries::Summaries;
 use crate::language::vocabulary::Vocabulary;
-use crate::nets::frozen::FrameEncoder;
+use crate::nets::eyes::Eyes;
+use crate::nets::visual::VisualSpec;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -83,8 +84,8 @@ impl Pretraining {
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let footage = Footage::open(&datasets)?;
         tch::manual_seed(self.preset.seed as i64);
-        let Preset { visual, policy, critic, .. } = &self.preset;
-        let networks = Networks::new(visual, policy, critic.as_ref(), self.device);
+        let Preset { policy, critic, .. } = &self.preset;
+        let networks = Networks::new(self.eyes()?, policy, critic.as_ref(), self.device);
         if !self.train_visual(&networks, &footage, &mut report, stop)? {
             return Ok(Trained::Stopped);
         }
@@ -93,8 +94,8 @@ impl Pretraining {
         if let Some(folder) = &self.policy_from {
             self.start_from(folder, &networks)?;
         }
-        let encoder = networks.visual.frozen(&networks.visual_store)?;
-        let Some(features) = encoding::features(&encoder, &datasets, &footage, &mut report, stop)? else {
+        let encoder = networks.eyes.frozen()?;
+        let Some(features) = encoding::features(&*encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
         let summaries = self.summaries()?;
@@ -114,9 +115,11 @@ impl Pretraining {
         let Some(material) = self.material(&items, &features, &embed, words.as_ref(), &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
+        let resnet18 = networks.eyes.store().is_none().then(|| encoder.digest().to_owned());
         let config = |steps: u64| -> anyhow::Result<Config> {
             let config = self.config(&digest, footage.trajectories.len() as u64, steps)?;
-            Ok(Config { words: words.as_ref().map(|words| words.words().to_vec()), ..config })
+            let words = words.as_ref().map(|words| words.words().to_vec());
+            Ok(Config { words, resnet18: resnet18.clone(), ..config })
         };
         let trainer = Trainer {
             networks: &networks,
@@ -247,25 +250,40 @@ impl Pretraining {
         report: &mut dyn Report,
         stop: &AtomicBool,
     ) -> anyhow::Result<bool> {
-        let state = self.out.join("training/visual.safetensors");
+        let Eyes::House { store: own, .. } = &networks.eyes else { return Ok(true) };
         if let Some(folder) = &self.visual_from {
-            copy(&self.given(folder)?.1.visual_store, "", &networks.visual_store)?;
+            let given = self.given(folder)?.1.eyes;
+            copy(given.store().context("its eyes are no House encoder")?, "", own)?;
             return Ok(true);
         }
+        let state = self.out.join("training/visual.safetensors");
         // The heads live in a store of their own shape, so the trained encoder is copied out of it.
         let mut store = tch::nn::VarStore::new(self.device);
         let encoder = crate::nets::visual::VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
         let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
         store.freeze();
-        copy(&store, "encoder.", &networks.visual_store)?;
+        copy(&store, "encoder.", own)?;
         Ok(finished)
     }
 
-    /// A checkpoint whose visual encoder is of the preset's size.
+    /// What the agent will see through: a House encoder with fresh weights, or ResNet-18.
+    fn eyes(&self) -> anyhow::Result<Eyes> {
+        match self.preset.eyes {
+            Sight::House => Ok(Eyes::house(&self.preset.visual, self.device)),
+            Sight::ResNet18 => Eyes::resnet18(&Eyes::resnet18_file(), self.device),
+        }
+    }
+
+    /// The House encoder's size, where there is one.
+    fn visual(&self) -> Option<&VisualSpec> {
+        (self.preset.eyes == Sight::House).then_some(&self.preset.visual)
+    }
+
+    /// A checkpoint whose visual encoder is of the preset's kind and size.
     fn given(&self, folder: &Path) -> anyhow::Result<(Config, Networks)> {
         let config = Config::read(folder)?;
         let file = folder.join("config.json");
-        let (found, own) = (&config.visual, &self.preset.visual);
+        let (found, own) = (config.visual.as_ref(), self.visual());
         anyhow::ensure!(found == own, "{}: visual is {found:?}, the preset's is {own:?}", file.display());
         let networks = Networks::load(folder, &config, self.device)?;
         Ok((config, networks))
@@ -297,7 +315,8 @@ impl Pretraining {
         Ok(Config {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
-            visual: self.preset.visual.clone(),
+            visual: self.visual().cloned(),
+            resnet18: None,
             method: Some(self.preset.method().to_string()),
             policy: self.preset.policy.clone(),
             critic: self.preset.critic.clone(),

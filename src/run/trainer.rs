@@ -217,6 +217,7 @@ mod tests {
     use crate::data::items::{Items, Label};
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
+    use crate::nets::eyes::Eyes;
     use crate::nets::policy::PolicySpec;
     use crate::run::material::{Maps, Material, Pool, Rows, Told, joined};
 
@@ -302,7 +303,10 @@ mod tests {
         let identity = [("dataset".to_string(), "d".to_string())].into();
         loop {
             tch::manual_seed(1);
-            let networks = Networks::new(&preset.visual, &preset.policy, preset.critic.as_ref(), Device::Cpu);
+            let networks = {
+                let eyes = Eyes::house(&preset.visual, Device::Cpu);
+                Networks::new(eyes, &preset.policy, preset.critic.as_ref(), Device::Cpu)
+            };
             let told = match preset.policy.goal {
                 Some(_) => Told::Goals,
                 None if preset.policy.attention.is_some() => Told::Words(vec![vec![2, 3], vec![4]]),

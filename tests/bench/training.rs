@@ -12,6 +12,7 @@ use sprint_explorer::algo::chain::Pairs;
 use sprint_explorer::data::features::{Features, Header, Writer};
 use sprint_explorer::data::items::{Items, Label, Span};
 use sprint_explorer::nets::device::best_device;
+use sprint_explorer::nets::eyes::Eyes;
 use sprint_explorer::run::batches::Batches;
 use sprint_explorer::run::material::{Maps, Material, Pool, Rows, Told, joined};
 use sprint_explorer::run::presets::Preset;
@@ -59,7 +60,7 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
         }
         _ => None,
     };
-    let networks = Networks::new(&preset.visual, &preset.policy, preset.critic.as_ref(), device);
+    let networks = Networks::new(Eyes::house(&preset.visual, device), &preset.policy, preset.critic.as_ref(), device);
     let material = Material { items: &items, maps: Maps::on(&features, device), told, pool, embed: &embed };
     let (judged, batch) = (networks.critic.is_some(), preset.training.batch);
     let batches =

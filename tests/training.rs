@@ -1,0 +1,95 @@
+//! Trainings through the program itself, from demonstrations to an agent that is evaluated.
+
+use sprint_explorer::nets::sentence::default_folder;
+
+use crate::program::Sprint;
+
+/// SPRINT in miniature: every part of it, in seconds.
+const TINY: &str = r#"
+extends = "sprint"
+hold_out = 3
+save_every = 2
+report_every = 1
+
+[visual]
+channels = [4, 4, 4, 8]
+
+[visual_training.optimisation]
+steps = 2
+batch = 4
+
+[policy]
+channels = [4, 4, 4, 4]
+hidden = [8]
+
+[critic]
+channels = [4, 4, 4, 4]
+hidden = [8]
+
+[chaining]
+pairs = { pool = 4 }
+batch = 2
+
+[training]
+steps = 6
+batch = 8
+
+[appraisal]
+tasks = 1
+swaps = 0
+"#;
+
+/// A folder with a few labelled demonstrations; nothing where the sentence encoder is not there.
+fn demonstrations() -> Option<Sprint> {
+    let sprint = Sprint::new();
+    let encoder = default_folder();
+    if !encoder.join("model.safetensors").exists() {
+        eprintln!("skipped: training needs the sentence encoder (`make setup` fetches it)");
+        return None;
+    }
+    std::fs::create_dir_all(sprint.path("home")).unwrap();
+    std::os::unix::fs::symlink(encoder.parent().unwrap(), sprint.path("home/encoders")).unwrap();
+    done(&sprint, "collect D --episodes 6 --seed 5 --lengths 2 --annotations 1");
+    done(&sprint, "relabel D --with rules");
+    std::fs::write(sprint.path("tiny.toml"), TINY).unwrap();
+    Some(sprint)
+}
+
+fn done(sprint: &Sprint, line: &str) -> String {
+    let ended = sprint.run(line);
+    assert_eq!(ended.code, Some(0), "{line}: {}", ended.stderr);
+    ended.stdout
+}
+
+#[test]
+fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
+    let Some(sprint) = demonstrations() else { return };
+    sprint.sample("tasks.json", 1, 2);
+    done(&sprint, "pretrain D --preset tiny.toml --out agent --trials tasks.json --trials-every 3");
+    let progress = sprint.read("agent/training/progress.jsonl");
+    let lines = || progress.lines().filter(|line| line.contains("\"policy\""));
+    let tried: Vec<&str> = lines().filter(|line| line.contains("trial_success")).collect();
+    assert_eq!(tried.len(), 2, "{progress}");
+    assert!(tried[0].contains("\"step\":4") && tried[1].contains("\"step\":6"), "{tried:?}");
+    for scalar in ["chain_q_loss", "follow_action_loss", "weight_max", "held_out_action_loss"] {
+        assert!(lines().any(|line| line.contains(scalar)), "{scalar} is not in {progress}");
+    }
+    assert!(sprint.read("agent/README.md").contains("implicit Q-learning with skills chained"));
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
+    assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
+}
+
+#[test]
+fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
+    let Some(sprint) = demonstrations() else { return };
+    done(&sprint, "pretrain D --preset tiny.toml --out agent --steps 2");
+    let again = sprint.run("pretrain D --preset tiny.toml --out agent --steps 2");
+    assert_eq!(again.code, Some(1));
+    assert!(again.stderr.contains("holds a training already"), "{}", again.stderr);
+    let other = sprint.run("pretrain D --preset tiny.toml --out agent --steps 4 --resume");
+    assert_eq!(other.code, Some(1));
+    assert!(other.stderr.contains("begun with another preset"), "{}", other.stderr);
+    let seeing = sprint.run("pretrain D --preset l-bc --out other --visual-from agent");
+    assert_eq!(seeing.code, Some(1));
+    assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
+}
