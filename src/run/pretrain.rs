@@ -330,7 +330,10 @@ impl Pretraining {
                 dataset: dataset.to_string(),
                 trajectories,
                 seed: self.preset.seed,
-                visual_steps: self.preset.visual_training.optimisation.steps,
+                visual_steps: match &self.visual_from {
+                    Some(folder) => Config::read(folder)?.provenance.visual_steps,
+                    None => self.preset.visual_training.optimisation.steps,
+                },
                 policy_steps,
             },
         })
