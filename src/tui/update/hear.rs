@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::app::{App, Entry, Tone};
-use super::chained::Chained;
-use super::graphics::classes::{self, Letters};
-use super::update::{Effect, turn_to};
-use super::verb::Page;
-use super::worker::Report;
+use super::Effect;
+use super::pages::turn_to;
 use crate::run::rollout::End;
+use crate::tui::app::{App, Entry, Tone};
+use crate::tui::chained::Chained;
+use crate::tui::graphics::classes::{self, Letters};
+use crate::tui::verb::Page;
+use crate::tui::worker::Report;
 
 /// Changes the state by what the worker says.
 pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
@@ -146,15 +147,15 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
 
 /// What is worth saying about a new state that was not stepped to.
 fn arrival(
-    before: Option<&super::engine::Snapshot>,
-    now: &super::engine::Snapshot,
+    before: Option<&crate::tui::engine::Snapshot>,
+    now: &crate::tui::engine::Snapshot,
     new_episode: bool,
 ) -> Option<String> {
     let Some(before) = before else { return Some(now.scene.name.clone()) };
     if new_episode {
         return Some(now.scene.name.clone());
     }
-    let name = |snapshot: &super::engine::Snapshot| {
+    let name = |snapshot: &crate::tui::engine::Snapshot| {
         snapshot.time.branches.get(snapshot.time.branch).map_or_else(String::new, |branch| branch.name.clone())
     };
     let forked = now.time.branches.len() > before.time.branches.len();
