@@ -11,6 +11,7 @@ pub mod config;
 pub mod editor;
 pub mod engine;
 pub mod graphics;
+pub mod history;
 pub mod inspect;
 pub mod keys;
 pub mod layout;

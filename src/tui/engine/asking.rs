@@ -4,7 +4,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 use super::Engine;
-use crate::language::{instruction, phrases};
+use crate::domain::{Role, Subtask};
+use crate::language::{instruction, nouns, phrases};
 use crate::run::chain::Chain;
 use crate::run::contrast::Contrast;
 use crate::run::{chain, contrast};
@@ -58,7 +59,8 @@ impl Engine {
             }
             (roles, grader.subtasks().get(grader.completed()..).unwrap_or_default().to_vec())
         });
-        let mut links = chain::split(text);
+        let typed = chain::split(text);
+        let mut links = typed.clone();
         if links.is_empty() {
             let (roles, subtasks) = left.as_ref().filter(|(_, subtasks)| !subtasks.is_empty()).ok_or_else(|| {
                 anyhow::anyhow!("there is no task whose steps would be a chain: type one, with ; between the links")
@@ -71,7 +73,15 @@ impl Engine {
             };
             links = links.iter().map(|link| instruction::normalise(link)).collect();
         }
-        let graded = left.filter(|(_, subtasks)| subtasks.len() == links.len());
+        // What a person typed is graded by the task only where every link is about what its subtask is about.
+        let about = |roles: &[Role], subtask: &Subtask, link: &str| {
+            let objects = std::iter::once(subtask.object).chain(subtask.receptacle);
+            objects.filter_map(|at| roles.get(usize::from(at))).any(|role| nouns::names(link, role.class))
+        };
+        let graded = left.filter(|(roles, subtasks)| {
+            subtasks.len() == links.len()
+                && (typed.is_empty() || subtasks.iter().zip(&links).all(|(subtask, link)| about(roles, subtask, link)))
+        });
         Ok(Chain { scene: house.scene().clone(), start: house.world().clone(), links, graded })
     }
 

@@ -15,8 +15,8 @@ pub use step::Event;
 use std::sync::Arc;
 
 use crate::agent::{Carried, Decision, Policy, Values};
+use crate::domain::Task;
 use crate::domain::task::SceneRef;
-use crate::domain::{Action, Task};
 use crate::house::view::Frame;
 use crate::run::branches::{Moment, Tree};
 use crate::run::episode::Author;
@@ -127,7 +127,7 @@ impl Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::ActionType;
+    use crate::domain::{Action, ActionType};
     use crate::tui::testing;
 
     #[test]
@@ -260,5 +260,13 @@ mod tests {
         assert_eq!(engine.tree().branches().len(), 5);
         let divergence = engine.divergence(0);
         assert_eq!(divergence.shared, 0);
+    }
+
+    #[test]
+    fn a_typed_chain_is_graded_only_where_it_is_about_the_task() {
+        let engine = testing::engine();
+        let graded = |text: &str| engine.chain(text).unwrap().graded.is_some();
+        assert!(graded("") && graded("take the mug; put it in the sink"));
+        assert!(!graded("take the plate; open the fridge") && !graded("take the mug"));
     }
 }

@@ -1,10 +1,14 @@
 //! Time travel: to another step or branch of what was tried, and along a recorded episode.
 
+use std::sync::Arc;
+
 use super::{Engine, rollout_of};
 use crate::agent::{Carried, Decision};
 use crate::domain::Action;
+use crate::house::House;
 use crate::run::branches::{self, FRAMES, Moment};
 use crate::run::episode::{Author, Episode};
+use crate::tui::graphics::pair::beside;
 use crate::tui::openings::Opening;
 use crate::tui::timeline::Divergence;
 
@@ -51,6 +55,24 @@ impl Engine {
     /// Where another branch and the one in hand part, and what they do from there.
     pub fn divergence(&self, other: usize) -> Divergence {
         Divergence::of(&self.tree, self.tree.branch(), other)
+    }
+
+    /// The same, with what the agent sees on both: at the step in hand, or where they part if that lies ahead.
+    pub fn parted(&self, other: usize) -> Divergence {
+        let mut divergence = self.divergence(other);
+        let stories = [self.tree.story(self.tree.branch()), self.tree.story(other)];
+        let wanted = self.tree.at().max(divergence.shared + 1);
+        let steps = stories.each_ref().map(|story| wanted.min(story.len().saturating_sub(1) as u32));
+        let mut house = House::new(self.rollout.house.scene().clone(), self.rollout.house.world().clone());
+        let mut draw = |side: usize| {
+            let (moment, _) = stories[side].get(steps[side] as usize)?;
+            house.restore((*moment.world).clone());
+            Some(house.frame().clone())
+        };
+        if let (Some(left), Some(right)) = (draw(0), draw(1)) {
+            divergence.sights = Some((Arc::new(beside(&left, &right)), steps));
+        }
+        divergence
     }
 
     /// Brings house and policy to the state in hand.

@@ -8,6 +8,7 @@ pub mod encoder;
 pub mod inline;
 pub mod labels;
 pub mod overlay;
+pub mod pair;
 mod placeholder;
 pub mod sixel;
 

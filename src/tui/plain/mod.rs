@@ -28,6 +28,7 @@ pub fn run(mut engine: Engine, kind: PolicyKind, input: impl BufRead, mut out: i
         writeln!(out, "error: {error:#}")?;
     }
     out.flush()?;
+    let mut breaks = Vec::new();
     for line in input.lines() {
         let line = line?;
         let line = line.trim();
@@ -37,7 +38,7 @@ pub fn run(mut engine: Engine, kind: PolicyKind, input: impl BufRead, mut out: i
         match parse(line) {
             Ok(Verb::Quit) => break,
             Ok(verb) => {
-                if let Err(error) = obey(&mut engine, verb, &mut out) {
+                if let Err(error) = obey(&mut engine, &mut breaks, verb, &mut out) {
                     writeln!(out, "error: {error:#}")?;
                 }
             }
@@ -48,11 +49,19 @@ pub fn run(mut engine: Engine, kind: PolicyKind, input: impl BufRead, mut out: i
     Ok(())
 }
 
-fn obey(engine: &mut Engine, verb: Verb, out: &mut impl Write) -> anyhow::Result<()> {
+fn obey(engine: &mut Engine, breaks: &mut Vec<Condition>, verb: Verb, out: &mut impl Write) -> anyhow::Result<()> {
     match verb {
-        Verb::Step(count) => steps(engine, count, None, out)?,
-        Verb::ToggleRun | Verb::Continue => steps(engine, FARTHEST, None, out)?,
-        Verb::Until(condition) => steps(engine, FARTHEST, Some(condition), out)?,
+        Verb::Step(count) => steps(engine, count, &[], out)?,
+        Verb::ToggleRun | Verb::Continue => steps(engine, FARTHEST, breaks, out)?,
+        Verb::Until(condition) => steps(engine, FARTHEST, &[breaks.as_slice(), &[condition]].concat(), out)?,
+        Verb::Break(condition) => {
+            match condition {
+                None => breaks.clear(),
+                Some(condition) => breaks.push(condition),
+            }
+            let all: Vec<String> = breaks.iter().map(ToString::to_string).collect();
+            writeln!(out, "runs stop at: {}", if all.is_empty() { "nothing".into() } else { all.join("; ") })?;
+        }
         Verb::Navigate(kind) => act(engine, Action::navigate(kind), out)?,
         Verb::Interact(number) => {
             let candidates = engine.snapshot().candidates;
@@ -127,7 +136,7 @@ fn obey(engine: &mut Engine, verb: Verb, out: &mut impl Write) -> anyhow::Result
         Verb::Diverge(wanted) => divergence(&engine.divergence(engine.branch(&wanted)?), out)?,
         Verb::Compare(other) => compare(&engine.contrast(&other)?, out)?,
         Verb::Chain(text) => chain(engine, &text, None, out)?,
-        Verb::WhichLink(times) => chain(engine, "", Some(times), out)?,
+        Verb::WhichLink(draws) => chain(engine, "", Some(draws), out)?,
         Verb::ValueMap => values(engine, out)?,
         Verb::Save(path) => writeln!(out, "{}", engine.keep(path)?)?,
         Verb::SaveTask(path) => writeln!(out, "{}", engine.keep_task(&path)?)?,
@@ -166,7 +175,8 @@ fn seek(engine: &mut Engine, step: u32, out: &mut impl Write) -> anyhow::Result<
     here(engine, out)
 }
 
-fn steps(engine: &mut Engine, count: u32, until: Option<Condition>, out: &mut impl Write) -> anyhow::Result<()> {
+/// So many steps, or until one of these conditions holds.
+fn steps(engine: &mut Engine, count: u32, until: &[Condition], out: &mut impl Write) -> anyhow::Result<()> {
     anyhow::ensure!(engine.end().is_none(), "the episode is over; `back`, `reset` or `next`");
     for _ in 0..count {
         let mind = engine.think()?.0.mind.clone();
@@ -176,10 +186,11 @@ fn steps(engine: &mut Engine, count: u32, until: Option<Condition>, out: &mut im
         if engine.end().is_some() {
             break;
         }
-        if let Some(condition) = until {
+        if !until.is_empty() {
             // Some conditions ask what the policy makes of the new state.
             engine.think()?;
-            if let Some(why) = condition.hit(&before, &engine.facts()) {
+            let now = engine.facts();
+            if let Some(why) = until.iter().find_map(|condition| condition.hit(&before, &now)) {
                 writeln!(out, "stopped: {why}")?;
                 break;
             }
@@ -221,6 +232,9 @@ mod tests {
     fn a_run_stops_where_it_is_told_to() {
         let text = say("until step 4\n");
         assert!(text.contains("step 4: ") && text.ends_with("stopped: step 4\n"), "{text}");
+        let text = say("break step 9\nbreak step 3\nrun\nbreak\n");
+        assert!(text.contains("runs stop at: step 9; step 3") && text.contains("stopped: step 3"), "{text}");
+        assert!(text.ends_with("runs stop at: nothing\n"), "{text}");
         assert!(say("until dusk\n").contains("there are: subtask"));
     }
 }

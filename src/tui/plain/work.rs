@@ -4,13 +4,14 @@ use std::cell::RefCell;
 use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
+use crate::run::chain::Draws;
 use crate::run::chain::{Play, Rate};
 use crate::run::landscape::survey;
 use crate::tui::chained::Chained;
 use crate::tui::engine::Engine;
 use crate::tui::worker::Report;
 
-pub(super) fn chain(engine: &Engine, text: &str, times: Option<u32>, out: &mut impl Write) -> anyhow::Result<()> {
+pub(super) fn chain(engine: &Engine, text: &str, draws: Option<Draws>, out: &mut impl Write) -> anyhow::Result<()> {
     let chain = engine.chain(text)?;
     let known = RefCell::new(Chained::default());
     let tell = |report: Report| {
@@ -19,7 +20,7 @@ pub(super) fn chain(engine: &Engine, text: &str, times: Option<u32>, out: &mut i
         }
         true
     };
-    Chained::work(&chain, engine.another_policy()?.as_mut(), times, &AtomicBool::new(false), &tell)?;
+    Chained::work(&chain, engine.another_policy()?.as_mut(), draws, &AtomicBool::new(false), &tell)?;
     let known = known.into_inner();
     let word = |play: &Option<Play>, at: usize| match play.as_ref().and_then(|play| play.outcomes.get(at)) {
         Some(outcome) if !outcome.reached => "not reached".to_string(),
@@ -58,10 +59,11 @@ pub(super) fn values(engine: &Engine, out: &mut impl Write) -> anyhow::Result<()
     let mut policy = engine.another_policy()?;
     let (stop, told) = (AtomicBool::new(false), engine.instruction());
     let mut found = survey(policy.as_mut(), house.scene(), house.world(), told, &stop, &mut |_| true)?;
-    found.heights.sort_by(|a, b| b.value.total_cmp(&a.value));
+    found.heights.sort_by(|a, b| b.facing(None).1.total_cmp(&a.facing(None).1));
     writeln!(out, "{} of {} cells ({})", found.heights.len(), found.of, found.measure.words())?;
     for height in found.heights.iter().take(10) {
-        writeln!(out, "cell {},{} facing {:?}: {:.2}", height.cell.x, height.cell.z, height.heading, height.value)?;
+        let (heading, value) = height.facing(None);
+        writeln!(out, "cell {},{} facing {}: {value:.2}", height.cell.x, height.cell.z, heading.name())?;
     }
     Ok(())
 }

@@ -4,20 +4,20 @@ mod hear;
 mod lines;
 mod pages;
 mod perform;
+mod pointer;
 mod travel;
 
 pub use perform::perform;
 
-use crossterm::event::{KeyEvent, KeyEventKind};
+use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
 use ratatui::layout::Size;
 
-use crate::domain::Action;
-use crate::tui::app::{App, Tone};
+use crate::tui::app::App;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
 use crate::tui::verb::Verb;
-use crate::tui::worker::{Command, Going, Report};
+use crate::tui::worker::{Command, Report};
 use hear::hear;
 
 /// Something that happened.
@@ -25,6 +25,8 @@ use hear::hear;
 pub enum Msg {
     /// A key was pressed.
     Key(KeyEvent),
+    /// The mouse was used.
+    Mouse(MouseEvent),
     /// Text was pasted.
     Paste(String),
     /// The terminal has another size.
@@ -50,6 +52,10 @@ pub enum Effect {
     Repaint,
     /// Put text on the terminal's clipboard.
     Copy(String),
+    /// Keep an instruction for later sessions.
+    Remember(String),
+    /// Hear the mouse, or no longer.
+    Mouse(bool),
     /// End.
     Quit(Farewell),
 }
@@ -69,7 +75,8 @@ pub enum Farewell {
 pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
-        Msg::Key(key) => match own(app, key).or_else(|| keys::verb(app.mode, app.page, key)) {
+        Msg::Mouse(event) => pointer::heed(app, event),
+        Msg::Key(key) => match welcomed(app, key).or_else(|| keys::verb(app.mode, app.page, key)) {
             Some(verb) => perform(app, verb),
             None => {
                 match app.mode {
@@ -115,6 +122,13 @@ pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     }
 }
 
+/// Whoever presses a key knows what keys are for, and has read what was noted.
+fn welcomed(app: &mut App, key: KeyEvent) -> Option<Verb> {
+    app.newcomer = false;
+    app.notice = None;
+    own(app, key)
+}
+
 /// What a key means by the person's own settings, while keys are no text.
 fn own(app: &App, key: KeyEvent) -> Option<Verb> {
     matches!(app.mode, Mode::Watch | Mode::Manual).then(|| app.config.verb(key)).flatten()
@@ -129,12 +143,14 @@ mod tests {
     use crossterm::event::{KeyCode, KeyModifiers};
 
     use super::*;
-    use crate::domain::ActionType;
+    use crate::domain::{Action, ActionType};
     use crate::house::{Outcome, Reason};
+    use crate::tui::app::Tone;
     use crate::tui::engine::Event;
     use crate::tui::graphics::Protocol;
     use crate::tui::testing;
     use crate::tui::theme::Ability;
+    use crate::tui::worker::Going;
 
     fn app() -> App {
         testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL)
@@ -262,6 +278,15 @@ mod tests {
                 perform(&mut app, Verb::Help);
                 testing::screen(&mut app);
             }
+        }
+    }
+
+    #[test]
+    fn a_terminal_that_has_changed_its_size_before_its_message_came_is_not_drawn_to() {
+        let app = app();
+        for (width, height) in [(80, 24), (60, 50), (200, 60)] {
+            let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(width, height)).unwrap();
+            crate::tui::screen::draw(&mut terminal, &app).unwrap();
         }
     }
 }

@@ -4,13 +4,13 @@ use super::lines::{complete, obey_line, open_line, uncover};
 use super::pages::{select, show, turn_to};
 use super::travel::{go_on, travel};
 use super::{Effect, Farewell, send};
-use crate::domain::Action;
+use crate::domain::{Action, Heading};
+use crate::run::chain::Draws;
 use crate::tui::app::{App, Tone};
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::keys::Mode;
 use crate::tui::policies::PolicyKind;
-use crate::tui::verb;
-use crate::tui::verb::{Page, Verb};
+use crate::tui::verb::{self, Page, TIMES, Verb};
 use crate::tui::worker::{Command, Pace};
 
 /// Does what a person asked for.
@@ -172,16 +172,39 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
                 vec![]
             }
         },
-        Verb::ValueMap if app.landscape.take().is_some() => send(Command::Stop),
-        Verb::ValueMap => send(Command::Survey),
+        Verb::ValueMap => {
+            app.paints_values = !app.paints_values;
+            app.landscape = None;
+            send(if app.paints_values { Command::Survey } else { Command::Stop })
+        }
+        Verb::Facing(heading) => {
+            app.heading = heading;
+            if app.paints_values { vec![] } else { perform(app, Verb::ValueMap) }
+        }
+        Verb::NextHeading => {
+            let next = match app.heading {
+                None => Some(Heading::North),
+                Some(Heading::West) => None,
+                Some(heading) => Some(heading.right()),
+            };
+            // The first press only paints.
+            perform(app, Verb::Facing(if app.paints_values { next } else { app.heading }))
+        }
+        Verb::Mouse => {
+            app.mouse = !app.mouse;
+            let text = if app.mouse { "the mouse is heard" } else { "the mouse is the terminal's again" };
+            app.note(Tone::Note, text);
+            vec![Effect::Mouse(app.mouse)]
+        }
+        Verb::ReplayLink => perform(app, Verb::WhichLink(Draws { times: TIMES, only: Some(app.selected) })),
         Verb::Chain(text) => {
             let mut effects = turn_to(app, Page::Chain);
             effects.push(Effect::Send(Command::Chain(text)));
             effects
         }
-        Verb::WhichLink(times) => {
+        Verb::WhichLink(draws) => {
             let mut effects = turn_to(app, Page::Chain);
-            effects.push(Effect::Send(Command::WhichLink(times)));
+            effects.push(Effect::Send(Command::WhichLink(draws)));
             effects
         }
         Verb::Stop => send(Command::Stop),

@@ -22,9 +22,9 @@ pub(super) fn travel(app: &mut App, verb: &Verb) -> Vec<Effect> {
     let Some(time) = app.now.as_ref().map(|now| now.time.clone()) else { return vec![] };
     let last = time.beats.len() as u32;
     let step = match verb {
-        Verb::Back(steps) => time.at.saturating_sub(*steps),
-        Verb::Forward(_) if time.at == last => return send(Command::Step),
-        Verb::Forward(steps) => time.at.saturating_add(*steps).min(last),
+        // Relative: more keys may come than states are shown.
+        Verb::Back(steps) => return send(Command::Along { by: -(*steps as i32), steps: true }),
+        Verb::Forward(steps) => return send(Command::Along { by: *steps as i32, steps: true }),
         Verb::Seek(step) => *step,
         Verb::NextEvent => time.event(true),
         Verb::LastEvent => time.event(false),

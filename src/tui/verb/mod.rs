@@ -4,12 +4,13 @@ mod doc;
 mod parse;
 mod said;
 
-pub use parse::parse;
+pub use parse::{TIMES, parse};
 pub use said::{SAID, Said, matching};
 
 use std::path::PathBuf;
 
-use crate::domain::ActionType;
+use crate::domain::{ActionType, Heading};
+use crate::run::chain::Draws;
 use crate::tui::breakpoints::Condition;
 use crate::tui::policies::PolicyKind;
 
@@ -96,10 +97,18 @@ pub enum Verb {
     Swap,
     /// The value of every cell, painted on the map; or end that.
     ValueMap,
+    /// Which link breaks, for the link that is selected alone.
+    ReplayLink,
+    /// Paint the values of that heading; without one, of the best.
+    Facing(Option<Heading>),
+    /// Paint the values of the next heading.
+    NextHeading,
+    /// Hear the mouse, or no longer.
+    Mouse,
     /// Follow a chain of instructions.
     Chain(String),
     /// Which link of the chain breaks.
-    WhichLink(u32),
+    WhichLink(Draws),
     /// Stop work in the background.
     Stop,
     /// Write what was explored as a run.

@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
-use super::Verb;
-use super::said::SAID;
-use crate::domain::ActionType;
+use super::{Page, Verb};
+use crate::domain::{ActionType, Heading};
+use crate::run::chain::Draws;
 use crate::tui::breakpoints::Condition;
 use crate::tui::policies::PolicyKind;
+
+/// Draws of a link where nobody says how many.
+pub const TIMES: u32 = 8;
 
 /// Reads a line.
 ///
@@ -52,7 +55,29 @@ pub fn parse(line: &str) -> Result<Verb, String> {
         "compare" | "ab" => Ok(Verb::Compare(text()?)),
         "swap" => Ok(Verb::Swap),
         "chain" => Ok(Verb::Chain(rest.to_string())),
-        "links" => Ok(Verb::WhichLink(if rest.is_empty() { 8 } else { number(rest)? })),
+        "links" => {
+            Ok(Verb::WhichLink(Draws { times: if rest.is_empty() { TIMES } else { number(rest)? }, only: None }))
+        }
+        "link" => {
+            let (link, times) = rest.split_once(' ').unwrap_or((rest, ""));
+            let only = number(link)?.checked_sub(1).ok_or("link: links are numbered from 1")?;
+            let times = if times.is_empty() { TIMES } else { number(times.trim())? };
+            Ok(Verb::WhichLink(Draws { times, only: Some(only as usize) }))
+        }
+        "heading" if rest == "best" => Ok(Verb::Facing(None)),
+        "heading" => match Heading::ALL.into_iter().find(|heading| heading.name() == rest) {
+            Some(heading) => Ok(Verb::Facing(Some(heading))),
+            None => Err(format!("heading: {rest:?} is none of best, north, east, south, west")),
+        },
+        "mouse" => Ok(Verb::Mouse),
+        "faster" => Ok(Verb::Faster),
+        "slower" => Ok(Verb::Slower),
+        "manual" => Ok(Verb::ToggleManual),
+        "page" => page(rest),
+        "graphics" => Ok(Verb::Graphics),
+        "overlay" => Ok(Verb::Overlay),
+        "numbers" => Ok(Verb::Labels),
+        "sort" => Ok(Verb::Sort),
         "values" => Ok(Verb::ValueMap),
         "stop" => Ok(Verb::Stop),
         "save" => Ok(Verb::Save((!rest.is_empty()).then(|| PathBuf::from(rest)))),
@@ -73,6 +98,22 @@ pub fn parse(line: &str) -> Result<Verb, String> {
     }
 }
 
+fn page(name: &str) -> Result<Verb, String> {
+    const PAGES: [(&str, Page); 6] = [
+        ("panels", Page::Main),
+        ("branches", Page::Branches),
+        ("mind", Page::Mind),
+        ("world", Page::World),
+        ("compare", Page::Compare),
+        ("chain", Page::Chain),
+    ];
+    let found = PAGES.iter().find(|(known, _)| *known == name);
+    found.map(|(_, page)| Verb::Show(*page)).ok_or_else(|| {
+        let names: Vec<&str> = PAGES.iter().map(|(name, _)| *name).collect();
+        format!("page: {name:?} is none of {}", names.join(", "))
+    })
+}
+
 fn act(rest: &str) -> Result<Verb, String> {
     match ActionType::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(rest)) {
         Some(kind) if kind.is_interaction() => Err(format!("do: {kind} needs a number from `candidates`")),
@@ -84,6 +125,7 @@ fn act(rest: &str) -> Result<Verb, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tui::verb::SAID;
 
     #[test]
     fn lines_are_read_as_verbs_and_mistakes_are_named() {
@@ -108,6 +150,9 @@ mod tests {
                 "" => "",
                 "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
                 "NAME" => "expert",
+                "N [TIMES]" => "2 4",
+                "best|north|..." => "south",
+                "panels|mind|..." => "world",
                 "[CONDITION]" | "CONDITION" => "failed",
                 _ => "next",
             };

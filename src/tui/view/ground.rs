@@ -6,7 +6,7 @@ use ratatui::style::Color;
 
 use super::chain::warmth;
 use crate::domain::place::{Cuboid, Rect as Floor};
-use crate::domain::{Cell, Class, Pose};
+use crate::domain::{Cell, Class, Heading, Pose};
 use crate::run::landscape::Landscape;
 use crate::tui::engine::Snapshot;
 
@@ -40,8 +40,8 @@ pub(super) struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    pub(super) fn of(now: &'a Snapshot, values: Option<&Landscape>) -> Ground<'a> {
-        let values = values.map_or_else(HashMap::new, Landscape::shares);
+    pub(super) fn of(now: &'a Snapshot, values: Option<&Landscape>, heading: Option<Heading>) -> Ground<'a> {
+        let values = values.map_or_else(HashMap::new, |values| values.shares(heading));
         let floor = now.scene.floor();
         let fixtures = (0u16..).zip(&now.scene.fixtures);
         let mut parts: Vec<_> = fixtures
@@ -64,8 +64,18 @@ impl<'a> Ground<'a> {
     }
 
     /// The furniture at a point, the highest of it.
+    fn piece(&self, x: i32, z: i32) -> Option<&Piece> {
+        self.furniture.iter().rev().find(|piece| piece.floor.contains(x, z))
+    }
+
+    /// Its class.
     pub(super) fn class(&self, x: i32, z: i32) -> Option<Class> {
-        self.furniture.iter().rev().find(|piece| piece.floor.contains(x, z)).map(|piece| piece.class)
+        self.piece(x, z).map(|piece| piece.class)
+    }
+
+    /// Its number.
+    pub(super) fn fixture(&self, x: i32, z: i32) -> Option<u16> {
+        self.piece(x, z).map(|piece| piece.fixture)
     }
 
     pub(super) fn colour(&self, x: i32, z: i32) -> Option<Color> {

@@ -1,14 +1,15 @@
 //! The floor plan from above: where the agent is, where it has been, and what stands around it. North is up.
 
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Position, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::ground::{Ground, extent, furniture_colour};
+use super::hit::Hit;
 use super::{fit, panel};
-use crate::domain::{Cell, Heading, Instance};
+use crate::domain::{Cell, Heading, Instance, Point};
 use crate::run::landscape::Landscape;
 use crate::tui::app::App;
 use crate::tui::engine::Snapshot;
@@ -40,8 +41,12 @@ impl Widget for Map<'_> {
             .as_ref()
             .and_then(|(decision, words)| Some((decision.action.target?, words)))
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
-        let right = match (&app.landscape, target) {
-            (Some(values), _) => legend(values),
+        let values = app.landscape.as_ref().filter(|_| app.paints_values);
+        let right = match (values, target) {
+            (Some((values, step)), _) => {
+                let room = usize::from(area.width).saturating_sub("Map".width() + 4);
+                legend(values, app.heading, (*step != now.step).then_some(*step), room)
+            }
             (None, Some((_, words))) => words.clone(),
             (None, None) => String::new(),
         };
@@ -50,7 +55,7 @@ impl Widget for Map<'_> {
             Page::World => things(now).get(app.selected).map(|thing| thing.instance),
             _ => None,
         };
-        let ground = Ground::of(now, app.landscape.as_deref());
+        let ground = Ground::of(now, values.map(|(values, _)| &**values), app.heading);
         let Some(plan) = Plan::fitting(&ground, inner) else { return };
         if app.ability.shades() {
             plan.shaded(&ground, buf)
@@ -61,15 +66,43 @@ impl Widget for Map<'_> {
     }
 }
 
-/// What the painted values are, and their range.
-fn legend(values: &Landscape) -> String {
-    let far = if values.heights.len() < values.of {
-        format!(" {}/{}", values.heights.len(), values.of)
-    } else {
-        String::new()
-    };
-    let range = values.range().map_or(String::new(), |(low, high)| format!(" {low:.2} to {high:.2}"));
-    format!("{}{range}{far}", values.measure.words())
+/// What the painted values are, their range, and the step they are for where that is another: as much of it as there is room for.
+fn legend(values: &Landscape, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
+    let facing = heading.map_or("best heading", Heading::name);
+    let (low, high) = values.range(heading).unwrap_or((0.0, 0.0));
+    let far = values.heights.len() < values.of;
+    let far = if far { format!(", {}/{}", values.heights.len(), values.of) } else { String::new() };
+    let step = other_step.map_or(String::new(), |step| format!(", as of step {step}"));
+    let (words, letter, short) =
+        (values.measure.words(), values.measure.letter(), heading.map_or("best", Heading::name));
+    let forms = [
+        format!("{words}, {facing}: {low:.2} to {high:.2}{far}{step}"),
+        format!("{words}, {short}: {low:.2} to {high:.2}"),
+        format!("{letter}, {facing}: {low:.2} to {high:.2}"),
+        format!("{letter} {short} {low:.2} to {high:.2}"),
+    ];
+    let fits = forms.iter().find(|form| form.width() <= room);
+    fits.unwrap_or(&forms[3]).clone()
+}
+
+/// What lies under a place of the panel: a thing that is in view, furniture, or a cell of the floor.
+pub(super) fn under(app: &App, area: Rect, at: Position) -> Option<Hit> {
+    let now = app.now.as_ref()?;
+    let inner = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
+    let ground = Ground::of(now, None, None);
+    let plan = Plan::fitting(&ground, inner).filter(|_| inner.contains(at))?;
+    let place = |instance: Instance| now.world.position(&now.scene, instance).and_then(|p| plan.position(p.x, p.z));
+    let seen = now.view.sightings.iter().map(|seen| seen.instance).filter(|seen| matches!(seen, Instance::Object(_)));
+    if let Some(object) = seen.into_iter().find(|&object| place(object) == Some((at.x, at.y))) {
+        return Some(Hit::Thing(object));
+    }
+    let (x, z) = plan.point(at.x - inner.x, 2 * (at.y - inner.y));
+    let z = z - plan.side / 2;
+    if let Some(fixture) = ground.fixture(x, z) {
+        return Some(Hit::Thing(Instance::Fixture(fixture)));
+    }
+    let cell = Cell::nearest(Point::new(x, 0, z));
+    now.scene.has_cell(cell).then_some(Hit::Cell(cell))
 }
 
 /// How millimetres become characters. A character is two squares high, one above the other.
@@ -177,7 +210,7 @@ impl Plan {
             for column in 0..self.area.width {
                 let (x, upper) = self.point(column, 2 * row);
                 let z = upper - self.side / 2;
-                let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
+                let cell = Cell::nearest(Point::new(x, 0, z));
                 let symbol = if let Some(class) = ground.class(x, z) {
                     app.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {

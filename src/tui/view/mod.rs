@@ -5,6 +5,7 @@ mod chain;
 mod compare;
 mod frame;
 mod ground;
+pub mod hit;
 mod help;
 mod instruction;
 mod log;
@@ -15,6 +16,7 @@ mod reach;
 #[cfg(test)]
 mod screens;
 mod status;
+mod suggestions;
 mod task;
 mod thoughts;
 mod time;
@@ -35,6 +37,10 @@ use super::verb::Page;
 
 impl Widget for &App {
     fn render(self, area: Rect, buf: &mut Buffer) {
+        // The terminal has another size already, and its message is under way.
+        if area.as_size() != self.size {
+            return;
+        }
         let Some(layout) = self.layout() else {
             too_small(area, buf);
             return;
@@ -61,7 +67,8 @@ impl Widget for &App {
         match self.mode {
             Mode::Help => help::Help(self).render(area, buf),
             Mode::Palette => palette::Palette(self).render(layout.page, buf),
-            Mode::Watch | Mode::Manual | Mode::Typing => {}
+            Mode::Typing => suggestions::Suggestions(self).render(layout.page, buf),
+            Mode::Watch | Mode::Manual => {}
         }
         self.config.scheme.paint(buf);
         self.ability.adapt(buf);

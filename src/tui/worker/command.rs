@@ -1,5 +1,6 @@
 //! What the screen asks of the worker.
 
+use crate::run::chain::Draws;
 use std::path::PathBuf;
 
 use super::Pace;
@@ -34,6 +35,13 @@ pub enum Command {
     Pace(Pace),
     /// To a step of the branch in hand.
     Seek(u32),
+    /// So many steps along the branch in hand.
+    Along {
+        /// Forward, or back.
+        by: i32,
+        /// At its end, forward is a step of the policy.
+        steps: bool,
+    },
     /// To the branch of that name or number.
     Switch(String),
     /// Another name for the branch in hand.
@@ -50,8 +58,8 @@ pub enum Command {
     Survey,
     /// Follow a chain; empty for the task's own.
     Chain(String),
-    /// Which link of the last chain breaks, with so many draws.
-    WhichLink(u32),
+    /// Which link of the last chain breaks, with so many draws of all links or one.
+    WhichLink(Draws),
     /// Stop work in the background.
     Stop,
     /// Write what was explored as a run, into that folder or a new one.

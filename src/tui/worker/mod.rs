@@ -13,15 +13,13 @@ pub use report::Report;
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::domain::Action;
 use crate::run::chain::Chain;
 use crate::tui::breakpoints::Condition;
 use crate::tui::engine::Engine;
 use crate::tui::policies::PolicyKind;
-use background::Background;
-use background::Surveys;
+use background::{Background, Spare, Surveys};
 
 /// Starts the worker. `open` makes the engine on the worker's thread; reports go to `tell`, which says whether anybody still
 /// listens.
@@ -44,6 +42,7 @@ pub fn start(
             until: None,
             chain: None,
             surveys: Arc::default(),
+            spare: Arc::default(),
             background: Background::default(),
         }
         .work(&inbox),
@@ -64,6 +63,7 @@ struct Worker<T> {
     /// The chain that was followed last.
     chain: Option<Chain>,
     surveys: Surveys,
+    spare: Spare,
     background: Background,
 }
 
@@ -156,9 +156,10 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
 #[cfg(test)]
 mod tests {
     use std::sync::mpsc::channel;
+    use std::time::Duration;
 
     use super::*;
-    use crate::domain::ActionType;
+    use crate::domain::{Action, ActionType};
     use crate::tui::testing;
 
     /// A worker in the kitchen, and what it tells.
@@ -208,6 +209,30 @@ mod tests {
         assert!(matches!(report, Report::Failed(reason) if reason.contains("there is no checkpoint")));
         commands.send(Command::Step).unwrap();
         wait(&reports, |report| matches!(report, Report::Stepped(_)));
+    }
+
+    #[test]
+    fn a_value_map_is_computed_once_for_a_house_and_can_be_stopped() {
+        let (commands, reports) = start();
+        wait(&reports, |report| matches!(report, Report::Thought(..)));
+        commands.send(Command::Survey).unwrap();
+        wait(&reports, |report| matches!(report, Report::Surveyed(found, 0) if found.heights.len() == 2));
+        commands.send(Command::Stop).unwrap();
+        wait(&reports, |report| matches!(report, Report::Working(None)));
+        commands.send(Command::Survey).unwrap();
+        wait(&reports, |report| matches!(report, Report::Surveyed(found, _) if found.heights.len() == found.of));
+        wait(&reports, |report| matches!(report, Report::Working(None)));
+        // Wherever the agent stands, the house is the same one.
+        commands.send(Command::Act(Action::navigate(ActionType::RotateLeft))).unwrap();
+        wait(&reports, |report| matches!(report, Report::Stepped(_)));
+        commands.send(Command::Survey).unwrap();
+        let mut worked = false;
+        let whole = |report: &Report| matches!(report, Report::Surveyed(found, 1) if found.heights.len() == found.of);
+        wait(&reports, |report| {
+            worked |= matches!(report, Report::Working(Some(_)));
+            whole(report)
+        });
+        assert!(!worked, "what is known is not computed again");
     }
 
     #[test]

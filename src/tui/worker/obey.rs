@@ -69,6 +69,14 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 self.engine.seek(step);
                 self.go(None) && self.show() && self.think()
             }
+            Command::Along { by, steps } => {
+                let (at, last) = (self.engine.tree().at(), self.engine.tree().last());
+                match (by > 0 && at == last, steps) {
+                    (true, true) => self.obey(Command::Step),
+                    (true, false) => true,
+                    (false, _) => self.obey(Command::Seek(at.saturating_add_signed(by).min(last))),
+                }
+            }
             Command::Switch(wanted) => {
                 let switched = self.engine.branch(&wanted).and_then(|branch| self.engine.switch(branch));
                 match switched {
@@ -81,7 +89,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 Err(error) => self.refuse(&error),
             },
             Command::Diverge(wanted) => match self.engine.branch(&wanted) {
-                Ok(branch) => (self.tell)(Report::Diverged(self.engine.divergence(branch))),
+                Ok(branch) => (self.tell)(Report::Diverged(self.engine.parted(branch))),
                 Err(error) => self.refuse(&error),
             },
             Command::Break(breaks) => {
@@ -106,7 +114,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                     Err(error) => self.refuse(&error),
                 }
             }
-            Command::WhichLink(times) => self.follow(Some(times)),
+            Command::WhichLink(draws) => self.follow(Some(draws)),
             Command::Stop => {
                 self.background.stop();
                 (self.tell)(Report::Working(None))

@@ -41,8 +41,8 @@ pub enum Report {
     Diverged(Divergence),
     /// What two instructions come to.
     Compared(Box<Contrast>),
-    /// The values of the cells so far.
-    Surveyed(Arc<Landscape>),
+    /// The values of the cells so far, in the house as it was at that step.
+    Surveyed(Arc<Landscape>, u32),
     /// A chain so far.
     Chained(Box<Chained>),
     /// Work in the background, with how far it is; nothing when it is over.
