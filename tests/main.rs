@@ -14,3 +14,5 @@ mod program;
 mod evaluator;
 mod faults;
 mod scenarios;
+mod terminal;
+mod workbench;
