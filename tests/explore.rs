@@ -1,115 +1,13 @@
-//! The explorer in a pseudo-terminal: the real binary, real keys, and a terminal that is left as it was found.
+//! The explorer in a pseudo-terminal: typing, time travel, signals, and a terminal that is left as it was found.
 
-use std::io::{Read, Write};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
-
-use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
-
-/// How long anything may take on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// A terminal with the explorer in it.
-struct Session {
-    master: Box<dyn MasterPty + Send>,
-    keys: Box<dyn Write + Send>,
-    child: Box<dyn Child + Send + Sync>,
-    screen: Arc<Mutex<vt100::Parser>>,
-    _state: tempfile::TempDir,
-}
-
-impl Session {
-    fn start(arguments: &[&str]) -> Session {
-        Session::of("explore", arguments)
-    }
-
-    fn of(command_name: &str, arguments: &[&str]) -> Session {
-        let size = PtySize { rows: 36, cols: 120, pixel_width: 0, pixel_height: 0 };
-        let pair = native_pty_system().openpty(size).unwrap();
-        let state = tempfile::tempdir().unwrap();
-        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
-        command.arg(command_name);
-        command.args(arguments);
-        for name in ["TMUX", "CI", "NO_COLOR", "LC_ALL", "LC_CTYPE"] {
-            command.env_remove(name);
-        }
-        command.env("TERM", "xterm-256color");
-        command.env("COLORTERM", "truecolor");
-        command.env("LANG", "en_US.UTF-8");
-        command.env("XDG_STATE_HOME", state.path());
-        command.env("XDG_CONFIG_HOME", state.path());
-        let child = pair.slave.spawn_command(command).unwrap();
-        drop(pair.slave);
-        let mut output = pair.master.try_clone_reader().unwrap();
-        let screen = Arc::new(Mutex::new(vt100::Parser::new(36, 120, 0)));
-        let shown = screen.clone();
-        std::thread::spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(count @ 1..) = output.read(&mut bytes) {
-                shown.lock().unwrap().process(&bytes[..count]);
-            }
-        });
-        let keys = pair.master.take_writer().unwrap();
-        Session { master: pair.master, keys, child, screen, _state: state }
-    }
-
-    fn text(&self) -> String {
-        self.screen.lock().unwrap().screen().contents()
-    }
-
-    /// Waits until the screen shows `text`.
-    fn see(&self, text: &str) {
-        let since = Instant::now();
-        while !self.text().contains(text) {
-            assert!(since.elapsed() < PATIENCE, "no {text:?} on the screen:\n{}", self.text());
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    fn press(&mut self, keys: &str) {
-        self.keys.write_all(keys.as_bytes()).unwrap();
-        self.keys.flush().unwrap();
-    }
-
-    /// Waits for the end; returns the exit code.
-    fn end(&mut self) -> u32 {
-        let since = Instant::now();
-        loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                return status.exit_code();
-            }
-            assert!(since.elapsed() < PATIENCE, "it does not end:\n{}", self.text());
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    /// The alternate screen is left, the cursor shown, pastes no longer marked.
-    fn is_restored(&self) {
-        let since = Instant::now();
-        loop {
-            let parser = self.screen.lock().unwrap();
-            let screen = parser.screen();
-            if !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste() {
-                return;
-            }
-            assert!(since.elapsed() < PATIENCE, "the terminal is not restored");
-            drop(parser);
-            std::thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    fn signal(&self, name: &str) {
-        let id = self.child.process_id().unwrap().to_string();
-        assert!(std::process::Command::new("kill").args([name, &id]).status().unwrap().success());
-    }
-}
+use super::terminal::Session;
 
 #[test]
 fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() {
     let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
     session.see("Mind");
     session.see("step 0");
-    assert!(session.screen.lock().unwrap().screen().alternate_screen());
+    assert!(session.is_taken());
     session.press("i");
     session.press("pick up the quince");
     session.see("now: ");
@@ -204,10 +102,11 @@ fn a_huge_paste_and_a_storm_of_resizes_do_no_harm() {
     session.press(&"carry the mug ".repeat(75_000));
     session.press("\x1b[201~");
     session.see("carry the mug");
-    for (rows, cols) in [(24, 80), (10, 30), (60, 200), (30, 100), (1, 1), (36, 120)] {
-        let size = PtySize { rows, cols, pixel_width: 0, pixel_height: 0 };
-        session.master.resize(size).unwrap();
-        session.screen.lock().unwrap().screen_mut().set_size(rows.max(2), cols.max(2));
+    for at in 0u16..120 {
+        session.resize(1 + at * 37 % 211, 1 + at * 13 % 67);
+    }
+    for (cols, rows) in [(80, 24), (30, 10), (200, 60), (100, 30), (1, 1), (120, 36)] {
+        session.resize(cols, rows);
     }
     // A screen that is too small takes no keys: it has to be large again first.
     session.see("esc leave");

@@ -152,7 +152,7 @@ fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
 }
 
 /// The folder with the sentence encoder, where it is installed.
-fn encoders() -> Option<std::path::PathBuf> {
+pub fn encoders() -> Option<std::path::PathBuf> {
     let cache = std::env::var_os("XDG_CACHE_HOME").map(Into::into);
     let home = std::env::var_os("HOME").map(|home| std::path::PathBuf::from(home).join(".cache"));
     let found = std::env::var_os("SPRINT_HOME").map(Into::into).or_else(|| Some(cache.or(home)?.join("sprint")))?;

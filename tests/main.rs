@@ -15,3 +15,5 @@ mod evaluator;
 mod faults;
 mod scenarios;
 mod training;
+mod terminal;
+mod workbench;

@@ -66,6 +66,9 @@ pub struct Display {
     /// No screen: a verb a line on standard input, a line a step on standard output
     #[arg(long)]
     plain: bool,
+    /// The most that a step's picture may cost on the wire; pictures get coarser to keep to it
+    #[arg(long, value_name = "KB")]
+    bandwidth: Option<u32>,
     /// Wait for a key before the first step
     #[arg(long)]
     paused: bool,
@@ -100,7 +103,10 @@ impl Display {
         };
         let log = logging::open().ok();
         let (config, memory) = (settings()?, Some(logging::path().with_file_name("terminals.json")));
-        let screen = screen::Screen { protocol, policy: kind, manual, runs: !self.paused, config, memory, log };
+        let history = Some(logging::path().with_file_name("history"));
+        let bandwidth = self.bandwidth.filter(|&kilobytes| kilobytes > 0).map(|kilobytes| 1000 * u64::from(kilobytes));
+        let runs = !self.paused;
+        let screen = screen::Screen { protocol, policy: kind, manual, runs, config, memory, history, bandwidth, log };
         match screen::run(screen, open)? {
             Farewell::Signal(_) => Ok(Ending::Interrupted),
             Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),

@@ -125,6 +125,16 @@ impl Heading {
     /// Clockwise from north.
     pub const ALL: [Heading; 4] = [Heading::North, Heading::East, Heading::South, Heading::West];
 
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Heading::North => "north",
+            Heading::East => "east",
+            Heading::South => "south",
+            Heading::West => "west",
+        }
+    }
+
     /// From quarter turns clockwise, any integer.
     pub fn from_quarters(quarters: i32) -> Heading {
         Heading::ALL[quarters.rem_euclid(4) as usize]

@@ -222,6 +222,22 @@ pub struct Rate {
     pub of: u32,
 }
 
+/// What is played to see which link breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draws {
+    /// Plays of each link from each entry.
+    pub times: u32,
+    /// Only this link, from 0.
+    pub only: Option<usize>,
+}
+
+impl Draws {
+    /// Whether a link is played.
+    pub fn include(self, link: usize) -> bool {
+        self.only.is_none_or(|only| only == link)
+    }
+}
+
 /// Which link breaks: how often each is done from the expert's entry state and from the agent's own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Trials {
@@ -242,7 +258,7 @@ impl Trials {
     }
 }
 
-/// Plays each link `times` times with drawn actions, from the expert's entry and from the agent's own (as `play` recorded it).
+/// Plays links with drawn actions, from the expert's entry and from the agent's own (as `play` recorded it).
 /// `visit` sees what was found after every play.
 ///
 /// # Errors
@@ -251,7 +267,7 @@ pub fn trials(
     chain: &Chain,
     play: &Play,
     policy: &mut dyn Policy,
-    times: u32,
+    draws: Draws,
     stop: &AtomicBool,
     visit: &mut dyn FnMut(&Trials),
 ) -> anyhow::Result<Trials> {
@@ -261,8 +277,8 @@ pub fn trials(
     let links = chain.links.len();
     let mut found = Trials { expert: vec![Rate::default(); links], own: vec![Rate::default(); links] };
     policy.set_sampling(true);
-    for draw in 0..times {
-        for (link, (steps, world, grader)) in entries.iter().enumerate() {
+    for draw in 0..draws.times {
+        for (link, (steps, world, grader)) in entries.iter().enumerate().filter(|(link, _)| draws.include(*link)) {
             let own = play.outcomes.get(link).filter(|outcome| outcome.reached).map(|outcome| &outcome.entry);
             // The bindings of the agent's own things differ; what it holds or moved is still of the classes that are asked for.
             let mut starts = vec![(world, grader.clone(), true)];
@@ -365,15 +381,19 @@ mod tests {
         let stop = AtomicBool::new(false);
         let play = chain.play(&mut policy, false, &stop).unwrap();
         let mut seen = 0;
-        let found = trials(&chain, &play, &mut policy, 2, &stop, &mut |_| seen += 1).unwrap();
+        let found =
+            trials(&chain, &play, &mut policy, Draws { times: 2, only: None }, &stop, &mut |_| seen += 1).unwrap();
         assert_eq!(found.expert.iter().map(|rate| rate.of).collect::<Vec<_>>(), [2, 2]);
         assert_eq!(found.own[0].of, 2);
         assert_eq!(found.own[1].of, if play.outcomes[1].reached { 2 } else { 0 });
         assert_eq!(seen, found.expert.iter().chain(&found.own).map(|rate| rate.of).sum::<u32>());
+        let one = Draws { times: 3, only: Some(1) };
+        let only = trials(&chain, &play, &mut policy, one, &stop, &mut |_| ()).unwrap();
+        assert_eq!(only.expert.iter().map(|rate| rate.of).collect::<Vec<_>>(), [0, 3]);
         stop.store(true, Ordering::Relaxed);
-        assert_eq!(trials(&chain, &play, &mut policy, 2, &stop, &mut |_| ()).unwrap().expert[0].of, 0);
+        assert_eq!(trials(&chain, &play, &mut policy, one, &stop, &mut |_| ()).unwrap().expert[1].of, 0);
         let ungraded = Chain { graded: None, ..chain };
-        assert!(trials(&ungraded, &play, &mut policy, 1, &stop, &mut |_| ()).is_err());
+        assert!(trials(&ungraded, &play, &mut policy, one, &stop, &mut |_| ()).is_err());
     }
 
     #[test]

@@ -21,8 +21,16 @@ impl Measure {
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
-            Measure::Value => "V, best heading",
+            Measure::Value => "V",
             Measure::Confidence => "no critic: p of the likeliest choice",
+        }
+    }
+
+    /// In a letter.
+    pub fn letter(self) -> char {
+        match self {
+            Measure::Value => 'V',
+            Measure::Confidence => 'p',
         }
     }
 }
@@ -32,10 +40,16 @@ impl Measure {
 pub struct Height {
     /// Where.
     pub cell: Cell,
-    /// The heading with the highest value.
-    pub heading: Heading,
-    /// That value.
-    pub value: f32,
+    /// The value looking each way, in the order of [`Heading::ALL`].
+    pub values: [f32; 4],
+}
+
+impl Height {
+    /// The value looking one way; without one, the highest and the way it looks.
+    pub fn facing(&self, heading: Option<Heading>) -> (Heading, f32) {
+        let each = Heading::ALL.into_iter().zip(self.values).filter(|(one, _)| heading.is_none_or(|only| only == *one));
+        each.reduce(|best, other| if other.1 > best.1 { other } else { best }).unwrap_or((Heading::North, 0.0))
+    }
 }
 
 /// What was found so far.
@@ -52,17 +66,17 @@ pub struct Landscape {
 }
 
 impl Landscape {
-    /// The lowest and the highest value.
-    pub fn range(&self) -> Option<(f32, f32)> {
-        let values = self.heights.iter().map(|height| height.value);
+    /// The lowest and the highest value, looking one way or the best.
+    pub fn range(&self, heading: Option<Heading>) -> Option<(f32, f32)> {
+        let values = self.heights.iter().map(|height| height.facing(heading).1);
         values.map(|value| (value, value)).reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
     /// The value of each cell that is done, between the lowest (0) and the highest (1).
-    pub fn shares(&self) -> HashMap<Cell, f32> {
-        let Some((low, high)) = self.range() else { return HashMap::new() };
+    pub fn shares(&self, heading: Option<Heading>) -> HashMap<Cell, f32> {
+        let Some((low, high)) = self.range(heading) else { return HashMap::new() };
         let share = |value: f32| if high > low { (value - low) / (high - low) } else { 0.5 };
-        self.heights.iter().map(|height| (height.cell, share(height.value))).collect()
+        self.heights.iter().map(|height| (height.cell, share(height.facing(heading).1))).collect()
     }
 }
 
@@ -87,8 +101,8 @@ pub fn survey(
     let here = world.agent.cell;
     cells.sort_by_key(|cell| cell.x.abs_diff(here.x) + cell.z.abs_diff(here.z));
     for cell in cells {
-        let mut best: Option<Height> = None;
-        for heading in Heading::ALL {
+        let mut values = [0.0; 4];
+        for (heading, height) in Heading::ALL.into_iter().zip(&mut values) {
             if stop.load(Ordering::Relaxed) {
                 return Ok(found);
             }
@@ -98,18 +112,15 @@ pub fn survey(
             policy.begin(0);
             let mut situation = Situation { house: &mut house, instruction: &found.instruction, step: 0, grader: None };
             let decision = policy.decide(&mut situation)?;
-            let value = match policy.values(&mut situation)? {
+            *height = match policy.values(&mut situation)? {
                 Some(values) => {
                     found.measure = Measure::Value;
                     values.state
                 }
                 None => decision.mind.map_or(0.0, |mind| mind.actions.into_iter().flatten().fold(0.0, f32::max)),
             };
-            if best.is_none_or(|best| value > best.value) {
-                best = Some(Height { cell, heading, value });
-            }
         }
-        found.heights.extend(best);
+        found.heights.push(Height { cell, values });
         if !visit(&found) {
             break;
         }
@@ -124,6 +135,13 @@ mod tests {
     use crate::house::testing::kitchen;
 
     #[test]
+    fn a_cell_is_worth_what_it_is_in_its_best_heading_or_in_one() {
+        let height = Height { cell: Cell::default(), values: [0.1, 0.7, 0.3, 0.7] };
+        assert_eq!(height.facing(None), (Heading::East, 0.7));
+        assert_eq!(height.facing(Some(Heading::South)), (Heading::South, 0.3));
+    }
+
+    #[test]
     fn every_cell_is_measured_once_unless_it_is_stopped() {
         let (scene, world) = kitchen();
         let stop = AtomicBool::new(false);
@@ -136,9 +154,11 @@ mod tests {
         let all = all.unwrap();
         assert_eq!((all.heights.len(), all.of, seen), (scene.cells.len(), scene.cells.len(), scene.cells.len()));
         assert_eq!(all.heights[0].cell, world.agent.cell, "from the agent outwards");
-        let shares = all.shares();
-        assert_eq!(shares.len(), scene.cells.len());
-        assert!(shares.values().all(|share| (0.0..=1.0).contains(share)));
+        for heading in [None, Some(Heading::West)] {
+            let shares = all.shares(heading);
+            assert_eq!(shares.len(), scene.cells.len());
+            assert!(shares.values().all(|share| (0.0..=1.0).contains(share)));
+        }
         let few = survey(&mut policy, &scene, &world, "go", &stop, &mut |found| found.heights.len() < 3).unwrap();
         assert_eq!(few.heights.len(), 3);
         stop.store(true, Ordering::Relaxed);

@@ -23,6 +23,7 @@ use super::timeline::Divergence;
 use super::verb::Page;
 use super::worker::{Going, Pace};
 use crate::agent::{Decision, Values};
+use crate::domain::Heading;
 use crate::house::view::Candidate;
 use crate::run::contrast::Contrast;
 use crate::run::landscape::Landscape;
@@ -95,8 +96,12 @@ pub struct App {
     pub now: Option<Box<Snapshot>>,
     /// Two instructions in one state.
     pub contrast: Option<Contrast>,
-    /// The values that are painted on the map.
-    pub landscape: Option<Arc<Landscape>>,
+    /// Values are painted on the map.
+    pub paints_values: bool,
+    /// The values, and the step of the house that they are for.
+    pub landscape: Option<(Arc<Landscape>, u32)>,
+    /// The heading whose values are painted; the best without one.
+    pub heading: Option<Heading>,
     /// The chain that was followed last, and the one before it where another policy followed the same.
     pub chain: Option<Chained>,
     /// The same chain by another policy.
@@ -127,6 +132,8 @@ pub struct App {
     pub trouble: Option<String>,
     /// What happened, oldest first.
     pub log: VecDeque<Entry>,
+    /// What was noted since the last key.
+    pub notice: Option<Entry>,
     /// The instruction line while somebody types.
     pub editor: Editor,
     /// The line of a verb while somebody types.
@@ -151,6 +158,12 @@ pub struct App {
     pub page_of_interactions: usize,
     /// Bytes that the newest step cost on the wire.
     pub bytes: Option<u64>,
+    /// Bytes a second on the wire, over the last while.
+    pub bytes_a_second: Option<u64>,
+    /// The mouse is heard.
+    pub mouse: bool,
+    /// Nobody has explored here before: the last row says how to begin.
+    pub newcomer: bool,
 }
 
 impl App {
@@ -174,7 +187,9 @@ impl App {
             breaks: Vec::new(),
             divergence: None,
             contrast: None,
+            paints_values: false,
             landscape: None,
+            heading: None,
             chain: None,
             chain_before: None,
             working: None,
@@ -184,6 +199,7 @@ impl App {
             busy: Some("building the house".into()),
             trouble: None,
             log: VecDeque::new(),
+            notice: None,
             editor: Editor::default(),
             palette: Editor::default(),
             examples: Vec::new(),
@@ -196,6 +212,9 @@ impl App {
             labels: true,
             page_of_interactions: 0,
             bytes: None,
+            bytes_a_second: None,
+            mouse: false,
+            newcomer: false,
         }
     }
 
@@ -215,10 +234,17 @@ impl App {
         Layout::of(Rect::from((ratatui::layout::Position::ORIGIN, self.size)))
     }
 
-    /// The character cells that the picture fills.
+    /// The character cells that the picture fills, where the page has one.
     pub fn picture_area(&self) -> Option<Rect> {
         let layout = self.layout()?;
-        Some(layout.picture(self.graphics.protocol, self.graphics.cell_pixels))
+        match self.page {
+            Page::Main => Some(layout.picture(self.graphics.protocol, self.graphics.cell_pixels)),
+            Page::Branches => {
+                self.divergence.as_ref()?.sights.as_ref()?;
+                Some(layout.branches(self.rows(), self.graphics.cell_pixels).frames)
+            }
+            Page::Mind | Page::World | Page::Compare | Page::Chain => None,
+        }
     }
 
     /// The interactions on the present page, numbered from 1.
@@ -242,7 +268,8 @@ impl App {
             Page::World => now.scene.fixtures.len() + now.world.objects.len(),
             Page::Mind => 5 + now.candidates.len(),
             Page::Compare => self.contrast.as_ref().map_or(0, |contrast| contrast.rows.len()),
-            Page::Main | Page::Chain => 0,
+            Page::Chain => self.chain.as_ref().map_or(0, |chain| chain.links.len()),
+            Page::Main => 0,
         }
     }
 
@@ -250,8 +277,9 @@ impl App {
     pub fn completions(&self) -> Vec<String> {
         let typed = self.editor.text();
         let mut found: Vec<String> = Vec::new();
+        let bare = |text: &str| text.trim_end_matches('.').to_lowercase();
         let mut add = |text: String| {
-            if text.len() > typed.len() && !found.contains(&text) {
+            if text.len() > typed.len() && !found.iter().any(|known| bare(known) == bare(&text)) {
                 found.push(text);
             }
         };
@@ -281,11 +309,16 @@ impl App {
     pub fn job(&self) -> Option<Job> {
         let now = self.now.as_ref()?;
         let cells = self.picture_area()?.as_size();
-        let plain = self.overlay != Overlay::Frames;
+        let pair = self.divergence.as_ref().and_then(|divergence| divergence.sights.as_ref());
+        let (frame, overlay) = match pair.filter(|_| self.page == Page::Branches) {
+            Some((pair, _)) => (pair.clone(), Overlay::Colour),
+            None => (now.frame.clone(), self.overlay),
+        };
+        let plain = self.page == Page::Main && overlay != Overlay::Frames;
         let labels = if plain && self.labels && self.going.is_none() { self.labelled(now) } else { Vec::new() };
         (cells.width > 0 && cells.height > 0).then(|| Job {
-            frame: now.frame.clone(),
-            overlay: self.overlay,
+            frame,
+            overlay,
             coarseness: self.coarseness,
             in_tmux: self.graphics.in_tmux,
             recent: now.recent.clone(),
@@ -322,10 +355,12 @@ impl App {
         labels
     }
 
-    /// Adds a line to the log.
+    /// Adds a line to the log, and shows it on pages without one until the next key.
     pub fn note(&mut self, tone: Tone, text: impl Into<String>) {
         let step = self.now.as_ref().map(|now| now.step);
-        self.write(Entry { step, text: text.into(), outcome: String::new(), tone });
+        let entry = Entry { step, text: text.into(), outcome: String::new(), tone };
+        self.notice = Some(entry.clone());
+        self.write(entry);
     }
 
     /// Adds an entry to the log, unless it is the last one again.

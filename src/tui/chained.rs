@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::worker::Report;
 use crate::agent::Policy;
-use crate::run::chain::{Chain, Play, Trials, trials};
+use crate::run::chain::{Chain, Draws, Play, Trials, trials};
 
 /// What is known of a chain so far.
 #[derive(Clone, Debug, Default)]
@@ -22,14 +22,14 @@ pub struct Chained {
 }
 
 impl Chained {
-    /// Follows a chain both ways; with `times` draws, also every link by itself. Tells what is known as it goes.
+    /// Follows a chain both ways; with `draws`, also links by themselves. Tells what is known as it goes.
     ///
     /// # Errors
     /// Whatever the policy reports.
     pub fn work(
         chain: &Chain,
         policy: &mut dyn Policy,
-        times: Option<u32>,
+        draws: Option<Draws>,
         stop: &AtomicBool,
         tell: &dyn Fn(Report) -> bool,
     ) -> anyhow::Result<()> {
@@ -43,10 +43,11 @@ impl Chained {
         show(&known, "chain: as one instruction");
         known.as_one = Some(chain.play(policy, true, stop)?);
         show(&known, "chain");
-        if let Some(times) = times {
-            let all = 2 * times as usize * chain.links.len();
+        if let Some(draws) = draws {
+            let links = if draws.only.is_some() { 1 } else { chain.links.len() };
+            let all = 2 * draws.times as usize * links;
             let mut shown = known.clone();
-            let found = trials(chain, &play, policy, times, stop, &mut |found| {
+            let found = trials(chain, &play, policy, draws, stop, &mut |found| {
                 shown.trials = Some(found.clone());
                 let done: u32 = found.expert.iter().chain(&found.own).map(|rate| rate.of).sum();
                 show(&shown, &format!("links: {done} of at most {all} plays"));

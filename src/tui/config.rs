@@ -1,4 +1,4 @@
-//! What a person has set: colours, and keys of their own. A TOML file; every mistake in it is named.
+//! What a person has set: colours, the mouse, and keys of their own. A TOML file; every mistake in it is named.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +16,8 @@ struct File {
     #[serde(default)]
     theme: Scheme,
     #[serde(default)]
+    mouse: bool,
+    #[serde(default)]
     keys: BTreeMap<String, String>,
 }
 
@@ -24,6 +26,8 @@ struct File {
 pub struct Config {
     /// The colours.
     pub scheme: Scheme,
+    /// The mouse is heard from the start.
+    pub mouse: bool,
     /// Keys that mean something else.
     pub keys: Vec<Remapped>,
 }
@@ -55,7 +59,7 @@ impl Config {
             let verb = verb::parse(line).map_err(|complaint| anyhow::anyhow!("keys.{name}: {complaint}"))?;
             keys.push(Remapped { code, modifiers, verb });
         }
-        Ok(Config { scheme: file.theme, keys })
+        Ok(Config { scheme: file.theme, mouse: file.mouse, keys })
     }
 
     /// What a key means by these settings.
@@ -102,9 +106,10 @@ mod tests {
 
     #[test]
     fn keys_and_colours_are_read() {
-        let text = "format_version = 1\ntheme = \"high-contrast\"\n[keys]\nctrl-r = \"policy random\"\nf5 = \"run\"\n";
+        let text = "format_version = 1\ntheme = \"high-contrast\"\nmouse = true\n[keys]\nctrl-r = \"policy random\"\nf5 = \"run\"\n";
         let config = Config::parse(text).unwrap();
-        assert_eq!(config.scheme, Scheme::HighContrast);
+        assert_eq!((config.scheme, config.mouse), (Scheme::HighContrast, true));
+        assert!(!Config::default().mouse);
         let press = |code, modifiers| config.verb(KeyEvent::new(code, modifiers));
         assert_eq!(press(KeyCode::Char('r'), KeyModifiers::CONTROL), Some(Verb::Policy(PolicyKind::Random)));
         assert_eq!(press(KeyCode::F(5), KeyModifiers::NONE), Some(Verb::ToggleRun));

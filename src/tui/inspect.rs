@@ -2,7 +2,7 @@
 
 use super::engine::Snapshot;
 use crate::domain::world::Parent;
-use crate::domain::{Action, ActionType, Class, Instance};
+use crate::domain::{Action, ActionType, Class, Instance, Scene, World};
 use crate::house::{rules, view};
 
 /// A thing, as the inspector shows it.
@@ -68,7 +68,7 @@ fn thing(now: &Snapshot, instance: Instance) -> Option<Thing> {
         instance,
         class,
         state: state(now, instance),
-        place: place(now, instance),
+        place: place(scene, world, instance),
         metres: view::distance(scene, world, instance).unwrap_or(0.0) / 1000.0,
         seen: now.view.sighting(instance).is_some(),
         possible,
@@ -117,12 +117,12 @@ pub fn state(now: &Snapshot, instance: Instance) -> String {
     words.join(", ")
 }
 
-fn place(now: &Snapshot, instance: Instance) -> String {
+fn place(scene: &Scene, world: &World, instance: Instance) -> String {
     let Instance::Object(index) = instance else { return String::new() };
-    match now.world.object(index).map(|object| object.parent) {
+    match world.object(index).map(|object| object.parent) {
         Some(Parent::Hand) => "in the hand".into(),
         Some(Parent::In(container)) => {
-            let class = now.world.class_of(&now.scene, container);
+            let class = world.class_of(scene, container);
             class.map_or_else(String::new, |class| format!("on/in {}", class.spoken()))
         }
         Some(Parent::Floor) => "on the floor".into(),
@@ -130,10 +130,63 @@ fn place(now: &Snapshot, instance: Instance) -> String {
     }
 }
 
+/// Where the agent stands and looks, and what it holds.
+pub fn stands(scene: &Scene, world: &World) -> String {
+    let pose = world.agent;
+    let held = world.held.and_then(|held| world.class_of(scene, Instance::Object(held)));
+    let hand = held.map_or("the hand is empty".to_string(), |class| format!("holds the {}", class.spoken()));
+    format!("cell {},{} facing {}, {hand}", pose.cell.x, pose.cell.z, pose.heading.name())
+}
+
+/// What is different in another state of the same house, the agent's place aside.
+pub fn changes(scene: &Scene, before: &World, after: &World) -> Vec<String> {
+    let fixtures = (0..scene.fixtures.len() as u16).map(Instance::Fixture);
+    let objects = (0..after.objects.len() as u16).map(Instance::Object);
+    let mut found = Vec::new();
+    for instance in fixtures.chain(objects) {
+        let Some(class) = after.class_of(scene, instance) else { continue };
+        let mut add = |was: bool, is: bool, [off, on]: [&str; 2]| {
+            if was != is {
+                found.push(format!("{} {}", class.spoken(), if is { on } else { off }));
+            }
+        };
+        add(before.is_open(instance), after.is_open(instance), ["shut", "open"]);
+        add(before.is_on(instance), after.is_on(instance), ["off", "on"]);
+        let Instance::Object(index) = instance else { continue };
+        let (Some(was), Some(is)) = (before.object(index), after.object(index)) else {
+            found.push(format!("{} there", class.spoken()));
+            continue;
+        };
+        add(was.sliced, is.sliced, ["whole", "cut up"]);
+        add(was.clean, is.clean, ["dirty", "clean"]);
+        add(was.hot, is.hot, ["no longer hot", "hot"]);
+        add(was.cold, is.cold, ["no longer cold", "cold"]);
+        if was.parent != is.parent {
+            found.push(format!("{} {}", class.spoken(), place(scene, after, instance)));
+        }
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tui::testing;
+
+    #[test]
+    fn another_state_is_told_by_what_changed() {
+        let mut engine = testing::engine();
+        engine.choose(crate::tui::policies::PolicyKind::Expert).unwrap();
+        let start = engine.snapshot();
+        while engine.progress().unwrap().completed_at.is_empty() {
+            engine.step().unwrap();
+        }
+        let now = engine.snapshot();
+        assert!(stands(&now.scene, &start.world).ends_with("the hand is empty"));
+        assert!(stands(&now.scene, &now.world).ends_with("holds the mug"));
+        assert!(changes(&now.scene, &start.world, &now.world).contains(&"mug in the hand".to_string()));
+        assert!(changes(&now.scene, &now.world, &now.world).is_empty());
+    }
 
     #[test]
     fn every_thing_says_what_can_be_done_or_why_not() {

@@ -3,8 +3,9 @@
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::policies::PolicyKind;
-use super::verb::{Page, Verb};
+use super::verb::{Page, TIMES, Verb};
 use crate::domain::ActionType;
+use crate::run::chain::Draws;
 
 /// What the keys mean at the moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +26,7 @@ pub enum Mode {
 pub struct Binding {
     /// Any of these.
     pub keys: &'static [KeyCode],
-    /// In the help.
+    /// In the help; empty where the binding before says it too.
     pub label: &'static str,
     /// What they do.
     pub verb: Verb,
@@ -40,13 +41,13 @@ use KeyCode::{Backspace, Char, Down, End, Enter, Esc, F, Home, Left, PageDown, P
 /// Keys that mean the same whether a policy or a person acts.
 const COMMON: &[Binding] = &[
     bind("space", &[Char(' ')], Verb::ToggleRun),
-    bind("enter n .", &[Enter, Char('n'), Char('.')], Verb::Step(1)),
-    bind("h", &[Char('h')], Verb::Back(1)),
-    bind("l", &[Char('l')], Verb::Forward(1)),
-    bind("0 home", &[Char('0'), Home], Verb::Seek(0)),
-    bind("$ end", &[Char('$'), End], Verb::Last),
-    bind("]", &[Char(']')], Verb::NextEvent),
-    bind("[", &[Char('[')], Verb::LastEvent),
+    bind("n enter", &[Enter, Char('n'), Char('.')], Verb::Step(1)),
+    bind("h l", &[Char('h')], Verb::Back(1)),
+    bind("", &[Char('l')], Verb::Forward(1)),
+    bind("0 $", &[Char('0'), Home], Verb::Seek(0)),
+    bind("", &[Char('$'), End], Verb::Last),
+    bind("[ ]", &[Char('[')], Verb::LastEvent),
+    bind("", &[Char(']')], Verb::NextEvent),
     bind("}", &[Char('}')], Verb::NextBranch),
     bind("c", &[Char('c')], Verb::Continue),
     bind("i /", &[Char('i'), Char('/')], Verb::Edit),
@@ -54,8 +55,8 @@ const COMMON: &[Binding] = &[
     bind("m", &[Char('m')], Verb::ToggleManual),
     bind("1-9", &[Char('1')], Verb::Interact(1)),
     bind("tab", &[Tab], Verb::Page),
-    bind("+ =", &[Char('+'), Char('=')], Verb::Faster),
-    bind("-", &[Char('-')], Verb::Slower),
+    bind("+ -", &[Char('+'), Char('=')], Verb::Faster),
+    bind("", &[Char('-')], Verb::Slower),
     bind("r", &[Char('r')], Verb::Reset),
     bind("N", &[Char('N')], Verb::Next),
     bind("p", &[Char('p')], Verb::NextPolicy),
@@ -65,6 +66,7 @@ const COMMON: &[Binding] = &[
     bind("B", &[Char('B')], Verb::Show(Page::Compare)),
     bind("C", &[Char('C')], Verb::Show(Page::Chain)),
     bind("V", &[Char('V')], Verb::ValueMap),
+    bind("v", &[Char('v')], Verb::NextHeading),
     bind("o", &[Char('o')], Verb::Overlay),
     bind("b", &[Char('b')], Verb::Labels),
     bind("g", &[Char('g')], Verb::Graphics),
@@ -72,15 +74,15 @@ const COMMON: &[Binding] = &[
     bind("S", &[Char('S')], Verb::Save(None)),
     bind("y", &[Char('y')], Verb::Copy),
     bind("?", &[Char('?'), F(1)], Verb::Help),
-    bind("q ctrl-c", &[Char('q')], Verb::Quit),
+    bind("q", &[Char('q')], Verb::Quit),
 ];
 
 const WATCH: &[Binding] = &[
-    bind("left", &[Left], Verb::Back(1)),
-    bind("right", &[Right], Verb::Forward(1)),
-    bind("a", &[Char('a')], Verb::Policy(PolicyKind::Agent)),
-    bind("e", &[Char('e')], Verb::Policy(PolicyKind::Expert)),
-    bind("x", &[Char('x')], Verb::Policy(PolicyKind::Random)),
+    bind("", &[Left], Verb::Back(1)),
+    bind("", &[Right], Verb::Forward(1)),
+    bind("a e x", &[Char('a')], Verb::Policy(PolicyKind::Agent)),
+    bind("", &[Char('e')], Verb::Policy(PolicyKind::Expert)),
+    bind("", &[Char('x')], Verb::Policy(PolicyKind::Random)),
 ];
 
 const MANUAL: &[Binding] = &[
@@ -88,7 +90,7 @@ const MANUAL: &[Binding] = &[
     bind("left a", &[Left, Char('a')], Verb::Navigate(ActionType::RotateLeft)),
     bind("right d", &[Right, Char('d')], Verb::Navigate(ActionType::RotateRight)),
     bind("pgup u", &[PageUp, Char('u')], Verb::Navigate(ActionType::LookUp)),
-    bind("pgdn down s", &[PageDown, Down, Char('s')], Verb::Navigate(ActionType::LookDown)),
+    bind("pgdn s", &[PageDown, Down, Char('s')], Verb::Navigate(ActionType::LookDown)),
     bind("esc", &[Esc], Verb::ToggleManual),
 ];
 
@@ -105,8 +107,8 @@ const HELP: &[Binding] =
 
 /// Keys of any page but the main one; they come before the common ones.
 const LIST: &[Binding] = &[
-    bind("j down", &[Char('j'), Down], Verb::Select(1)),
-    bind("k up", &[Char('k'), Up], Verb::Select(-1)),
+    bind("j k", &[Char('j'), Down], Verb::Select(1)),
+    bind("", &[Char('k'), Up], Verb::Select(-1)),
     bind("esc", &[Esc], Verb::Show(Page::Main)),
 ];
 const BRANCHES: &[Binding] = &[
@@ -119,7 +121,8 @@ const MIND: &[Binding] = &[bind("s", &[Char('s')], Verb::Sort)];
 const COMPARE: &[Binding] = &[bind("enter", &[Enter], Verb::Palette("compare ")), bind("s", &[Char('s')], Verb::Swap)];
 const CHAIN: &[Binding] = &[
     bind("enter", &[Enter], Verb::Palette("chain ")),
-    bind("w", &[Char('w')], Verb::WhichLink(8)),
+    bind("w", &[Char('w')], Verb::WhichLink(Draws { times: TIMES, only: None })),
+    bind("x", &[Char('x')], Verb::ReplayLink),
     bind("s", &[Char('s')], Verb::Stop),
 ];
 

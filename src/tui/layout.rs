@@ -49,6 +49,19 @@ pub struct Layout {
     pub status: Rect,
 }
 
+/// The parts of the page of branches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Branches {
+    /// The tree of branches.
+    pub list: Rect,
+    /// Everything under it.
+    pub below: Rect,
+    /// The steps of two branches.
+    pub steps: Rect,
+    /// Two pictures side by side.
+    pub frames: Rect,
+}
+
 /// What the panels on the right need: the map, a gap, and words.
 const NARROWEST_RIGHT: u16 = 46;
 
@@ -99,6 +112,22 @@ impl Layout {
         Rect { x: inner.x + (inner.width - width) / 2, y: inner.y, width, height }
     }
 
+    /// The parts of the page of branches: the list of so many branches, the steps side by side, and two square pictures.
+    pub fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> Branches {
+        let page = self.page;
+        let tall = (many as u16).saturating_add(2).clamp(4, page.height / 2);
+        let list = Rect { height: tall, ..page };
+        let below = Rect { y: page.y + tall, height: page.height - tall, ..page };
+        let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
+        // Twice a square and a gap; the title and the names take two rows.
+        let widest = u32::from(page.width) * if page.width < 110 { 4 } else { 5 } / 10;
+        let rows = (widest * across / (2 * down)).min(u32::from(below.height.saturating_sub(2)));
+        let columns = (2 * rows * down / across).min(widest);
+        let (rows, columns) = (rows as u16, columns as u16);
+        let frames = Rect { x: below.right() - columns, y: below.y + 2, width: columns, height: rows };
+        Branches { list, below, steps: Rect { width: below.width - columns - 2, ..below }, frames }
+    }
+
     /// How many interactions the list shows at a time.
     pub fn interactions(&self) -> usize {
         let rows = usize::from(self.reach.height.saturating_sub(1));
@@ -133,6 +162,11 @@ mod tests {
                 for other in &panels[at + 1..] {
                     assert!(!panel.intersects(*other), "{width}x{height}: {panel:?} {other:?}");
                 }
+            }
+            for (many, pixels) in [(1, (8, 16)), (7, (10, 20)), (90, (9, 20)), (3, (20, 20))] {
+                let parts = layout.branches(many, pixels);
+                assert!(!parts.list.intersects(parts.below) && !parts.steps.intersects(parts.frames), "{parts:?}");
+                assert!(parts.below.union(parts.frames) == parts.below && parts.frames.height >= 4, "{parts:?}");
             }
             assert!(layout.interactions() >= 4);
             for protocol in Protocol::ALL {

@@ -15,6 +15,7 @@ use ratatui::Terminal;
 use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 use ratatui::layout::Size;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use termprofile::TermProfile;
 
 use super::app::{App, Graphics};
 use super::config::Config;
@@ -22,6 +23,7 @@ use super::engine::Engine;
 use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::Encoder;
 use super::graphics::{Protocol, detect};
+use super::history;
 use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
@@ -42,12 +44,18 @@ pub struct Screen {
     pub config: Config,
     /// Where it is remembered what a terminal answered.
     pub memory: Option<PathBuf>,
+    /// Where instructions are kept for later sessions.
+    pub history: Option<PathBuf>,
+    /// The most that a step's picture may cost on the wire, in bytes.
+    pub bandwidth: Option<u64>,
     /// Where libtorch's messages go.
     pub log: Option<std::fs::File>,
 }
 
 /// Messages that may wait for the screen; beyond that their senders wait.
 const QUEUE: usize = 64;
+/// How long the meter of bytes a second counts.
+const METERED: Duration = Duration::from_secs(1);
 /// How long a screen that does not react to a signal is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -68,6 +76,17 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
     app.config = screen.config;
+    app.bandwidth = screen.bandwidth;
+    app.mouse = app.config.mouse;
+    if app.mouse {
+        terminal::hear_mouse(&mut io::stdout(), true)?;
+    }
+    if let Some(path) = &screen.history {
+        let remembered = history::read(path);
+        app.newcomer = remembered.is_first;
+        remembered.instructions.iter().for_each(|instruction| app.editor.remember(instruction));
+        keep(path, None);
+    }
 
     let reports = tell.clone();
     let gone = Gone(tell.clone());
@@ -81,11 +100,18 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     }
     let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
-    let farewell = converse(Conversation::new(app, display, commands, encoder), &messages);
+    let farewell = converse(Conversation::new(app, display, commands, encoder, screen.history), &messages);
     drop(guard);
     match farewell? {
         Farewell::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
         farewell => Ok(farewell),
+    }
+}
+
+/// Keeps an instruction; where that cannot be, the log says why and the session goes on.
+fn keep(path: &Path, instruction: Option<&str>) {
+    if let Err(error) = history::add(path, instruction) {
+        tracing::info!("{}: {error}", path.display());
     }
 }
 
@@ -104,8 +130,12 @@ pub struct Conversation<W: Write> {
     display: Terminal<CrosstermBackend<W>>,
     commands: Sender<Command>,
     encoder: Encoder,
+    /// Where instructions are kept for later sessions.
+    history: Option<PathBuf>,
     /// The step that the meter of bytes counted last, and the bytes written until then.
     metered: (u32, u64),
+    /// When the meter of bytes a second began to count, and the bytes written until then.
+    since: (Instant, u64),
 }
 
 impl<W: Write> Conversation<W> {
@@ -115,8 +145,10 @@ impl<W: Write> Conversation<W> {
         display: Terminal<CrosstermBackend<W>>,
         commands: Sender<Command>,
         encoder: Encoder,
+        history: Option<PathBuf>,
     ) -> Conversation<W> {
-        Conversation { app, display, commands, encoder, metered: (0, 0) }
+        let since = (Instant::now(), terminal::WRITTEN.load(Ordering::Relaxed));
+        Conversation { app, display, commands, encoder, history, metered: (0, 0), since }
     }
 
     /// Draws the state and sends it out whole.
@@ -145,6 +177,12 @@ impl<W: Write> Conversation<W> {
                     Effect::Copy(text) => {
                         queue!(self.display.backend_mut(), CopyToClipboard::to_clipboard_from(text))?;
                     }
+                    Effect::Remember(instruction) => {
+                        if let Some(path) = &self.history {
+                            keep(path, Some(&instruction));
+                        }
+                    }
+                    Effect::Mouse(on) => terminal::hear_mouse(self.display.backend_mut(), on)?,
                     Effect::Repaint => self.repaint()?,
                     Effect::Quit(farewell) => return Ok(Some(farewell)),
                 }
@@ -168,6 +206,15 @@ impl<W: Write> Conversation<W> {
         Ok(())
     }
 
+    /// Takes in the terminal's size, should a message about it have been missed.
+    fn measure(&mut self) -> io::Result<()> {
+        let size = self.display.size()?;
+        if size != self.app.size {
+            self.hear([Msg::Resize(size)])?;
+        }
+        Ok(())
+    }
+
     /// Makes pictures coarser or finer, so that steps keep to what they may cost.
     fn budget(&mut self) {
         let (Some(most), Some(cost)) = (self.app.bandwidth, self.app.bytes) else { return };
@@ -188,12 +235,19 @@ impl<W: Write> Conversation<W> {
             self.metered = (step, bytes);
             self.budget();
         }
+        let (since, before) = self.since;
+        if since.elapsed() >= METERED {
+            let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
+            self.app.bytes_a_second = Some(((bytes - before) as f32 / since.elapsed().as_secs_f32()) as u64);
+            self.since = (Instant::now(), bytes);
+        }
     }
 }
 
 /// Takes in messages until one of them ends it.
 fn converse(mut conversation: Conversation<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<Farewell> {
     loop {
+        conversation.measure()?;
         conversation.show()?;
         let first = messages.recv().context("all threads are gone")?;
         // What came meanwhile is taken in before the next drawing: only the newest state is drawn.
@@ -214,8 +268,12 @@ pub fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::E
 
 /// What the terminal can show, from the environment.
 fn ability() -> Ability {
-    let colours = termprofile::TermProfile::detect(&io::stdout(), termprofile::DetectorSettings::new());
+    let colours = TermProfile::detect(&io::stdout(), termprofile::DetectorSettings::new());
     let variable = |name: &str| std::env::var(name).ok();
+    // tmux brings colours down to what its terminal has by itself; whoever says that there are all of them is believed.
+    let all = matches!(variable("COLORTERM").as_deref(), Some("truecolor" | "24bit"));
+    let in_tmux = variable("TERM_PROGRAM").as_deref() == Some("tmux");
+    let colours = if all && in_tmux && colours >= TermProfile::Ansi256 { TermProfile::TrueColor } else { colours };
     Ability { colours, unicode: detect::shows_unicode(variable) }
 }
 
@@ -253,6 +311,7 @@ fn read_keys(tell: SyncSender<Msg>) -> io::Result<()> {
         while let Ok(event) = crossterm::event::read() {
             let msg = match event {
                 Event::Key(key) => Msg::Key(key),
+                Event::Mouse(event) => Msg::Mouse(event),
                 Event::Paste(text) => Msg::Paste(text),
                 Event::Resize(width, height) => Msg::Resize(Size { width, height }),
                 _ => continue,

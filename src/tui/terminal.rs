@@ -19,6 +19,8 @@ use super::graphics::inline;
 static OWNED: AtomicBool = AtomicBool::new(false);
 /// Pictures were left with the terminal.
 static PICTURES: AtomicBool = AtomicBool::new(false);
+/// The terminal sends what the mouse does.
+static MOUSE: AtomicBool = AtomicBool::new(false);
 /// Where error messages went before.
 static STDERR: Mutex<Option<OwnedFd>> = Mutex::new(None);
 /// The last words of a thread that is not the screen's.
@@ -52,6 +54,19 @@ impl Drop for Guard {
     }
 }
 
+/// Asks for buttons and the wheel, in SGR form; not for every motion, which would cost a slow link.
+const HEAR_MOUSE: &[u8] = b"\x1b[?1000h\x1b[?1006h";
+const LEAVE_MOUSE: &[u8] = b"\x1b[?1006l\x1b[?1000l";
+
+/// Asks the terminal to send what the mouse does, or no longer.
+///
+/// # Errors
+/// When the terminal cannot be written.
+pub fn hear_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
+    MOUSE.store(on, Ordering::SeqCst);
+    out.write_all(if on { HEAR_MOUSE } else { LEAVE_MOUSE })
+}
+
 /// Notes that the terminal holds pictures which it should forget in the end.
 pub fn holds_pictures() {
     PICTURES.store(true, Ordering::SeqCst);
@@ -63,16 +78,19 @@ pub fn give_back() {
         return;
     }
     let mut out = io::stdout();
-    let _ = farewell(&mut out, PICTURES.load(Ordering::SeqCst));
+    let _ = farewell(&mut out, PICTURES.load(Ordering::SeqCst), MOUSE.load(Ordering::SeqCst));
     let _ = disable_raw_mode();
     if let Some(saved) = STDERR.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = rustix::stdio::dup2_stderr(saved);
     }
 }
 
-fn farewell(out: &mut impl Write, pictures: bool) -> io::Result<()> {
+fn farewell(out: &mut impl Write, pictures: bool, mouse: bool) -> io::Result<()> {
     if pictures {
         out.write_all(inline::kitty_forget().as_bytes())?;
+    }
+    if mouse {
+        out.write_all(LEAVE_MOUSE)?;
     }
     execute!(out, EndSynchronizedUpdate, DisableBracketedPaste, LeaveAlternateScreen, cursor::Show)
 }
@@ -138,9 +156,9 @@ mod tests {
     #[test]
     fn the_farewell_leaves_the_alternate_screen_shows_the_cursor_and_forgets_pictures() {
         let mut out = Vec::new();
-        farewell(&mut out, true).unwrap();
+        farewell(&mut out, true, true).unwrap();
         let text = String::from_utf8(out).unwrap();
-        let order = ["\x1b_Ga=d", "\x1b[?2026l", "\x1b[?2004l", "\x1b[?1049l", "\x1b[?25h"];
+        let order = ["\x1b_Ga=d", "\x1b[?1000l", "\x1b[?2026l", "\x1b[?2004l", "\x1b[?1049l", "\x1b[?25h"];
         let places: Vec<_> =
             order.iter().map(|part| text.find(part).unwrap_or_else(|| panic!("no {part:?}"))).collect();
         assert!(places.is_sorted(), "{text:?}");

@@ -1,6 +1,9 @@
 //! The steps of the branch in hand in a form that a screen can draw, and how two branches part.
 
+use std::sync::Arc;
+
 use crate::domain::ActionType;
+use crate::house::view::Frame;
 use crate::run::branches::{Taken, Tree};
 
 /// What was tried, for the screen.
@@ -123,7 +126,7 @@ impl Timeline {
 }
 
 /// How two branches part.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Divergence {
     /// Their names.
     pub names: [String; 2],
@@ -131,6 +134,8 @@ pub struct Divergence {
     pub shared: u32,
     /// The steps after that, side by side.
     pub rows: Vec<Parted>,
+    /// What the agent saw on both, side by side in one picture, at the steps that are named.
+    pub sights: Option<(Arc<Frame>, [u32; 2])>,
 }
 
 /// A step of two branches that have parted.
@@ -157,7 +162,7 @@ impl Divergence {
             let same = matches!((of(0), of(1)), (Some((a, _)), Some((b, _))) if a.world == b.world);
             Parted { step, sides: [side(0), side(1)], same }
         });
-        Divergence { names: [name(one), name(other)], shared, rows: rows.collect() }
+        Divergence { names: [name(one), name(other)], shared, rows: rows.collect(), sights: None }
     }
 }
 

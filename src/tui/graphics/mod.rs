@@ -8,6 +8,8 @@ pub mod encoder;
 pub mod inline;
 pub mod labels;
 pub mod overlay;
+pub mod pair;
+mod placeholder;
 pub mod sixel;
 
 use std::num::NonZeroU16;
@@ -150,7 +152,7 @@ impl Widget for &Picture {
             Content::Placed(transmit) => {
                 for (row, line) in area.rows().enumerate() {
                     for (column, position) in line.positions().enumerate() {
-                        let placeholder = inline::placeholder(row, column);
+                        let placeholder = placeholder::placeholder(row, column);
                         let first = (row, column) == (0, 0);
                         let symbol = if first { format!("{transmit}{placeholder}") } else { placeholder };
                         buf[position].set_symbol(&symbol).set_diff_option(ONE);

@@ -1,14 +1,18 @@
-//! Sixels with a fixed palette: no colours are searched for, so a frame costs little, and the same colour looks the same from
+//! Sixels with a fixed palette, a cube of colours and a ramp of greys: no colours are searched for, so a frame costs little, and the same colour looks the same from
 //! step to step.
 
 use std::fmt::Write;
 
 use super::{Job, labels};
 
-/// Levels of red, green and blue in the palette.
-const LEVELS: [usize; 3] = [6, 7, 6];
+/// Levels of red, green and blue in the cube.
+const LEVELS: usize = 6;
+/// Colours of the cube; greys follow them.
+const CUBE: usize = LEVELS * LEVELS * LEVELS;
+/// Greys: walls and metal are nearly grey, and a tint would show.
+const GREYS: usize = 36;
 /// Colours of the palette.
-const COLOURS: usize = LEVELS[0] * LEVELS[1] * LEVELS[2];
+const COLOURS: usize = CUBE + GREYS;
 /// Pixel rows of a band.
 const BAND: usize = 6;
 
@@ -24,7 +28,15 @@ pub fn encode(rgb: &[u8], from_width: usize, from_height: usize, width: usize, h
     let mut sequence = String::with_capacity(width * height / 4 + 8192);
     // Aspect 1:1, and what is not drawn stays as it is.
     let _ = write!(sequence, "\x1bP0;1;0q\"1;1;{width};{height}");
-    let indices: Vec<u8> = rgb.chunks_exact(3).map(nearest).collect();
+    // Surfaces are flat: most pixels are like the one before.
+    let mut last: (&[u8], u8) = (&[], 0);
+    let mut index = |pixel| {
+        if pixel != last.0 {
+            last = (pixel, nearest(pixel));
+        }
+        last.1
+    };
+    let indices: Vec<u8> = rgb.chunks_exact(3).map(&mut index).collect();
     let columns: Vec<usize> = (0..width).map(|x| x * from_width / width.max(1)).collect();
     let mut defined = [false; COLOURS];
     let mut band: Vec<Vec<u8>> = vec![Vec::new(); COLOURS];
@@ -48,9 +60,9 @@ pub fn encode(rgb: &[u8], from_width: usize, from_height: usize, width: usize, h
             if !std::mem::replace(&mut defined[colour], true) {
                 let [r, g, b] = percent(colour);
                 let _ = write!(sequence, "#{colour};2;{r};{g};{b}");
-            } else {
-                let _ = write!(sequence, "#{colour}");
             }
+            // Some terminals do not select what they are told to define.
+            let _ = write!(sequence, "#{colour}");
             runs(&band[colour], &mut sequence);
             band[colour].clear();
         }
@@ -77,17 +89,27 @@ fn runs(line: &[u8], sequence: &mut String) {
     }
 }
 
-/// The palette's colour nearest to a pixel.
+/// The palette's colour nearest to a pixel: of the cube or a grey.
 fn nearest(pixel: &[u8]) -> u8 {
-    let level = |value: u8, levels: usize| (usize::from(value) * (levels - 1) + 127) / 255;
-    let [r, g, b] = [0, 1, 2].map(|i| level(pixel[i], LEVELS[i]));
-    ((r * LEVELS[1] + g) * LEVELS[2] + b) as u8
+    let steps = LEVELS - 1;
+    let level = |value: u8| (usize::from(value) * steps + 127) / 255;
+    let [r, g, b] = [0, 1, 2].map(|i| level(pixel[i]));
+    let sum: usize = pixel[..3].iter().map(|&value| usize::from(value)).sum();
+    let grey = (sum * (GREYS - 1) + 382) / 765;
+    let error = |shown: [usize; 3]| -> usize {
+        pixel.iter().zip(shown).map(|(&value, shown)| usize::from(value).abs_diff(shown).pow(2)).sum()
+    };
+    let cube = error([r, g, b].map(|level| level * 255 / steps));
+    let colour = if error([grey * 255 / (GREYS - 1); 3]) < cube { CUBE + grey } else { (r * LEVELS + g) * LEVELS + b };
+    colour as u8
 }
 
 /// A colour of the palette in per cent of red, green and blue.
 fn percent(colour: usize) -> [usize; 3] {
-    let parts = [colour / LEVELS[2] / LEVELS[1], colour / LEVELS[2] % LEVELS[1], colour % LEVELS[2]];
-    [0, 1, 2].map(|i| parts[i] * 100 / (LEVELS[i] - 1))
+    if let Some(grey) = colour.checked_sub(CUBE) {
+        return [grey * 100 / (GREYS - 1); 3];
+    }
+    [colour / LEVELS / LEVELS, colour / LEVELS % LEVELS, colour % LEVELS].map(|level| level * 100 / (LEVELS - 1))
 }
 
 #[cfg(test)]
@@ -150,5 +172,11 @@ mod tests {
         assert_eq!(at(4, 7), Some([0, 0, 100]));
         assert_eq!(at(9, 13), Some([100, 100, 100]));
         assert!(pixels.iter().all(Option::is_some));
+        assert!(
+            !sequence.split('#').skip(1).any(|part| part.contains(";2;") && part.contains(['~', '!'])),
+            "defined, then selected"
+        );
+        assert_eq!(percent(usize::from(nearest(&[170, 178, 186]))), [68, 68, 68], "a grey stays a grey");
+        assert_eq!(percent(usize::from(nearest(&[150, 110, 70]))), [60, 40, 20]);
     }
 }

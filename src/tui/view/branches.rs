@@ -5,9 +5,11 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
 
 use super::{fit, panel, put};
 use crate::tui::app::App;
+use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 use crate::tui::timeline::{Divergence, Timeline};
 
@@ -17,19 +19,24 @@ pub struct Branches<'a>(pub &'a App);
 impl Widget for Branches<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let Some(now) = &app.now else { return };
-        let many = now.time.branches.len();
-        let tall = (many as u16 + 2).clamp(4, area.height / 2);
-        let list = Rect { height: tall, ..area };
-        let below = Rect { y: area.y + tall, height: area.height - tall, ..area };
-        self.list(&now.time, list, buf);
+        let (Some(now), Some(layout)) = (&app.now, app.layout()) else { return };
+        let parts = layout.branches(app.rows(), app.graphics.cell_pixels);
+        debug_assert_eq!(layout.page, area);
+        self.list(&now.time, parts.list, buf);
         match &app.divergence {
-            Some(divergence) => side_by_side(divergence, now.time.at, below, buf),
-            None => {
-                let inner = panel(buf, below, "Side by side", "");
-                let hint = match many {
-                    1 => "one branch so far: go back (h) and do something else, and a second one begins",
-                    _ => "select a branch (j k) to see where it parts from the one in hand",
+            Some(divergence) if divergence.names[0] != divergence.names[1] => {
+                let right = format!("the same until step {}", divergence.shared);
+                panel(buf, parts.below, "Side by side", &right);
+                let steps = Rect { y: parts.steps.y + 1, height: parts.steps.height - 1, ..parts.steps };
+                side_by_side(divergence, now.time.at, steps, buf);
+                self.sights(divergence, parts.frames, buf);
+            }
+            divergence => {
+                let inner = panel(buf, parts.below, "Side by side", "");
+                let hint = match (app.rows(), divergence) {
+                    (1, _) => "one branch so far: go back (h) and do something else, and a second one begins",
+                    (_, Some(_)) => "this is the branch in hand; select another one (j k)",
+                    (_, None) => "select a branch (j k) to see where it parts from the one in hand",
                 };
                 put(buf, inner, 0, hint, THEME.quiet);
             }
@@ -65,21 +72,33 @@ impl Branches<'_> {
     }
 }
 
+impl Branches<'_> {
+    /// What the agent saw on both, with the steps over the pictures.
+    fn sights(&self, divergence: &Divergence, area: Rect, buf: &mut Buffer) {
+        let Some((_, steps)) = &divergence.sights else { return };
+        let half = area.width / 2;
+        for (side, (name, step)) in (0u16..).zip(divergence.names.iter().zip(steps)) {
+            let head = Rect { x: area.x + side * (half + 1), y: area.y - 1, width: half.saturating_sub(1), height: 1 };
+            let step = format!(" {step}");
+            let name = fit(name, usize::from(head.width).saturating_sub(step.width()));
+            put(buf, head, 0, format!("{name}{step}"), THEME.quiet);
+        }
+        let covered = self.0.mode == Mode::Help && self.0.graphics.protocol.floats();
+        match &self.0.picture {
+            Some(picture) if !covered => picture.render(area, buf),
+            _ => put(buf, area, area.height / 2, "  drawing ...", THEME.quiet),
+        }
+    }
+}
+
 /// How many branches lie between a branch and the first.
 fn depth(time: &Timeline, branch: usize) -> usize {
     let from = |&at: &usize| time.branches.get(at)?.left.map(|(from, _)| from);
     std::iter::successors(Some(branch), from).skip(1).take(8).count()
 }
 
-fn side_by_side(divergence: &Divergence, at: u32, area: Rect, buf: &mut Buffer) {
+fn side_by_side(divergence: &Divergence, at: u32, inner: Rect, buf: &mut Buffer) {
     let [one, other] = &divergence.names;
-    if one == other {
-        let inner = panel(buf, area, "Side by side", one);
-        put(buf, inner, 0, "this is the branch in hand; select another one", THEME.quiet);
-        return;
-    }
-    let right = format!("the same until step {}", divergence.shared);
-    let inner = panel(buf, area, "Side by side", &right);
     let width = usize::from(inner.width.saturating_sub(9)) / 2;
     put(buf, inner, 0, format!("{:>5}  {:<width$}  {}", "step", fit(one, width), fit(other, width)), THEME.quiet);
     let rows = usize::from(inner.height).saturating_sub(1);

@@ -10,7 +10,11 @@ use super::{fit, panel, put, wrap};
 use crate::run::chain::{Outcome, Play, Rate};
 use crate::tui::app::App;
 use crate::tui::chained::Chained;
+use crate::tui::inspect::{changes, stands};
 use crate::tui::theme::THEME;
+
+/// Rows that the selected link takes at least.
+const LINK: u16 = 5;
 
 /// The page.
 pub struct ChainPage<'a>(pub &'a App);
@@ -29,9 +33,12 @@ impl Widget for ChainPage<'_> {
             return;
         };
         let many = chain.links.len() as u16;
-        let tall = (many + 4).min(area.height * 2 / 3);
+        let tall = (many + 4).min(area.height / 2);
         self.links(chain, Rect { height: tall, ..area }, buf);
-        heat(chain, Rect { y: area.y + tall, height: area.height - tall, ..area }, buf);
+        let warm = (many + 2).min(area.height - tall - LINK);
+        heat(chain, Rect { y: area.y + tall, height: warm, ..area }, buf);
+        let below = area.y + tall + warm;
+        self.link(chain, Rect { y: below, height: area.bottom() - below, ..area }, buf);
     }
 }
 
@@ -54,10 +61,14 @@ impl ChainPage<'_> {
         put(buf, inner, 0, head, THEME.quiet);
         let weakest = chain.trials.as_ref().and_then(|trials| trials.weakest());
         let of = |play: Option<&Play>, at: usize| play.and_then(|play| play.outcomes.get(at)).cloned();
-        for (at, link) in chain.links.iter().enumerate().take(usize::from(inner.height).saturating_sub(2)) {
+        let rows = usize::from(inner.height).saturating_sub(2);
+        let first = (self.0.selected + 1).saturating_sub(rows);
+        for (row, (at, link)) in (1u16..).zip(chain.links.iter().enumerate().skip(first).take(rows)) {
             let weak = weakest == Some(at);
+            let selected = at == self.0.selected;
+            let number = if selected { THEME.chosen } else { THEME.key };
             let mut spans = vec![
-                Span::styled(format!("{:>2} ", at + 1), THEME.key),
+                Span::styled(format!("{}{:<2}", if selected { ">" } else { " " }, at + 1), number),
                 Span::styled(
                     format!("{:<width$}", fit(link, width.saturating_sub(1))),
                     if weak { THEME.bad } else { Style::new() },
@@ -75,7 +86,7 @@ impl ChainPage<'_> {
                     if weak { THEME.bad } else { Style::new() },
                 ));
             }
-            Line::from(spans).render(Rect { y: inner.y + 1 + at as u16, height: 1, ..inner }, buf);
+            Line::from(spans).render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
         }
         let note = match (weakest, &chain.trials) {
             (Some(at), _) => format!("link {} breaks the chain", at + 1),
@@ -83,6 +94,28 @@ impl ChainPage<'_> {
             (None, None) => handovers(chain.by_link.as_ref()),
         };
         put(buf, inner, inner.height - 1, note, if weakest.is_some() { THEME.bad } else { THEME.quiet });
+    }
+}
+
+impl ChainPage<'_> {
+    /// In which state the selected link began and ended, link by link.
+    fn link(&self, chain: &Chained, area: Rect, buf: &mut Buffer) {
+        let at = self.0.selected.min(chain.links.len().saturating_sub(1));
+        let inner = panel(buf, area, &format!("Link {}", at + 1), "entry and exit, told link by link");
+        let (Some(now), Some(link)) = (&self.0.now, chain.links.get(at)) else { return };
+        put(buf, inner, 0, link.as_str(), THEME.instruction);
+        let Some(outcome) = chain.by_link.as_ref().and_then(|play| play.outcomes.get(at)) else { return };
+        if !outcome.reached {
+            put(buf, inner, 1, "not reached: a link before it failed", THEME.quiet);
+            return;
+        }
+        put(buf, inner, 1, format!("entry   {}", stands(&now.scene, &outcome.entry)), Style::new());
+        put(buf, inner, 2, format!("exit    {}", stands(&now.scene, &outcome.exit)), Style::new());
+        let changes = changes(&now.scene, &outcome.entry, &outcome.exit);
+        let text = if changes.is_empty() { "nothing".to_string() } else { changes.join(", ") };
+        for (row, line) in (3..).zip(wrap(&format!("changed {text}"), usize::from(inner.width), "        ")) {
+            put(buf, inner, row, line, THEME.note);
+        }
     }
 }
 

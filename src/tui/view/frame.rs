@@ -21,7 +21,7 @@ impl Widget for Sees<'_> {
         let right = match &app.now {
             Some(now) => {
                 let pose = now.world.agent;
-                let heading = ["north", "east", "south", "west"][pose.heading.quarters().rem_euclid(4) as usize];
+                let heading = pose.heading.name();
                 match pose.horizon {
                     0 => heading.to_string(),
                     up if up < 0 => format!("{heading}, {} up", -up),

@@ -14,7 +14,9 @@ use crate::tui::theme::THEME;
 pub struct Help<'a>(pub &'a App);
 
 /// Columns that the names of keys take.
-const LABEL: usize = 13;
+const LABEL: usize = 9;
+/// Columns that a key takes with what it does.
+const WIDEST: u16 = 40;
 
 impl Widget for Help<'_> {
     fn render(self, screen: Rect, buf: &mut Buffer) {
@@ -23,11 +25,13 @@ impl Widget for Help<'_> {
             Mode::Manual => " Keys while you act ",
             _ => " Keys while a policy acts ",
         };
-        let bindings: Vec<_> = keys::bindings(mode, self.0.page).collect();
-        // Two columns where one would not fit.
-        let columns = if bindings.len() + 2 > usize::from(screen.height) { 2 } else { 1 };
+        // A key that the one before it speaks for has no line of its own.
+        let bindings: Vec<_> = keys::bindings(mode, self.0.page).filter(|binding| !binding.label.is_empty()).collect();
+        // As many columns as it takes.
+        let most = usize::from(screen.height.saturating_sub(2)).max(1);
+        let columns = bindings.len().div_ceil(most).max(1);
         let rows = bindings.len().div_ceil(columns);
-        let width = (58 * columns as u16).min(screen.width);
+        let width = (WIDEST * columns as u16 + 4).min(screen.width);
         let room = usize::from(width.saturating_sub(4)) / columns;
         let lines = (0..rows).map(|row| {
             let shown = bindings.iter().skip(row).step_by(rows.max(1)).take(columns);

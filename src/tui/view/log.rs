@@ -16,29 +16,44 @@ pub struct Log<'a>(pub &'a App);
 impl Widget for Log<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let inner = panel(buf, area, "Log", "");
-        let rows = usize::from(inner.height);
-        let mut lines: Vec<Line> = Vec::new();
-        for entry in self.0.log.iter().rev() {
-            if lines.len() >= rows {
-                break;
-            }
-            lines.splice(0..0, entry_lines(entry, usize::from(inner.width)));
-        }
-        let skip = lines.len().saturating_sub(rows);
-        for (row, line) in inner.rows().zip(lines.into_iter().skip(skip)) {
+        for (row, (_, line)) in inner.rows().zip(lines(self.0, inner)) {
             line.render(row, buf);
         }
     }
 }
 
-fn entry_lines(entry: &Entry, width: usize) -> Vec<Line<'static>> {
-    let step = entry.step.map_or(String::new(), |step| step.to_string());
-    let tone = match entry.tone {
+/// The lines that are shown, with the step of each.
+fn lines(app: &App, inner: Rect) -> impl Iterator<Item = (Option<u32>, Line<'static>)> {
+    let rows = usize::from(inner.height);
+    let mut lines: Vec<(Option<u32>, Line)> = Vec::new();
+    for entry in app.log.iter().rev() {
+        if lines.len() >= rows {
+            break;
+        }
+        lines.splice(0..0, entry_lines(entry, usize::from(inner.width)).into_iter().map(|line| (entry.step, line)));
+    }
+    let skip = lines.len().saturating_sub(rows);
+    lines.into_iter().skip(skip)
+}
+
+/// The step of the entry in that row of the screen.
+pub(super) fn step_at(app: &App, inner: Rect, row: u16) -> Option<u32> {
+    lines(app, inner).nth(usize::from(row.checked_sub(inner.y)?))?.0
+}
+
+/// The style of a tone.
+pub(super) fn tone(tone: Tone) -> Style {
+    match tone {
         Tone::Done => THEME.quiet,
         Tone::Impossible | Tone::Bad => THEME.bad,
         Tone::Good => THEME.good,
         Tone::Note => THEME.note,
-    };
+    }
+}
+
+fn entry_lines(entry: &Entry, width: usize) -> Vec<Line<'static>> {
+    let step = entry.step.map_or(String::new(), |step| step.to_string());
+    let tone = tone(entry.tone);
     let text =
         if entry.outcome.is_empty() { entry.text.clone() } else { format!("{} · {}", entry.text, entry.outcome) };
     let room = width.saturating_sub(5);

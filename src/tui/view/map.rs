@@ -1,17 +1,15 @@
 //! The floor plan from above: where the agent is, where it has been, and what stands around it. North is up.
 
-use std::collections::HashMap;
-
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Position, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::chain::warmth;
+use super::ground::{Ground, extent, furniture_colour};
+use super::hit::Hit;
 use super::{fit, panel};
-use crate::domain::place::{Cuboid, Rect as Floor};
-use crate::domain::{Cell, Class, Heading, Instance, Pose};
+use crate::domain::{Cell, Heading, Instance, Point};
 use crate::run::landscape::Landscape;
 use crate::tui::app::App;
 use crate::tui::engine::Snapshot;
@@ -22,18 +20,9 @@ use crate::tui::verb::Page;
 /// The panel with the floor plan.
 pub struct Map<'a>(pub &'a App);
 
-/// Furniture that begins higher above the floor than this hangs over other furniture and is left out, in millimetres.
-const OVERHEAD: i32 = 1200;
 /// The side of the smallest square that is drawn, in millimetres.
 const FINEST: i32 = 50;
-/// How far the shade of what the agent looks at reaches, in millimetres.
-const GAZE: f32 = 3000.0;
 
-const GROUND: Color = Color::Rgb(38, 41, 46);
-const WALKABLE: Color = Color::Rgb(58, 63, 71);
-const SEEN: Color = Color::Rgb(82, 90, 101);
-const WALL: Color = Color::Rgb(120, 124, 130);
-const PATH: Color = Color::Rgb(86, 140, 190);
 const AGENT: Color = Color::Rgb(80, 220, 255);
 const TARGET: Color = Color::Rgb(255, 214, 0);
 const INK: Color = Color::Rgb(16, 16, 18);
@@ -52,8 +41,12 @@ impl Widget for Map<'_> {
             .as_ref()
             .and_then(|(decision, words)| Some((decision.action.target?, words)))
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
-        let right = match (&app.landscape, target) {
-            (Some(values), _) => legend(values),
+        let values = app.landscape.as_ref().filter(|_| app.paints_values);
+        let right = match (values, target) {
+            (Some((values, step)), _) => {
+                let room = usize::from(area.width).saturating_sub("Map".width() + 4);
+                legend(values, app.heading, (*step != now.step).then_some(*step), room)
+            }
             (None, Some((_, words))) => words.clone(),
             (None, None) => String::new(),
         };
@@ -62,7 +55,7 @@ impl Widget for Map<'_> {
             Page::World => things(now).get(app.selected).map(|thing| thing.instance),
             _ => None,
         };
-        let ground = Ground::of(now, app.landscape.as_deref());
+        let ground = Ground::of(now, values.map(|(values, _)| &**values), app.heading);
         let Some(plan) = Plan::fitting(&ground, inner) else { return };
         if app.ability.shades() {
             plan.shaded(&ground, buf)
@@ -73,15 +66,43 @@ impl Widget for Map<'_> {
     }
 }
 
-/// What the painted values are, and their range.
-fn legend(values: &Landscape) -> String {
-    let far = if values.heights.len() < values.of {
-        format!(" {}/{}", values.heights.len(), values.of)
-    } else {
-        String::new()
-    };
-    let range = values.range().map_or(String::new(), |(low, high)| format!(" {low:.2} to {high:.2}"));
-    format!("{}{range}{far}", values.measure.words())
+/// What the painted values are, their range, and the step they are for where that is another: as much of it as there is room for.
+fn legend(values: &Landscape, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
+    let facing = heading.map_or("best heading", Heading::name);
+    let (low, high) = values.range(heading).unwrap_or((0.0, 0.0));
+    let far = values.heights.len() < values.of;
+    let far = if far { format!(", {}/{}", values.heights.len(), values.of) } else { String::new() };
+    let step = other_step.map_or(String::new(), |step| format!(", as of step {step}"));
+    let (words, letter, short) =
+        (values.measure.words(), values.measure.letter(), heading.map_or("best", Heading::name));
+    let forms = [
+        format!("{words}, {facing}: {low:.2} to {high:.2}{far}{step}"),
+        format!("{words}, {short}: {low:.2} to {high:.2}"),
+        format!("{letter}, {facing}: {low:.2} to {high:.2}"),
+        format!("{letter} {short} {low:.2} to {high:.2}"),
+    ];
+    let fits = forms.iter().find(|form| form.width() <= room);
+    fits.unwrap_or(&forms[3]).clone()
+}
+
+/// What lies under a place of the panel: a thing that is in view, furniture, or a cell of the floor.
+pub(super) fn under(app: &App, area: Rect, at: Position) -> Option<Hit> {
+    let now = app.now.as_ref()?;
+    let inner = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
+    let ground = Ground::of(now, None, None);
+    let plan = Plan::fitting(&ground, inner).filter(|_| inner.contains(at))?;
+    let place = |instance: Instance| now.world.position(&now.scene, instance).and_then(|p| plan.position(p.x, p.z));
+    let seen = now.view.sightings.iter().map(|seen| seen.instance).filter(|seen| matches!(seen, Instance::Object(_)));
+    if let Some(object) = seen.into_iter().find(|&object| place(object) == Some((at.x, at.y))) {
+        return Some(Hit::Thing(object));
+    }
+    let (x, z) = plan.point(at.x - inner.x, 2 * (at.y - inner.y));
+    let z = z - plan.side / 2;
+    if let Some(fixture) = ground.fixture(x, z) {
+        return Some(Hit::Thing(Instance::Fixture(fixture)));
+    }
+    let cell = Cell::nearest(Point::new(x, 0, z));
+    now.scene.has_cell(cell).then_some(Hit::Cell(cell))
 }
 
 /// How millimetres become characters. A character is two squares high, one above the other.
@@ -189,7 +210,7 @@ impl Plan {
             for column in 0..self.area.width {
                 let (x, upper) = self.point(column, 2 * row);
                 let z = upper - self.side / 2;
-                let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
+                let cell = Cell::nearest(Point::new(x, 0, z));
                 let symbol = if let Some(class) = ground.class(x, z) {
                     app.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
@@ -244,111 +265,4 @@ impl Plan {
         let at = pose.cell.centre(0);
         mark(at.x, at.z, arrow, Style::new().fg(AGENT).add_modifier(Modifier::BOLD));
     }
-}
-
-/// A box of a piece of furniture, from above.
-#[derive(Clone, Copy)]
-struct Piece {
-    floor: Floor,
-    class: Class,
-    fixture: u16,
-}
-
-/// What is where on the floor.
-struct Ground<'a> {
-    now: &'a Snapshot,
-    /// The share of each cell's value, where values are painted.
-    values: HashMap<Cell, f32>,
-    /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
-    furniture: Vec<Piece>,
-    /// What the whole plan covers.
-    bounds: Option<Floor>,
-}
-
-impl<'a> Ground<'a> {
-    fn of(now: &'a Snapshot, values: Option<&Landscape>) -> Ground<'a> {
-        let values = values.map_or_else(HashMap::new, Landscape::shares);
-        let floor = now.scene.floor();
-        let fixtures = (0u16..).zip(&now.scene.fixtures);
-        let mut parts: Vec<_> = fixtures
-            .flat_map(|(i, fixture)| fixture.body.iter().map(move |part| (part, fixture.class, i)))
-            .filter(|(part, ..)| part.min.y - floor < OVERHEAD)
-            .collect();
-        parts.sort_by_key(|(part, ..)| part.max.y);
-        let piece = |(part, class, fixture): (&Cuboid, Class, u16)| Piece { floor: part.footprint(), class, fixture };
-        let furniture: Vec<Piece> = parts.into_iter().map(piece).collect();
-        let cells = now.scene.cells.iter().map(|cell| {
-            let at = cell.centre(0);
-            Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(Cell::SIDE / 2)
-        });
-        let walls = now.scene.walls.iter().map(|wall| wall.footprint());
-        let bounds = cells.chain(walls).chain(furniture.iter().map(|piece| piece.floor)).reduce(|a, b| Floor {
-            min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1])],
-            max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1])],
-        });
-        Ground { now, values, furniture, bounds }
-    }
-
-    /// The furniture at a point, the highest of it.
-    fn class(&self, x: i32, z: i32) -> Option<Class> {
-        self.furniture.iter().rev().find(|piece| piece.floor.contains(x, z)).map(|piece| piece.class)
-    }
-
-    fn colour(&self, x: i32, z: i32) -> Option<Color> {
-        if !self.bounds?.contains(x, z) {
-            return None;
-        }
-        if let Some(class) = self.class(x, z) {
-            return Some(furniture_colour(class));
-        }
-        let now = self.now;
-        if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
-            return Some(WALL);
-        }
-        let cell = Cell::nearest(crate::domain::Point::new(x, 0, z));
-        if !now.scene.has_cell(cell) {
-            return Some(GROUND);
-        }
-        if let Some(&share) = self.values.get(&cell) {
-            return Some(warmth(share));
-        }
-        if now.path.contains(&cell) {
-            return Some(PATH);
-        }
-        Some(if gazed_at(now.world.agent, x, z) { SEEN } else { WALKABLE })
-    }
-}
-
-fn extent(floor: &Floor) -> i64 {
-    i64::from(floor.max[0] - floor.min[0]) * i64::from(floor.max[1] - floor.min[1])
-}
-
-/// Whether a point lies in the 60 degrees that the agent looks into.
-fn gazed_at(pose: Pose, x: i32, z: i32) -> bool {
-    let at = pose.cell.centre(0);
-    let (dx, dz) = pose.heading.step();
-    let (east, north) = ((x - at.x) as f32, (z - at.z) as f32);
-    let ahead = east * f32::from(dx) + north * f32::from(dz);
-    let aside = east * f32::from(dz) - north * f32::from(dx);
-    ahead > 0.0 && ahead < GAZE && aside.abs() < ahead * 0.577
-}
-
-/// A muted colour for a class of furniture, the same everywhere.
-fn furniture_colour(class: Class) -> Color {
-    const COLOURS: [(u8, u8, u8); 12] = [
-        (134, 104, 74),
-        (108, 122, 137),
-        (146, 126, 92),
-        (96, 118, 100),
-        (150, 110, 100),
-        (120, 110, 140),
-        (104, 128, 128),
-        (140, 120, 120),
-        (112, 100, 84),
-        (128, 134, 104),
-        (100, 108, 124),
-        (148, 132, 112),
-    ];
-    let (r, g, b) = COLOURS[class.index() * 5 % COLOURS.len()];
-    Color::Rgb(r, g, b)
 }

@@ -6,6 +6,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Padding, Widget};
 
+use super::{fit, wrap};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 use crate::tui::verb::matching;
@@ -19,8 +20,9 @@ const ROWS: usize = 12;
 impl Widget for Palette<'_> {
     fn render(self, page: Rect, buf: &mut Buffer) {
         let found = matching(self.0.palette.text());
-        let rows = found.len().clamp(1, ROWS.min(usize::from(page.height) - 2));
-        let height = rows as u16 + 2;
+        let rows = found.len().clamp(1, ROWS.min(usize::from(page.height) - 4));
+        // Under the list the whole of what the selected verb does.
+        let height = rows as u16 + 4;
         let area = Rect { y: page.bottom() - height, height, width: page.width.min(110), ..page };
         Clear.render(area, buf);
         let block = Block::bordered().title(Line::styled(" Verbs ", THEME.title)).padding(Padding::horizontal(1));
@@ -30,11 +32,18 @@ impl Widget for Palette<'_> {
         if found.is_empty() {
             Line::styled("no verb fits", THEME.quiet).render(inner, buf);
         }
-        for (row, (at, said)) in inner.rows().zip(found.iter().enumerate().skip(first)) {
+        for (row, (at, said)) in inner.rows().take(rows).zip(found.iter().enumerate().skip(first)) {
             let style = if at == self.0.selected { THEME.chosen } else { Style::new() };
             let verb = format!("{} {}", said.name, said.arguments);
-            let spans = vec![Span::styled(format!("{verb:<24} "), style), Span::styled(said.doc, THEME.quiet)];
+            let doc = fit(said.doc, usize::from(row.width).saturating_sub(25));
+            let spans = vec![Span::styled(format!("{verb:<24} "), style), Span::styled(doc, THEME.quiet)];
             Line::from(spans).render(row, buf);
+        }
+        if let Some(said) = found.get(self.0.selected) {
+            let foot = Rect { y: inner.bottom() - 2, height: 2, ..inner };
+            for (row, line) in foot.rows().zip(wrap(said.doc, usize::from(inner.width), "")) {
+                Line::styled(line, THEME.note).render(row, buf);
+            }
         }
     }
 }

@@ -27,16 +27,19 @@ impl Widget for Reach<'_> {
         let inner = panel(buf, area, "In reach", &hand);
         let page = app.page_of_candidates();
         if page.is_empty() {
-            put(buf, inner, 0, "nothing: move closer, or turn", THEME.quiet);
+            put(
+                buf,
+                inner,
+                0,
+                if inner.width < 30 { "nothing: move or turn" } else { "nothing: move closer, or turn" },
+                THEME.quiet,
+            );
             return;
         }
-        let columns: u16 = if area.width >= 60 { 2 } else { 1 };
-        let rows = inner.height;
-        let width = (inner.width - 2 * (columns - 1)) / columns;
         let chosen = app.thought.as_ref().map(|(decision, _)| decision.action);
         let more = app.pages() > 1;
-        for (at, candidate) in (0u16..).zip(page) {
-            let place = Rect { x: inner.x + at / rows * (width + 2), y: inner.y + at % rows, width, height: 1 };
+        for ((at, candidate), place) in (0u16..).zip(page).zip(places(inner)) {
+            let width = place.width;
             let style = if chosen == Some(candidate.action()) { THEME.chosen } else { THEME.key };
             let name = fit(&format!("{} {}", candidate.kind, candidate.class.name()), usize::from(width) - 3 - 6);
             let mut spans = vec![
@@ -52,4 +55,14 @@ impl Widget for Reach<'_> {
             Line::from(spans).render(place, buf);
         }
     }
+}
+
+/// Where the interactions are written, from the first on: down one column, then down the next where there is room for two.
+pub(super) fn places(inner: Rect) -> impl Iterator<Item = Rect> {
+    let columns: u16 = if inner.width >= 60 { 2 } else { 1 };
+    let width = (inner.width - 2 * (columns - 1)) / columns;
+    (0..columns).flat_map(move |column| {
+        let left = inner.x + column * (width + 2);
+        (0..inner.height).map(move |row| Rect { x: left, y: inner.y + row, width, height: 1 })
+    })
 }

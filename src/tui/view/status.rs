@@ -7,6 +7,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::fit;
+use super::log::tone;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
@@ -60,12 +61,39 @@ impl Widget for Header<'_> {
     }
 }
 
+/// For whoever has never been here.
+const WELCOME: &str = "New here? space: it acts, waits · i: tell it something · h l: in time · ?: keys";
+
+/// How pictures are shown and what they cost, as much of it as there is room for.
+fn pictures(app: &App, room: usize) -> String {
+    let kilobytes = |bytes: u64| format!("{:.1} kB", bytes as f64 / 1000.0);
+    let step = app.bytes.map_or(String::new(), |bytes| format!(" · {}/step", kilobytes(bytes)));
+    let second = app.bytes_a_second.filter(|_| app.going.is_some()).map(|bytes| format!(" · {}/s", kilobytes(bytes)));
+    let second = second.unwrap_or_default();
+    let (name, reason) = (app.graphics.protocol.name(), &app.graphics.reason);
+    let forms = [
+        format!("{name}: {reason}{step}{second}"),
+        format!("{name}{step}{second}"),
+        format!("{name}{step}"),
+        name.into(),
+    ];
+    forms.into_iter().find(|form| form.width() <= room).unwrap_or_default()
+}
+
 /// The last row.
 pub struct Status<'a>(pub &'a App);
 
 impl Widget for Status<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
+        if app.newcomer && (app.mode, app.page) == (Mode::Watch, Page::Main) {
+            Line::styled(fit(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
+            return;
+        }
+        if let Some(notice) = app.notice.as_ref().filter(|_| app.mode == Mode::Watch && app.page != Page::Main) {
+            Line::styled(fit(&notice.text, usize::from(area.width)), tone(notice.tone)).render(area, buf);
+            return;
+        }
         let hints: &[(&str, &str)] = match (app.mode, app.page) {
             (Mode::Watch, Page::Main) => &[
                 ("space", "run"),
@@ -79,11 +107,17 @@ impl Widget for Status<'_> {
                 &[("j k", "select"), ("enter", "go there"), ("R", "name"), ("T", "save as task"), ("esc", "panels")]
             }
             (Mode::Watch, Page::Mind) => &[("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")],
-            (Mode::Watch, Page::World) => &[("j k", "select"), ("V", "value map"), ("esc", "panels"), ("?", "keys")],
-            (Mode::Watch, Page::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
-            (Mode::Watch, Page::Chain) => {
-                &[("enter", "new chain"), ("w", "which link breaks"), ("s", "stop"), ("esc", "panels")]
+            (Mode::Watch, Page::World) => {
+                &[("j k", "select"), ("V", "value map"), ("v", "heading"), ("esc", "panels"), ("?", "keys")]
             }
+            (Mode::Watch, Page::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
+            (Mode::Watch, Page::Chain) => &[
+                ("enter", "new chain"),
+                ("w", "which link breaks"),
+                ("x", "replay one"),
+                ("s", "stop"),
+                ("esc", "panels"),
+            ],
             (Mode::Manual, _) => &[
                 ("arrows", "move"),
                 ("1-9", "act"),
@@ -105,9 +139,7 @@ impl Widget for Status<'_> {
             used += key.width() + word.width() + 3;
             spans.extend([Span::styled(*key, THEME.key), Span::styled(format!(" {word}  "), THEME.quiet)]);
         }
-        let bytes = app.bytes.map_or(String::new(), |bytes| format!(" · {:.1} kB/step", bytes as f64 / 1000.0));
-        let graphics = format!("{}: {}{bytes}", app.graphics.protocol.name(), app.graphics.reason);
-        let graphics = fit(&graphics, usize::from(area.width).saturating_sub(used));
+        let graphics = pictures(app, usize::from(area.width).saturating_sub(used));
         let gap = usize::from(area.width).saturating_sub(used + graphics.width());
         spans.extend([Span::raw(" ".repeat(gap)), Span::styled(graphics, THEME.quiet)]);
         Line::from(spans).render(area, buf);

@@ -151,7 +151,7 @@ fn curves(now: &Snapshot, area: Rect, buf: &mut Buffer) {
 }
 
 /// Columns before a curve.
-const LABEL: usize = 22;
+const LABEL: usize = 24;
 
 fn column(step: usize, steps: usize, room: usize) -> usize {
     if steps <= room { step } else { step * room / steps.max(1) }

@@ -19,20 +19,43 @@ impl Widget for Time<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let Some(now) = &self.0.now else { return };
         let time = &now.time;
-        let name = time.branches.get(time.branch).map_or("", |branch| branch.name.as_str());
-        let others = match time.branches.len() {
-            0 | 1 => String::new(),
-            many => format!(" {many} branches"),
-        };
-        let title = "Time ";
-        let place = format!("{} {}/{} ", fit(name, usize::from(area.width) / 6), time.at, time.beats.len());
-        let room = usize::from(area.width).saturating_sub(title.width() + place.width() + others.width() + 1);
-        let mut spans = vec![Span::styled(title, THEME.title), Span::raw(place)];
-        spans.extend(strip(time, room).into_iter().map(|(symbol, style)| Span::styled(symbol.to_string(), style)));
+        let (place, others) = around(time, area.width);
+        let mut spans = vec![Span::styled(TITLE, THEME.title), Span::raw(place.clone())];
+        spans.extend(
+            strip(time, room(area, &place, &others))
+                .into_iter()
+                .map(|(symbol, style)| Span::styled(symbol.to_string(), style)),
+        );
         Line::from(spans).render(area, buf);
         let left = area.right().saturating_sub(others.width() as u16);
         buf.set_string(left, area.y, others, THEME.quiet);
     }
+}
+
+const TITLE: &str = "Time ";
+
+/// What stands left and right of the strip.
+fn around(time: &Timeline, width: u16) -> (String, String) {
+    let name = time.branches.get(time.branch).map_or("", |branch| branch.name.as_str());
+    let others = match time.branches.len() {
+        0 | 1 => String::new(),
+        many => format!(" {many} branches"),
+    };
+    (format!("{} {}/{} ", fit(name, usize::from(width) / 6), time.at, time.beats.len()), others)
+}
+
+fn room(area: Rect, place: &str, others: &str) -> usize {
+    usize::from(area.width).saturating_sub(TITLE.width() + place.width() + others.width() + 1)
+}
+
+/// The step that the strip shows in a column of the screen.
+pub(super) fn step_at(app: &App, area: Rect, x: u16) -> Option<u32> {
+    let time = &app.now.as_ref()?.time;
+    let (place, others) = around(time, area.width);
+    let places = time.beats.len() + 1;
+    let columns = places.min(room(area, &place, &others).max(1));
+    let column = usize::from(x).checked_sub(usize::from(area.x) + TITLE.width() + place.width())?;
+    (column < columns).then(|| (column * places).div_ceil(columns) as u32)
 }
 
 /// A character for each step, the start first; several steps share one where there is no room.

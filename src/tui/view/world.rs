@@ -21,27 +21,32 @@ impl Widget for World<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         let Some(now) = &app.now else { return };
-        let width = (area.width * 45 / 100).min(2 * area.height + 10);
-        map::Map(app).render(Rect { width, ..area }, buf);
-        let right = Rect { x: area.x + width + 2, width: area.width - width - 2, ..area };
+        let [plan, list] = parts(area);
+        map::Map(app).render(plan, buf);
         let things = things(now);
-        let list = Rect { height: right.height - DETAILS, ..right };
         self.list(&things, list, buf);
         if let Some(thing) = things.get(app.selected) {
-            details(thing, Rect { y: list.bottom(), height: DETAILS, ..right }, buf);
+            details(thing, Rect { y: list.bottom(), height: DETAILS, ..list }, buf);
         }
     }
+}
+
+/// Where the floor plan and the list of things are.
+pub(super) fn parts(page: Rect) -> [Rect; 2] {
+    let width = (page.width * 45 / 100).min(2 * page.height + 10);
+    let left = width + 2;
+    [Rect { width, ..page }, Rect { x: page.x + left, width: page.width - left, height: page.height - DETAILS, ..page }]
 }
 
 impl World<'_> {
     fn list(&self, things: &[Thing], area: Rect, buf: &mut Buffer) {
         let could = things.iter().filter(|thing| !thing.possible.is_empty()).count();
         let seen = things.iter().filter(|thing| thing.seen).count();
-        let right = format!("{could} to act on, {seen} in view, {} in all", things.len());
+        let right = format!("{could} usable, {seen} seen, {} in all", things.len());
         let inner = panel(buf, area, "Things", &right);
         let rows = usize::from(inner.height);
         let first = (self.0.selected + 1).saturating_sub(rows);
-        let room = usize::from(inner.width).saturating_sub(24);
+        let room = usize::from(inner.width).saturating_sub(26);
         for (row, (at, thing)) in inner.rows().zip(things.iter().enumerate().skip(first)) {
             let selected = at == self.0.selected;
             let style = match (selected, thing.possible.is_empty(), thing.seen) {
@@ -59,7 +64,7 @@ impl World<'_> {
                     format!("{} {:<14}", if selected { ">" } else { " " }, fit(thing.class.spoken(), 14)),
                     style,
                 ),
-                Span::styled(format!("{:>5.1} m ", thing.metres), THEME.quiet),
+                Span::styled(format!("{:>5.1} m   ", thing.metres), THEME.quiet),
                 Span::styled(fit(&verdict, room), if thing.possible.is_empty() { THEME.quiet } else { THEME.good }),
             ])
             .render(row, buf);
@@ -72,10 +77,11 @@ fn details(thing: &Thing, area: Rect, buf: &mut Buffer) {
     let inner = panel(buf, area, thing.class.spoken(), &format!("{:.2} m, {seen}", thing.metres));
     let mut words = [thing.place.as_str(), thing.state.as_str()].join(", ");
     words = words.trim_matches([',', ' ']).to_string();
+    let first = u16::from(!words.is_empty());
     put(buf, inner, 0, words, Style::new());
     let possible = thing.possible.iter().map(|kind| (kind, "possible now".to_string(), THEME.good));
     let impossible = thing.impossible.iter().map(|(kind, reason)| (kind, reason.clone(), THEME.quiet));
-    for (row, (kind, text, style)) in (1..).zip(possible.chain(impossible)) {
+    for (row, (kind, text, style)) in (first..).zip(possible.chain(impossible)) {
         put(buf, inner, row, format!("{:<10} {text}", kind.name()), style);
     }
 }

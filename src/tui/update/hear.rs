@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::app::{App, Entry, Tone};
-use super::chained::Chained;
-use super::graphics::classes::{self, Letters};
-use super::update::{Effect, turn_to};
-use super::verb::Page;
-use super::worker::Report;
+use super::Effect;
+use super::pages::turn_to;
 use crate::run::rollout::End;
+use crate::tui::app::{App, Entry, Tone};
+use crate::tui::chained::Chained;
+use crate::tui::graphics::classes::{self, Letters};
+use crate::tui::verb::Page;
+use crate::tui::worker::{Command, Report};
 
 /// Changes the state by what the worker says.
 pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
@@ -23,6 +24,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
                 app.divergence = None;
                 app.contrast = None;
                 app.landscape = None;
+                app.paints_values = false;
                 app.chain = None;
                 app.chain_before = None;
                 let known = app.now.as_ref().is_some_and(|now| now.instruction == snapshot.instruction);
@@ -34,11 +36,15 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             app.trouble = None;
             app.policy = snapshot.policy;
             app.page_of_interactions = 0;
+            app.newcomer &= snapshot.step < NEW;
             let before = app.now.replace(snapshot);
             if let Some(note) = app.now.as_ref().and_then(|now| arrival(before.as_deref(), now, new_episode)) {
-                app.note(Tone::Note, note);
+                let step = app.now.as_ref().map(|now| now.step);
+                app.write(Entry { step, text: note, outcome: String::new(), tone: Tone::Note });
             }
-            vec![Effect::Encode]
+            let mut effects = vec![Effect::Encode];
+            effects.extend(asked_again(app));
+            effects
         }
         Report::Stepped(event) => {
             let action = if event.by_hand { format!("{} (you)", event.action) } else { event.action };
@@ -70,9 +76,10 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
         Report::Instructed { old, new, note } => {
             app.editor.remember(&new);
             app.note(Tone::Note, format!("told: {new} ({note})"));
-            app.replaced = (old != new).then_some(old);
             app.thought = None;
-            vec![]
+            let effects = vec![Effect::Remember(new.clone())];
+            app.replaced = (old != new).then_some(old);
+            effects
         }
         Report::Ended(end) => {
             let task = app.now.as_ref().and_then(|now| now.progress.as_ref());
@@ -94,14 +101,17 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             if app.page == Page::Branches {
                 app.divergence = Some(divergence);
             }
-            vec![]
+            vec![Effect::Encode]
         }
         Report::Compared(contrast) => {
             app.contrast = Some(*contrast);
             turn_to(app, Page::Compare)
         }
-        Report::Surveyed(landscape) => {
-            app.landscape = Some(landscape);
+        Report::Surveyed(landscape, step) => {
+            // What was cancelled may still arrive.
+            if app.paints_values {
+                app.landscape = Some((landscape, step));
+            }
             vec![]
         }
         Report::Chained(chained) => {
@@ -144,17 +154,33 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
     }
 }
 
+/// Steps after which nobody is a newcomer.
+const NEW: u32 = 20;
+
+/// What has to be asked again in a new state: how the branches beside each other part, and values for other words.
+fn asked_again(app: &App) -> Vec<Effect> {
+    let mut effects = Vec::new();
+    let Some(now) = &app.now else { return effects };
+    let other = app.divergence.as_ref().map(|divergence| &divergence.names[1]).filter(|_| app.page == Page::Branches);
+    effects.extend(other.map(|other| Effect::Send(Command::Diverge(other.clone()))));
+    let told = app.landscape.as_ref().is_some_and(|(values, _)| values.instruction != now.instruction);
+    if app.paints_values && told {
+        effects.push(Effect::Send(Command::Survey));
+    }
+    effects
+}
+
 /// What is worth saying about a new state that was not stepped to.
 fn arrival(
-    before: Option<&super::engine::Snapshot>,
-    now: &super::engine::Snapshot,
+    before: Option<&crate::tui::engine::Snapshot>,
+    now: &crate::tui::engine::Snapshot,
     new_episode: bool,
 ) -> Option<String> {
     let Some(before) = before else { return Some(now.scene.name.clone()) };
     if new_episode {
         return Some(now.scene.name.clone());
     }
-    let name = |snapshot: &super::engine::Snapshot| {
+    let name = |snapshot: &crate::tui::engine::Snapshot| {
         snapshot.time.branches.get(snapshot.time.branch).map_or_else(String::new, |branch| branch.name.clone())
     };
     let forked = now.time.branches.len() > before.time.branches.len();

@@ -1,12 +1,61 @@
 //! Keeping what was explored: as a run, as a task, or as something to look at. Each says in a line what it wrote.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::engine::Engine;
+use super::Engine;
+use crate::domain::{Scene, Task};
+use crate::run::branches::Moment;
+use crate::run::explored::Explored;
+use crate::run::recording::Recording;
+use crate::run::scenes::Setting;
 use crate::run::{explored, export, folder};
 
 impl Engine {
+    /// Everything that was tried as a run's tasks and episodes, a branch each.
+    pub fn explored(&self) -> Explored {
+        let tasks = self.tree.branches().iter().map(|branch| self.task_at(self.tree.start(), &branch.name)).collect();
+        let episodes = self.tree.branches().iter().enumerate();
+        Explored {
+            scene: self.rollout.house.scene().clone(),
+            tasks,
+            episodes: episodes.map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
+        }
+    }
+
+    /// The branch in hand as a recording.
+    ///
+    /// # Errors
+    /// Never for what the simulator itself did.
+    pub fn recording(&self) -> anyhow::Result<Recording> {
+        let start = self.tree.start();
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
+        Recording::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
+    }
+
+    /// The present state and instruction as a task: what is left of the subtasks, with the expert's own number of steps.
+    ///
+    /// # Errors
+    /// When nobody grades the instruction, nothing is left to do, or the expert sees no way.
+    pub fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let id = format!("{}-{name}-{}", self.rollout.house.scene().name, self.tree.at());
+        let base = self.task_at(self.tree.moment(), &id);
+        Ok((explored::rest_of(base, &self.rollout)?, self.rollout.house.scene().clone()))
+    }
+
+    /// The task that begins at a moment; without subtasks where nobody grades the instruction.
+    fn task_at(&self, moment: &Moment, id: &str) -> Task {
+        let graded = self.task.as_ref().filter(|_| moment.grader.is_some());
+        let mut task = graded.cloned().unwrap_or_else(|| explored::ungraded(self.reference.clone()));
+        task.id = id.into();
+        task.start = Some((*moment.world).clone());
+        task.instruction.clone_from(&moment.instruction);
+        task
+    }
+
     /// Writes every branch as an episode of a run, into `path` or a new folder.
     ///
     /// # Errors

@@ -1,0 +1,292 @@
+//! The one function that changes the explorer's state: a message in, effects out. No IO.
+
+mod hear;
+mod lines;
+mod pages;
+mod perform;
+mod pointer;
+mod travel;
+
+pub use perform::perform;
+
+use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
+use ratatui::layout::Size;
+
+use crate::tui::app::App;
+use crate::tui::graphics::Picture;
+use crate::tui::keys;
+use crate::tui::keys::Mode;
+use crate::tui::verb::Verb;
+use crate::tui::worker::{Command, Report};
+use hear::hear;
+
+/// Something that happened.
+#[derive(Clone)]
+pub enum Msg {
+    /// A key was pressed.
+    Key(KeyEvent),
+    /// The mouse was used.
+    Mouse(MouseEvent),
+    /// Text was pasted.
+    Paste(String),
+    /// The terminal has another size.
+    Resize(Size),
+    /// The worker has something to say.
+    Report(Report),
+    /// A frame was encoded.
+    Picture(Picture),
+    /// A signal asks the program to end.
+    Signal(i32),
+    /// The worker stopped.
+    WorkerGone,
+}
+
+/// Something to be done about it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// Ask the worker.
+    Send(Command),
+    /// Encode the frame again.
+    Encode,
+    /// Draw the whole screen again.
+    Repaint,
+    /// Put text on the terminal's clipboard.
+    Copy(String),
+    /// Keep an instruction for later sessions.
+    Remember(String),
+    /// Hear the mouse, or no longer.
+    Mouse(bool),
+    /// End.
+    Quit(Farewell),
+}
+
+/// How the explorer ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Farewell {
+    /// The person wanted to.
+    Asked,
+    /// A signal of that number came.
+    Signal(i32),
+    /// The worker stopped.
+    WorkerGone,
+}
+
+/// Changes the state by one message.
+pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
+    match msg {
+        Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
+        Msg::Mouse(event) => pointer::heed(app, event),
+        Msg::Key(key) => match welcomed(app, key).or_else(|| keys::verb(app.mode, app.page, key)) {
+            Some(verb) => perform(app, verb),
+            None => {
+                match app.mode {
+                    Mode::Typing => app.editor.key(key),
+                    Mode::Palette => {
+                        app.palette.key(key);
+                        app.selected = 0;
+                    }
+                    Mode::Watch | Mode::Manual | Mode::Help => {}
+                }
+                vec![]
+            }
+        },
+        Msg::Paste(text) => {
+            if app.mode == Mode::Palette {
+                app.palette.paste(&text);
+                return vec![];
+            }
+            let mut effects = vec![];
+            if app.mode != Mode::Typing {
+                effects = perform(app, Verb::Edit);
+                app.editor.open("");
+            }
+            app.editor.paste(&text);
+            effects
+        }
+        Msg::Resize(size) => {
+            app.size = size;
+            app.picture = None;
+            app.page_of_interactions = 0;
+            vec![Effect::Encode, Effect::Repaint]
+        }
+        Msg::Report(report) => hear(app, report),
+        Msg::Picture(picture) => {
+            let fits = app.picture_area().is_some_and(|area| area.as_size() == picture.cells);
+            if fits && picture.protocol == app.graphics.protocol {
+                app.picture = Some(picture);
+            }
+            vec![]
+        }
+        Msg::Signal(number) => vec![Effect::Quit(Farewell::Signal(number))],
+        Msg::WorkerGone => vec![Effect::Quit(Farewell::WorkerGone)],
+    }
+}
+
+/// Whoever presses a key knows what keys are for, and has read what was noted.
+fn welcomed(app: &mut App, key: KeyEvent) -> Option<Verb> {
+    app.newcomer = false;
+    app.notice = None;
+    own(app, key)
+}
+
+/// What a key means by the person's own settings, while keys are no text.
+fn own(app: &App, key: KeyEvent) -> Option<Verb> {
+    matches!(app.mode, Mode::Watch | Mode::Manual).then(|| app.config.verb(key)).flatten()
+}
+
+fn send(command: Command) -> Vec<Effect> {
+    vec![Effect::Send(command)]
+}
+
+#[cfg(test)]
+mod tests {
+    use crossterm::event::{KeyCode, KeyModifiers};
+
+    use super::*;
+    use crate::domain::{Action, ActionType};
+    use crate::house::{Outcome, Reason};
+    use crate::tui::app::Tone;
+    use crate::tui::engine::Event;
+    use crate::tui::graphics::Protocol;
+    use crate::tui::testing;
+    use crate::tui::theme::Ability;
+    use crate::tui::worker::Going;
+
+    fn app() -> App {
+        testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL)
+    }
+
+    fn press(app: &mut App, code: KeyCode) -> Vec<Effect> {
+        update(app, Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)))
+    }
+
+    fn type_text(app: &mut App, text: &str) {
+        for c in text.chars() {
+            assert_eq!(press(app, KeyCode::Char(c)), []);
+        }
+    }
+
+    #[test]
+    fn space_runs_and_pauses() {
+        let mut app = app();
+        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Go(Some(Going::Policy)))]);
+        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Go(None))]);
+    }
+
+    #[test]
+    fn an_instruction_is_typed_while_the_agent_runs_and_applies_on_enter() {
+        let mut app = app();
+        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        press(&mut app, KeyCode::Char('i'));
+        type_text(&mut app, "quit nothing, 1 mug");
+        assert!(app.going.is_some(), "typing does not stop the agent");
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Instruct("quit nothing, 1 mug".into()))]);
+        assert_eq!(app.mode, Mode::Watch);
+    }
+
+    #[test]
+    fn escape_leaves_the_instruction_as_it_was() {
+        let mut app = app();
+        perform(&mut app, Verb::ToggleManual);
+        press(&mut app, KeyCode::Char('/'));
+        type_text(&mut app, "no");
+        assert_eq!(press(&mut app, KeyCode::Esc), []);
+        assert_eq!(app.mode, Mode::Manual, "typing goes back to where it came from");
+        press(&mut app, KeyCode::Char('i'));
+        assert_eq!(press(&mut app, KeyCode::Enter), [], "nothing typed changes nothing");
+    }
+
+    #[test]
+    fn the_worker_says_what_an_instruction_replaced() {
+        let mut app = app();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Report(Report::Instructed { old, new, note: "the task no longer applies" }));
+        assert_eq!(app.replaced.as_deref(), Some("put the mug in the sink"));
+        assert!(app.log.back().unwrap().text.contains("open the fridge (the task no longer applies)"));
+        press(&mut app, KeyCode::Char('i'));
+        press(&mut app, KeyCode::Up);
+        press(&mut app, KeyCode::Up);
+        assert_eq!(app.editor.text(), "put the mug in the sink", "the history begins with the task's words");
+    }
+
+    #[test]
+    fn a_digit_does_the_interaction_of_that_number() {
+        let mut app = app();
+        let fridge = testing::instance(&app, "Fridge");
+        let open = Action::interact(ActionType::Open, fridge);
+        assert_eq!(press(&mut app, KeyCode::Char('3')), [Effect::Send(Command::Act(open))]);
+        assert_eq!(press(&mut app, KeyCode::Char('4')), []);
+        assert!(app.log.back().unwrap().text.contains("no interaction has the number 4"));
+    }
+
+    #[test]
+    fn taking_over_stops_the_policy_and_arrows_move() {
+        let mut app = app();
+        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        assert_eq!(press(&mut app, KeyCode::Char('m')), [Effect::Send(Command::Go(None))]);
+        let ahead = Action::navigate(ActionType::MoveAhead);
+        assert_eq!(press(&mut app, KeyCode::Up), [Effect::Send(Command::Act(ahead))]);
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Step)], "the policy's choice");
+    }
+
+    #[test]
+    fn outcomes_are_told_in_words() {
+        let mut app = app();
+        let event = Event {
+            step: 1,
+            action: "MoveAhead".into(),
+            outcome: Outcome::Impossible(Reason::Blocked),
+            by_hand: true,
+            completed: None,
+            forked: None,
+        };
+        update(&mut app, Msg::Report(Report::Stepped(event)));
+        let entry = app.log.back().unwrap();
+        assert_eq!((entry.text.as_str(), entry.outcome.as_str()), ("MoveAhead (you)", "something is in the way"));
+        assert_eq!(entry.tone, Tone::Impossible);
+    }
+
+    #[test]
+    fn pictures_of_another_size_or_protocol_are_dropped() {
+        let mut app = app();
+        let stale = Picture::encode(&app.job().unwrap());
+        update(&mut app, Msg::Resize(Size { width: 80, height: 24 }));
+        update(&mut app, Msg::Picture(stale));
+        assert!(app.picture.is_none());
+        let stale = Picture::encode(&app.job().unwrap());
+        assert!(perform(&mut app, Verb::Graphics).contains(&Effect::Repaint));
+        update(&mut app, Msg::Picture(stale));
+        assert!(app.picture.is_none());
+    }
+
+    #[test]
+    fn numbers_are_in_the_picture_only_while_somebody_may_choose() {
+        let mut app = app();
+        let labels = app.job().unwrap().labels;
+        assert_eq!(labels.iter().map(|label| label.text.as_str()).collect::<Vec<_>>(), ["2", "3", "1"]);
+        assert!(labels[2].chosen, "what the policy is about to act on comes last, over the others");
+        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        assert!(app.job().unwrap().labels.is_empty());
+    }
+
+    #[test]
+    fn a_screen_of_any_size_draws() {
+        for (width, height) in [(1, 1), (10, 3), (79, 24), (80, 24), (97, 31), (200, 60), (300, 40), (80, 90)] {
+            for protocol in Protocol::ALL {
+                let mut app = testing::app(width, height, protocol, Ability::FULL);
+                perform(&mut app, Verb::Help);
+                testing::screen(&mut app);
+            }
+        }
+    }
+
+    #[test]
+    fn a_terminal_that_has_changed_its_size_before_its_message_came_is_not_drawn_to() {
+        let app = app();
+        for (width, height) in [(80, 24), (60, 50), (200, 60)] {
+            let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(width, height)).unwrap();
+            crate::tui::screen::draw(&mut terminal, &app).unwrap();
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Instructions that fit what is typed so far: given before, or sensible in this house.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::Line;
+use ratatui::widgets::{Block, Clear, Padding, Widget};
+
+use super::fit;
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+
+/// The list, at the foot of an area.
+pub struct Suggestions<'a>(pub &'a App);
+
+/// Instructions that are listed at a time.
+const ROWS: usize = 8;
+
+impl Widget for Suggestions<'_> {
+    fn render(self, page: Rect, buf: &mut Buffer) {
+        let found = self.0.completions();
+        if found.is_empty() {
+            return;
+        }
+        let title = if self.0.editor.text().is_empty() { " Told before, or sensible here " } else { " Tab completes " };
+        let height = found.len().min(ROWS) as u16 + 2;
+        let area = Rect { y: page.bottom() - height, height, width: page.width.min(80), ..page };
+        Clear.render(area, buf);
+        let block = Block::bordered().title(Line::styled(title, THEME.title)).padding(Padding::horizontal(1));
+        let inner = block.inner(area);
+        block.render(area, buf);
+        for (at, (row, text)) in inner.rows().zip(&found).enumerate() {
+            let style = if at == 0 { THEME.chosen } else { Style::new() };
+            Line::styled(fit(text, usize::from(row.width)), style).render(row, buf);
+        }
+    }
+}

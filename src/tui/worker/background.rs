@@ -1,0 +1,161 @@
+//! Work that takes long, on a thread of its own: value maps and chains.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::{Report, Worker};
+use crate::agent::Policy;
+use crate::domain::{Heading, Scene, World};
+use crate::run::chain::Draws;
+use crate::run::landscape::{Landscape, survey};
+use crate::tui::chained::Chained;
+
+/// Finished surveys by who was asked, what it was told, and the house without the agent.
+pub(super) type Surveys = Arc<Mutex<HashMap<(Who, String, String), Arc<Landscape>>>>;
+
+/// A policy's name and its checkpoint's hash.
+type Who = (String, Option<String>);
+
+/// The policy that worked in the background last: loading one takes a while.
+pub(super) type Spare = Arc<Mutex<Option<(Who, Box<dyn Policy>)>>>;
+
+/// Work on a thread of its own, one at a time.
+#[derive(Default)]
+pub(super) struct Background {
+    turn: Turn,
+}
+
+/// The permission to go on working, and to be heard. What is stopped says nothing any more.
+#[derive(Clone, Default)]
+pub(super) struct Turn {
+    stop: Arc<AtomicBool>,
+    speaking: Arc<Mutex<()>>,
+}
+
+impl Turn {
+    fn stop(&self) {
+        let _silence = self.speaking.lock().unwrap_or_else(PoisonError::into_inner);
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Says something, unless it was stopped; false when nobody listens.
+    fn say(&self, say: impl FnOnce() -> bool) -> bool {
+        let _speaking = self.speaking.lock().unwrap_or_else(PoisonError::into_inner);
+        self.stop.load(Ordering::Relaxed) || say()
+    }
+}
+
+impl Background {
+    /// Stops what is under way and starts something else.
+    pub(super) fn start(&mut self, work: impl FnOnce(&Turn) + Send + 'static) {
+        self.stop();
+        let turn = self.turn.clone();
+        // Without a thread left nothing is computed; the screen stays as it is.
+        let _ = std::thread::Builder::new().name("background".into()).spawn(move || work(&turn));
+    }
+
+    pub(super) fn stop(&mut self) {
+        self.turn.stop();
+        self.turn = Turn::default();
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
+    /// Surveys the cells in the background, unless that was done before.
+    pub(super) fn survey(&mut self) -> bool {
+        let (told, step) = (self.engine.instruction().to_string(), self.engine.tree().at());
+        let house = &self.engine.rollout().house;
+        let (scene, world) = (house.scene().clone(), house.world().clone());
+        let key = (self.who(), told.clone(), without_agent(&scene, &world).digest());
+        let known = self.surveys.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(known) = known {
+            return (self.tell)(Report::Surveyed(known, step));
+        }
+        let policy = match self.spare_policy() {
+            Ok(policy) => policy,
+            Err(error) => return self.refuse(&error),
+        };
+        let (tell, surveys, spare) = (self.tell.clone(), self.surveys.clone(), self.spare.clone());
+        self.background.start(move |turn| {
+            let mut policy = policy;
+            let mut visit = |found: &Landscape| {
+                let far = format!("values {}/{}", found.heights.len(), found.of);
+                let found = Arc::new(found.clone());
+                turn.say(|| tell(Report::Working(Some(far))) && tell(Report::Surveyed(found, step)))
+            };
+            let found = survey(policy.as_mut(), &scene, &world, &told, &turn.stop, &mut visit);
+            *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((key.0.clone(), policy));
+            let over = match found {
+                Ok(found) if found.heights.len() == found.of => {
+                    surveys.lock().unwrap_or_else(PoisonError::into_inner).insert(key, Arc::new(found));
+                    true
+                }
+                Ok(_) => true,
+                Err(error) => turn.say(|| tell(Report::Refused(format!("{error:#}")))),
+            };
+            let _ = over && turn.say(|| tell(Report::Working(None)));
+        });
+        true
+    }
+
+    fn who(&self) -> Who {
+        let author = self.engine.author();
+        (author.policy.clone(), author.checkpoint.clone())
+    }
+
+    /// A policy like the one that acts, for work beside the episode: the one that worked before, or a new one.
+    fn spare_policy(&mut self) -> anyhow::Result<Box<dyn Policy>> {
+        let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match spare {
+            Some((who, mut policy)) if who == self.who() => {
+                policy.set_sampling(false);
+                Ok(policy)
+            }
+            _ => {
+                (self.tell)(Report::Busy(Some(format!("loading another {}", self.engine.author().policy))));
+                let policy = self.engine.another_policy();
+                (self.tell)(Report::Busy(None));
+                policy
+            }
+        }
+    }
+
+    /// Follows the chain in the background; with `draws`, also which link breaks.
+    pub(super) fn follow(&mut self, draws: Option<Draws>) -> bool {
+        let Some(chain) = self.chain.clone() else {
+            return (self.tell)(Report::Refused(
+                "there is no chain yet: type one (chain A; B; ...), or chain alone".into(),
+            ));
+        };
+        let policy = match self.spare_policy() {
+            Ok(policy) => policy,
+            Err(error) => return self.refuse(&error),
+        };
+        let (tell, spare, who) = (self.tell.clone(), self.spare.clone(), self.who());
+        self.background.start(move |turn| {
+            let mut policy = policy;
+            let say = |report: Report| turn.say(|| tell(report));
+            if let Err(error) = Chained::work(&chain, policy.as_mut(), draws, &turn.stop, &say) {
+                say(Report::Refused(format!("{error:#}")));
+            }
+            *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((who, policy));
+            say(Report::Working(None));
+        });
+        true
+    }
+}
+
+/// The same world whatever the agent's cell and heading: surveys put it everywhere.
+fn without_agent(scene: &Scene, world: &World) -> World {
+    let mut world = world.clone();
+    world.agent.cell = scene.cells.first().copied().unwrap_or_default();
+    world.agent.heading = Heading::North;
+    world
+}

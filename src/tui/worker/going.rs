@@ -1,0 +1,89 @@
+//! Going on by itself, step after step, until something stops it.
+
+use std::time::Instant;
+
+use super::{Going, Report, Worker};
+use crate::tui::breakpoints::Facts;
+use crate::tui::engine::Event;
+
+impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
+    pub(super) fn start_going(&mut self, going: Option<Going>) -> bool {
+        self.due = Instant::now();
+        match going {
+            None => {
+                self.until = None;
+                self.go(None)
+            }
+            Some(Going::Replay) => {
+                let is_there = self.engine.tree().next().is_some();
+                self.go(is_there.then_some(Going::Replay))
+            }
+            // Without a policy there is nothing to run; that it is missing was told.
+            Some(Going::Policy) if !self.engine.has_policy() => true,
+            Some(Going::Policy) => {
+                let over = self.over();
+                self.go((!over).then_some(Going::Policy))
+            }
+        }
+    }
+
+    /// Whether the episode is over; says so again if it is.
+    pub(super) fn over(&mut self) -> bool {
+        let end = self.engine.end();
+        if let Some(end) = end {
+            (self.tell)(Report::Ended(end));
+        }
+        end.is_some()
+    }
+
+    /// The next step of what goes on by itself.
+    pub(super) fn go_on(&mut self) -> bool {
+        match self.going {
+            Some(Going::Replay) => {
+                let before = self.engine.facts();
+                self.engine.seek(self.engine.tree().at() + 1);
+                let over = self.engine.tree().next().is_none();
+                self.show() && self.think() && self.stop_at(&before) && (!over || self.go(None))
+            }
+            _ => self.step(),
+        }
+    }
+
+    pub(super) fn step(&mut self) -> bool {
+        let before = self.engine.facts();
+        match self.engine.step() {
+            Ok(event) => self.stepped(event) && self.stop_at(&before),
+            Err(error) => self.fail(&error) && self.go(None),
+        }
+    }
+
+    pub(super) fn stepped(&mut self, event: Event) -> bool {
+        (self.tell)(Report::Stepped(event))
+            && self.show()
+            && match self.engine.end() {
+                Some(end) => (self.tell)(Report::Ended(end)) && self.go(None),
+                None => self.think(),
+            }
+    }
+
+    /// Stops where a condition says so.
+    fn stop_at(&mut self, before: &Facts) -> bool {
+        if self.going.is_none() {
+            return true;
+        }
+        let now = self.engine.facts();
+        match self.breaks.iter().chain(&self.until).find_map(|condition| condition.hit(before, &now)) {
+            Some(why) => self.go(None) && (self.tell)(Report::Stopped(why)),
+            None => true,
+        }
+    }
+
+    pub(super) fn go(&mut self, going: Option<Going>) -> bool {
+        let changed = going != self.going;
+        self.going = going;
+        if going.is_none() {
+            self.until = None;
+        }
+        !changed || (self.tell)(Report::Going(going))
+    }
+}
