@@ -165,6 +165,21 @@ fn a_bad_task_file_is_one_clear_error() {
 }
 
 #[test]
+fn the_readmes_task_by_hand_is_sound_and_the_expert_solves_it() {
+    let readme = include_str!("../README.md");
+    let (_, after) = readme.split_once("A task by hand:\n\n```json\n").expect("the README has a task by hand");
+    let (task, _) = after.split_once("```").unwrap();
+    let sprint = Sprint::new();
+    std::fs::write(sprint.path("mine.json"), task).unwrap();
+    let check = sprint.run("tasks check mine.json");
+    assert_eq!((check.code, check.stdout.as_str()), (Some(0), "mine.json: 1 tasks, 1 solved by the expert\n"));
+    let ended = sprint.run("eval --tasks mine.json --policy expert --out run --json --fail-below success=1");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let summary: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!((&summary["task_set"], &summary["completed_subtasks"]["mean"]), (&"mine".into(), &2.0.into()));
+}
+
+#[test]
 fn the_expert_completes_alfreds_official_sets() {
     // Importing takes a minute; whoever has a dataset names it.
     let Ok(data) = std::env::var("SPRINT_DATA") else {

@@ -61,6 +61,52 @@ fn a_folder_that_cannot_be_written_to_is_named() {
 }
 
 #[test]
+fn a_run_in_a_folder_that_became_read_only_is_refused_and_stays_as_it_is() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 2);
+    let disk = sprint.path("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let mount = |options: &str| {
+        let mut mount = std::process::Command::new("mount");
+        mount
+            .args(["-t", "tmpfs", "-o", options, "tmpfs"])
+            .arg(&disk)
+            .output()
+            .is_ok_and(|ended| ended.status.success())
+    };
+    if !mount("size=4m") {
+        eprintln!("skipped: only a file system is read-only to root, and mounting one needs root");
+        return;
+    }
+    let line = "eval --tasks tasks.json --policy random --out disk/run";
+    let first = sprint.run(line).code;
+    let whole = sprint.read("disk/run/episodes.jsonl");
+    let remounted = mount("remount,ro");
+    let ended = sprint.run(&format!("{line} --json"));
+    let after = sprint.read("disk/run/episodes.jsonl");
+    assert!(std::process::Command::new("umount").arg(&disk).status().unwrap().success());
+    assert_eq!((first, remounted, ended.code), (Some(0), true, Some(1)), "{}", ended.stderr);
+    assert!(ended.stderr.contains("disk/run") && ended.stderr.contains("Read-only"), "{}", ended.stderr);
+    assert_eq!(after, whole);
+}
+
+#[test]
+fn no_result_depends_on_the_clock() {
+    // The wall clock may jump: it names folders and stamps the events of trainings, nothing else.
+    let mut found = Vec::new();
+    let mut open = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+        } else if std::fs::read_to_string(&path).is_ok_and(|text| text.contains("SystemTime")) {
+            found.push(path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string());
+        }
+    }
+    found.sort();
+    assert_eq!(found, ["src/cli/eval.rs", "src/run/events.rs", "src/tui/keep.rs"]);
+}
+
+#[test]
 fn a_run_folder_with_a_link_out_of_it_is_refused() {
     let sprint = Sprint::new();
     sprint.sample("tasks.json", 1, 1);
@@ -72,6 +118,10 @@ fn a_run_folder_with_a_link_out_of_it_is_refused() {
     let ended = sprint.run(line);
     assert_eq!(ended.code, Some(1));
     assert!(ended.stderr.contains("run/episodes.jsonl: a symbolic link"), "{}", ended.stderr);
+    std::fs::remove_file(sprint.path("run/episodes.jsonl")).unwrap();
+    std::os::unix::fs::symlink(sprint.path("."), sprint.path("run/shards")).unwrap();
+    let ended = sprint.run(line);
+    assert!(ended.code == Some(1) && ended.stderr.contains("run/shards: a symbolic link"), "{}", ended.stderr);
     assert_eq!(sprint.read("diary.txt"), "mine");
 }
 

@@ -7,6 +7,7 @@ mod alfred;
 mod explore;
 mod eval;
 mod floors;
+mod fuzz;
 mod command_line;
 mod generated;
 mod properties;

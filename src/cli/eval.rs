@@ -12,8 +12,9 @@ use super::Ending;
 use super::policies::PolicyChoice;
 use crate::data::taskset;
 use crate::house::grading::Grading;
-use crate::run::evaluate::{Evaluation, Options, Progress};
+use crate::run::evaluate::{Evaluation, Progress};
 use crate::run::folder::{self, RunFolder};
+use crate::run::options::Options;
 use crate::run::report::Summary;
 use crate::run::scenes::Scenes;
 use crate::run::shard::Shard;
@@ -61,7 +62,7 @@ pub struct Eval {
     /// Begin an episode that ends with an error anew, at most so often; episodes of an earlier run in --out too
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
-    /// End an episode with an error when it takes longer
+    /// End an episode with an error when it takes longer, within a step too
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=1_000_000), default_value_t = 3600)]
     timeout: u64,
     /// Play one share of the episodes, into RUN/shards; `slurm` reads which from the environment of an array's job
@@ -97,7 +98,7 @@ impl Eval {
         let stop = super::stop::on_signals()?;
         let mut meter = Meter::new(self.json);
         let summary =
-            crate::run::evaluate(&evaluation, &*chosen.team, &mut run, &stop, &mut |progress| meter.show(progress))?;
+            crate::run::evaluate(&evaluation, &chosen.team, &mut run, &stop, &mut |progress| meter.show(progress))?;
         meter.finish();
         let mut out = std::io::stdout().lock();
         if self.json {

@@ -50,7 +50,7 @@ pub struct Chosen {
     /// Makes one.
     pub make: Box<MakePolicy>,
     /// Makes one that acts in several episodes at once.
-    pub team: Box<MakeTeam<'static>>,
+    pub team: Arc<MakeTeam>,
     /// The checkpoint's folder.
     pub folder: Option<PathBuf>,
 }
@@ -97,7 +97,7 @@ impl PolicyChoice {
             name: name.into(),
             checkpoint_hash: None,
             make: Box::new(move || Ok(make())),
-            team: Box::new(move || Ok(Box::new(Solo(make())))),
+            team: Arc::new(move || Ok(Box::new(Solo(make())))),
             folder: None,
         };
         if self.policy != Kind::Agent && self.checkpoint.is_some() {
@@ -144,7 +144,7 @@ fn sampled(folder: PathBuf, sampling: bool) -> anyhow::Result<Chosen> {
         name,
         checkpoint_hash: Some(checkpoint_hash),
         make: Box::new(move || Ok(Box::new(one()?))),
-        team: Box::new(move || -> anyhow::Result<Box<dyn Team>> {
+        team: Arc::new(move || -> anyhow::Result<Box<dyn Team>> {
             Ok(Box::new(LearnedTeam::new(several()?, LearnedTeam::SEATS)))
         }),
         folder: Some(folder),

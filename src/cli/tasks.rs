@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, ensure};
@@ -9,11 +10,13 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::ProgressBar;
 
 use super::Ending;
-use crate::agent::{ExpertPolicy, Solo};
+use crate::agent::{ExpertPolicy, Solo, Team};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
 use crate::house::grading::{Grading, describe};
-use crate::run::evaluate::{Evaluation, Options};
+use crate::run::evaluate::Evaluation;
+use crate::run::options::Options;
+use crate::run::player::MakeTeam;
 use crate::run::scenes::Scenes;
 use crate::run::taskcheck;
 use crate::run::tasks::{self, Phrasing, Wish};
@@ -199,8 +202,9 @@ impl Check {
         let mut unsolved = 0;
         evaluation.play(
             &evaluation.all(),
-            &|| Ok(Box::new(Solo(Box::new(ExpertPolicy::new())))),
-            &AtomicBool::new(false),
+            &(Arc::new(|| -> anyhow::Result<Box<dyn Team>> { Ok(Box::new(Solo(Box::new(ExpertPolicy::new())))) })
+                as Arc<MakeTeam>),
+            &Arc::new(AtomicBool::new(false)),
             &mut |episode| {
                 if !episode.success {
                     unsolved += 1;

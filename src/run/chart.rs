@@ -54,8 +54,8 @@ impl Chart {
         let values = || self.lines.iter().flat_map(Line::shown);
         let (first, last) = ends(values().map(|(x, _)| x));
         let (low, high) = self.vertical.unwrap_or_else(|| ends(values().map(|(_, y)| y)));
-        let x = |value: f64| left + INSET + (value - first) / (last - first) * (right - left - 2.0 * INSET);
-        let y = |value: f64| bottom - ((value - low) / (high - low)).clamp(0.0, 1.0) * (bottom - top);
+        let x = |value: f64| left + INSET + share(value, first, last) * (right - left - 2.0 * INSET);
+        let y = |value: f64| bottom - share(value, low, high) * (bottom - top);
         let middle = f64::midpoint(left, right);
         drawing.text((middle, corner.1 + 20.0), &self.title, Anchor::Middle, INK);
         drawing.text((middle, corner.1 + size.1 - 8.0), &self.across, Anchor::Middle, INK);
@@ -84,6 +84,11 @@ impl Line {
     fn shown(&self) -> impl Iterator<Item = (f64, f64)> {
         self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
     }
+}
+
+/// Where a value lies between two others; what lies outside is at the nearer end.
+fn share(value: f64, low: f64, high: f64) -> f64 {
+    ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
 /// The lowest and highest of some numbers, kept apart.
@@ -139,7 +144,9 @@ mod tests {
 
     #[test]
     fn a_chart_of_nothing_of_one_point_or_of_no_numbers_is_still_a_chart() {
-        for points in [vec![], vec![(3.0, 0.5)], vec![(1.0, f64::NAN), (2.0, f64::INFINITY)]] {
+        for points in
+            [vec![], vec![(3.0, 0.5)], vec![(1.0, f64::NAN), (2.0, f64::INFINITY)], vec![(0.0, -1e308), (1e300, 1e308)]]
+        {
             for vertical in [None, Some((0.0, 1.0))] {
                 let line = Line { points: points.clone(), ..Line::default() };
                 let drawing = Chart { lines: vec![line], vertical, ..chart() }.drawing(640.0, 400.0);

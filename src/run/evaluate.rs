@@ -1,71 +1,27 @@
 //! Evaluation: every task with every seed, on several threads, with the same result for any number of them.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
-use super::chance;
+use super::booking::{Booking, bookings};
 use super::episode::{Episode, Key};
-use super::folder::{Manifest, RunFolder};
-use super::player::{Booking, MakeTeam, Player};
+use super::folder::RunFolder;
+use super::manifest::Manifest;
+use super::options::Options;
+use super::player::{self, MakeTeam};
 use super::report::Summary;
 use super::scenes::Scenes;
-use super::shard::Shard;
-use super::wording::{self, Wording};
+use super::wording;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
 use crate::house::grading::Grading;
 
-/// How to evaluate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// How subtasks are graded.
-    pub grading: Grading,
-    /// Each task is played this often, with the seeds 0, 1, ...
-    pub seeds: u64,
-    /// Only that many tasks, from the first.
-    pub limit: Option<usize>,
-    /// Threads; the result does not depend on it.
-    pub jobs: usize,
-    /// The agent is told all steps instead of the task's instruction.
-    pub step_by_step: bool,
-    /// The agent draws its actions by chance instead of taking the likeliest.
-    pub sampling: bool,
-    /// Each task is also played in every other wording.
-    pub language: bool,
-    /// Each task is also played from each of its subtasks on; the expert does those before.
-    pub every_start: bool,
-    /// An episode that ends with an error is begun anew at most this often.
-    pub retries: u32,
-    /// An episode that takes longer ends with an error; `None` for no limit.
-    pub timeout: Option<Duration>,
-    /// Only this share of the episodes.
-    pub shard: Option<Shard>,
-}
-
-impl Options {
-    /// Each task once, from its start, in its own words, on one thread.
-    pub fn plain(grading: Grading) -> Options {
-        Options {
-            grading,
-            seeds: 1,
-            limit: None,
-            jobs: 1,
-            step_by_step: false,
-            sampling: false,
-            language: false,
-            every_start: false,
-            retries: 0,
-            timeout: None,
-            shard: None,
-        }
-    }
-}
-
-/// An evaluation that can start: its tasks fit their scenes.
+/// An evaluation that can start: its tasks fit their scenes. Copies share tasks and scenes.
+#[derive(Clone)]
 pub struct Evaluation {
-    pub(super) tasks: Vec<Task>,
-    pub(super) scenes: Scenes,
+    pub(super) tasks: Arc<[Task]>,
+    pub(super) scenes: Arc<Scenes>,
     pub(super) options: Options,
     manifest: Manifest,
 }
@@ -124,7 +80,8 @@ impl Evaluation {
             every_start: options.every_start,
             shard: options.shard,
         };
-        Ok(Evaluation { tasks, scenes, options, manifest })
+        manifest.check()?;
+        Ok(Evaluation { tasks: tasks.into(), scenes: Arc::new(scenes), options, manifest })
     }
 
     /// What identifies this run.
@@ -163,31 +120,12 @@ impl Evaluation {
     pub fn play(
         &self,
         wanted: &[Booking],
-        make_team: &MakeTeam<'_>,
-        stop: &AtomicBool,
+        make_team: &Arc<MakeTeam>,
+        stop: &Arc<AtomicBool>,
         sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        Player { evaluation: self, make_team, stop }.play(wanted, sink)
+        player::play(self, wanted, make_team, stop, sink)
     }
-}
-
-/// Every episode of a run in its order: by task, then seed, then what the agent is told, then from where it starts.
-pub fn bookings(manifest: &Manifest, tasks: &[Task]) -> Vec<Booking> {
-    let wordings: &[Wording] = if manifest.language { &Wording::ALL } else { &Wording::ALL[..1] };
-    let mut all = Vec::new();
-    for (task, of) in tasks.iter().enumerate() {
-        for seed in 0..manifest.seeds {
-            let begin = |wording, from| Booking { place: 0, task, seed, wording, from, attempts: 0 };
-            all.extend(wordings.iter().map(|&wording| begin(wording, 0)));
-            if manifest.every_start {
-                all.extend((1..of.subtasks.len() as u32).map(|from| begin(Wording::Own, from)));
-            }
-        }
-    }
-    for (place, booking) in all.iter_mut().enumerate() {
-        booking.place = place;
-    }
-    all
 }
 
 /// Checks that the tasks have what the options need.
@@ -222,9 +160,9 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
 /// When a team cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
 pub fn evaluate(
     evaluation: &Evaluation,
-    make_team: &MakeTeam<'_>,
+    make_team: &Arc<MakeTeam>,
     folder: &mut RunFolder,
-    stop: &AtomicBool,
+    stop: &Arc<AtomicBool>,
     progress: &mut dyn FnMut(Progress),
 ) -> anyhow::Result<Summary> {
     let all = evaluation.all();
@@ -271,11 +209,6 @@ pub fn finish(manifest: &Manifest, tasks: &[Task], all: &[Booking], folder: &mut
     summary.episodes_hash = hash;
     folder.write_summary(&summary)?;
     Ok(summary)
-}
-
-/// What drives a policy's chance in an episode: the task's position and the seed, and nothing else.
-pub fn policy_seed(task: usize, seed: u64) -> u64 {
-    chance::mix(task as u64, seed)
 }
 
 #[cfg(test)]
@@ -380,20 +313,21 @@ pub(crate) mod tests {
     pub(crate) fn run(
         into: &std::path::Path,
         options: Options,
-        make: &MakeTeam<'_>,
+        make: impl Fn() -> anyhow::Result<Box<dyn Team>> + Send + Sync + 'static,
         stop_after: usize,
     ) -> anyhow::Result<Ran> {
         let (folder, set) = tasks();
         let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
         let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;
         let mut folder = RunFolder::open(into, evaluation.manifest())?;
-        let stop = AtomicBool::new(false);
-        let mut progress = |progress: Progress| {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopping = stop.clone();
+        let mut progress = move |progress: Progress| {
             if progress.done >= stop_after {
-                stop.store(true, Ordering::Relaxed);
+                stopping.store(true, Ordering::Relaxed);
             }
         };
-        let summary = evaluate(&evaluation, make, &mut folder, &stop, &mut progress)?;
+        let summary = evaluate(&evaluation, &(Arc::new(make) as Arc<MakeTeam>), &mut folder, &stop, &mut progress)?;
         Ok(Ran { summary, lines: std::fs::read_to_string(into.join("episodes.jsonl"))? })
     }
 
@@ -402,7 +336,7 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let with = |jobs: usize| {
             let into = folder.path().join(jobs.to_string());
-            run(&into, Options { jobs, ..options() }, &|| walker(false, false), usize::MAX).unwrap()
+            run(&into, Options { jobs, ..options() }, || walker(false, false), usize::MAX).unwrap()
         };
         let (one, four) = (with(1), with(4));
         assert_eq!(one.lines.lines().count(), 12);
@@ -414,11 +348,11 @@ pub(crate) mod tests {
     #[test]
     fn errors_and_panics_end_their_episode_and_stay_in_the_count() {
         let folder = tempfile::tempdir().unwrap();
-        let failing = run(&folder.path().join("a"), options(), &|| walker(true, false), usize::MAX).unwrap();
+        let failing = run(&folder.path().join("a"), options(), || walker(true, false), usize::MAX).unwrap();
         assert_eq!((failing.summary.episodes, failing.summary.partial), (12, false));
         assert!(failing.summary.errors > 0);
         assert!(failing.lines.contains("\"error\":\"no way to the mug\""), "{}", failing.lines);
-        let panicking = run(&folder.path().join("b"), options(), &|| walker(false, true), usize::MAX).unwrap();
+        let panicking = run(&folder.path().join("b"), options(), || walker(false, true), usize::MAX).unwrap();
         assert_eq!(panicking.summary.episodes, 12);
         assert!(panicking.lines.contains("\"error\":\"panicked: out of legs\""), "{}", panicking.lines);
     }
@@ -428,22 +362,22 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (whole, stopped) = (folder.path().join("whole"), folder.path().join("stopped"));
         let make = || walker(false, false);
-        let whole = run(&whole, options(), &make, usize::MAX).unwrap();
-        let partial = run(&stopped, Options { jobs: 2, ..options() }, &make, 3).unwrap();
+        let whole = run(&whole, options(), make, usize::MAX).unwrap();
+        let partial = run(&stopped, Options { jobs: 2, ..options() }, make, 3).unwrap();
         assert!(partial.summary.partial && (3..12).contains(&partial.summary.episodes));
-        let resumed = run(&stopped, options(), &make, usize::MAX).unwrap();
+        let resumed = run(&stopped, options(), make, usize::MAX).unwrap();
         assert_eq!(resumed.lines, whole.lines);
         assert_eq!(resumed.summary, whole.summary);
-        let again = run(&stopped, options(), &make, usize::MAX).unwrap();
+        let again = run(&stopped, options(), make, usize::MAX).unwrap();
         assert_eq!(again.lines, whole.lines, "a complete run is left as it is");
     }
 
     #[test]
     fn a_folder_of_other_settings_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        run(folder.path(), options(), &|| walker(false, false), usize::MAX).unwrap();
+        run(folder.path(), options(), || walker(false, false), usize::MAX).unwrap();
         let other = Options { seeds: 5, ..options() };
-        let error = run(folder.path(), other, &|| walker(false, false), usize::MAX).err().unwrap();
+        let error = run(folder.path(), other, || walker(false, false), usize::MAX).err().unwrap();
         assert!(error.to_string().contains("seeds: 4, not 5"), "{error}");
     }
 }

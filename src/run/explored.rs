@@ -8,7 +8,8 @@ use anyhow::{Context, ensure};
 use sha2::{Digest, Sha256};
 
 use super::episode::Episode;
-use super::folder::{Manifest, RunFolder};
+use super::folder::RunFolder;
+use super::manifest::Manifest;
 use super::report::Summary;
 use super::rollout::{End, Rollout};
 use super::scenes::Scenes;
@@ -30,8 +31,6 @@ pub struct Explored {
     pub episodes: Vec<Episode>,
 }
 
-/// The file with the tasks of an explored run.
-pub const TASKS: &str = "tasks.json";
 /// The folder with its scenes, where they come from a dataset.
 const SCENES: &str = "scenes";
 /// The most steps that the expert is given for a task.
@@ -42,7 +41,7 @@ const MOST: u32 = 1000;
 /// # Errors
 /// When the folder holds something else, or cannot be written to.
 pub fn write(explored: &Explored, path: &Path) -> anyhow::Result<()> {
-    ensure!(!path.join("manifest.json").exists(), "{} holds a run already; name another folder", path.display());
+    ensure!(!path.join(RunFolder::MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let set = TaskSet {
         format_version: TaskSet::FORMAT,
@@ -72,7 +71,7 @@ pub fn write(explored: &Explored, path: &Path) -> anyhow::Result<()> {
         shard: None,
     };
     let mut folder = RunFolder::open(path, &manifest)?;
-    json::write_bytes(&path.join(TASKS), &bytes)?;
+    json::write_bytes(&path.join(RunFolder::TASKS), &bytes)?;
     if named {
         json::write(&path.join(SCENES).join(format!("{}.json", explored.scene.name)), &*explored.scene)?;
     }
@@ -174,7 +173,7 @@ pub fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(S
 /// # Errors
 /// When neither is there, or the file is another one than the run was made from.
 pub fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(Vec<Task>, Scenes)> {
-    let own = run.join(TASKS);
+    let own = run.join(RunFolder::TASKS);
     let path = match file {
         Some(path) => path,
         None if own.exists() => &own,

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
+use super::booking::{Booking, bookings};
 use super::episode::{Episode, Key};
-use super::evaluate::bookings;
-use super::folder::{Manifest, RunFolder, read_episodes};
-use super::player::Booking;
+use super::folder::{RunFolder, read_episodes};
+use super::manifest::Manifest;
 use super::scenes::Scenes;
 use crate::data::{json, taskset};
 use crate::domain::TaskSet;
@@ -37,6 +37,7 @@ impl FinishedRun {
         let manifest_path = path.join(RunFolder::MANIFEST);
         ensure!(manifest_path.exists(), "{name} holds no run: there is no {}", RunFolder::MANIFEST);
         let manifest = json::read::<Manifest>(&manifest_path, Manifest::FORMAT)?.value;
+        manifest.check().with_context(|| manifest_path.display().to_string())?;
         let tasks = path.join(RunFolder::TASKS);
         let set = taskset::read(&tasks)?.value;
         ensure!(

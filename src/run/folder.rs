@@ -6,74 +6,14 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::episode::{Episode, Key};
+use super::manifest::Manifest;
 use super::plot;
 use super::shard::Shard;
 use crate::data::json;
 use crate::domain::TaskSet;
-use crate::house::grading::Grading;
-
-/// What a run was made from; two runs with equal manifests measure the same thing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Manifest {
-    /// Version of this format, for the whole folder.
-    pub format_version: u32,
-    /// The version of the program.
-    pub sprint: String,
-    /// The task set's name.
-    pub task_set: String,
-    /// SHA-256 of the task file.
-    pub task_set_hash: String,
-    /// SHA-256 over the scenes that its tasks play in.
-    pub scenes_hash: String,
-    /// The policy's name.
-    pub policy: String,
-    /// SHA-256 of the checkpoint, where the policy has one.
-    pub checkpoint_hash: Option<String>,
-    /// How many tasks of the set, from the first.
-    pub tasks: usize,
-    /// Each task is played with the seeds 0 to this, exclusive.
-    pub seeds: u64,
-    /// How subtasks are graded.
-    pub grader: Grading,
-    /// The agent is told all steps instead of the task's instruction.
-    pub step_by_step: bool,
-    /// The agent draws its actions by chance instead of taking the likeliest.
-    #[serde(default)]
-    pub sampling: bool,
-    /// Each task is also played in every other wording.
-    #[serde(default)]
-    pub language: bool,
-    /// Each task is also played from each of its subtasks on.
-    #[serde(default)]
-    pub every_start: bool,
-    /// Which share of the run this is; nothing for a whole one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shard: Option<Shard>,
-}
-
-impl Manifest {
-    /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
-
-    /// The fields in which `other` differs, each as `field: this, not that`.
-    pub fn differences(&self, other: &Manifest) -> Vec<String> {
-        let fields = |manifest| match serde_json::to_value(manifest) {
-            Ok(serde_json::Value::Object(fields)) => fields,
-            _ => serde_json::Map::new(),
-        };
-        let (own, others) = (fields(self), fields(other));
-        let names: std::collections::BTreeSet<&String> = own.keys().chain(others.keys()).collect();
-        let null = serde_json::Value::Null;
-        let pairs =
-            names.into_iter().map(|name| (name, own.get(name).unwrap_or(&null), others.get(name).unwrap_or(&null)));
-        pairs.filter(|(_, a, b)| a != b).map(|(name, a, b)| format!("{name}: {a}, not {b}")).collect()
-    }
-}
 
 /// An open run folder, which no other process writes to.
 pub struct RunFolder {
@@ -295,26 +235,7 @@ fn timestamp(unix_seconds: u64) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-
-    pub(crate) fn manifest() -> Manifest {
-        Manifest {
-            format_version: 1,
-            sprint: "0".into(),
-            task_set: "set".into(),
-            task_set_hash: "aa".into(),
-            scenes_hash: "bb".into(),
-            policy: "random".into(),
-            checkpoint_hash: None,
-            tasks: 2,
-            seeds: 1,
-            grader: Grading::Class,
-            step_by_step: false,
-            sampling: false,
-            language: false,
-            every_start: false,
-            shard: None,
-        }
-    }
+    use crate::run::manifest::tests::manifest;
 
     pub(crate) fn episode(task: &str) -> Episode {
         Episode {

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 
+use super::booking::bookings;
 use super::episode::Key;
-use super::evaluate::{bookings, finish};
+use super::evaluate::finish;
 use super::finished::FinishedRun;
-use super::folder::{Manifest, RunFolder};
+use super::folder::RunFolder;
+use super::manifest::Manifest;
 use super::report::Summary;
 use super::shard::Shard;
 use super::tasks;

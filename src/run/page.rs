@@ -195,7 +195,7 @@ pub fn lined_up(head: &[String], rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::folder::tests::manifest;
+    use crate::run::manifest::tests::manifest;
     use crate::run::report::tests::sample;
 
     #[test]

@@ -155,8 +155,8 @@ fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) 
 pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
-    use crate::run::folder::tests::{episode, manifest};
-
+    use crate::run::folder::tests::episode;
+    use crate::run::manifest::tests::manifest;
     use crate::run::scenes::Scenes;
 
     /// A run of the sample set in which these seeds of the first task succeeded.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::breakdown::{self, Errored, FailureClass, Group, Grouped, Start};
 use super::episode::Episode;
 use super::failure::Failure;
-use super::folder::Manifest;
+use super::manifest::Manifest;
 use super::stats::{self, Interval};
 use super::wording::Wording;
 use crate::domain::{SkillKind, Task};
@@ -197,7 +197,8 @@ impl SkillRate {
 pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
-    use crate::run::folder::tests::{episode, manifest};
+    use crate::run::folder::tests::episode;
+    use crate::run::manifest::tests::manifest;
 
     pub(crate) fn sample() -> (Vec<Task>, Vec<Episode>) {
         let tasks = sample_set().tasks;

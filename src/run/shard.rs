@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// One of equal shares of a run's episodes, each a block in the run's order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Written")]
 pub struct Shard {
     /// Which share, from 1.
     pub index: u32,
@@ -15,7 +15,28 @@ pub struct Shard {
     pub of: u32,
 }
 
+/// A share as it stands in a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    index: u32,
+    of: u32,
+}
+
+impl TryFrom<Written> for Shard {
+    type Error = String;
+
+    fn try_from(Written { index, of }: Written) -> Result<Shard, String> {
+        match (1..=Shard::MOST).contains(&of) && (1..=of).contains(&index) {
+            true => Ok(Shard { index, of }),
+            false => Err(format!("{index}/{of}: shares are counted from 1 to N, at most {}", Shard::MOST)),
+        }
+    }
+}
+
 impl Shard {
+    /// The most shares of a run.
+    const MOST: u32 = 10_000;
     /// The folder under a run's own that holds its shares.
     pub const FOLDER: &str = "shards";
 
@@ -66,11 +87,7 @@ impl std::str::FromStr for Shard {
         }
         let (index, of) = text.split_once('/').ok_or("write I/N, for example 2/8, or slurm")?;
         let number = |text: &str| text.parse::<u32>().map_err(|_| format!("{text:?} is not a number"));
-        let (index, of) = (number(index)?, number(of)?);
-        if !(1..=10_000).contains(&of) || !(1..=of).contains(&index) {
-            return Err(format!("{text}: shares are counted from 1 to N, at most 10000"));
-        }
-        Ok(Shard { index, of })
+        Shard::try_from(Written { index: number(index)?, of: number(of)? })
     }
 }
 
@@ -93,6 +110,10 @@ mod tests {
         assert_eq!("2/8".parse(), Ok(Shard { index: 2, of: 8 }));
         for nonsense in ["0/3", "4/3", "1/0", "1", "a/b", "1/99999"] {
             assert!(nonsense.parse::<Shard>().is_err(), "{nonsense}");
+        }
+        for nonsense in [r#"{"index":0,"of":2}"#, r#"{"index":3,"of":2}"#, r#"{"index":1,"of":0}"#] {
+            let error = serde_json::from_str::<Shard>(nonsense).unwrap_err().to_string();
+            assert!(error.contains("counted from 1 to N"), "{error}");
         }
         let slurm = |id: &'static str, count: &'static str, min: Option<&'static str>| {
             Shard::of_slurm(move |name| match name {

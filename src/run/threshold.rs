@@ -68,7 +68,7 @@ impl std::str::FromStr for Threshold {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::folder::tests::manifest;
+    use crate::run::manifest::tests::manifest;
     use crate::run::report::tests::sample;
 
     #[test]

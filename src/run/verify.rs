@@ -6,10 +6,11 @@ use std::path::Path;
 use anyhow::Context;
 use serde::Serialize;
 
+use super::booking::policy_seed;
 use super::branches::{FRAMES, Moment, look_back};
 use super::episode::{Author, Episode, Step};
-use super::evaluate::policy_seed;
-use super::folder::{Manifest, read_episodes};
+use super::folder::read_episodes;
+use super::manifest::Manifest;
 use super::rollout::Rollout;
 use super::scenes::{Scenes, Setting};
 use crate::agent::{Carried, Policy};

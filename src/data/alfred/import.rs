@@ -331,45 +331,7 @@ mod tests {
 
     /// A recording of our own in ALFRED's format: walk, take the mug from the counter, put it into the sink.
     fn recording() -> Value {
-        let counter = json!(["CounterTop", [0.4, 0.4, 4.0, 4.0, 3.8, 3.8]]);
-        let sink = json!(["SinkBasin", [2.0, 2.0, 4.1, 4.1, 3.2, 3.2]]);
-        let mug = "Mug|+00.10|+00.95|+00.90";
-        let basin = "Sink|+00.45|+00.82|+01.00|SinkBasin";
-        let low = |high: usize, action: Value, bounds: Value| json!({"high_idx": high, "api_action": action, "discrete_action": {"args": bounds}});
-        let seen = |bounds: [i32; 4]| json!({"bbox": bounds, "mask": [[0, 3]], "point": [1, 1]});
-        json!({
-            "task_id": "trial_1",
-            "task_type": "pick_and_place_simple",
-            "images": [{"low_idx": 0}],
-            "pddl_params": {"object_target": "Mug", "parent_target": "SinkBasin", "mrecep_target": "",
-                "toggle_target": "", "object_sliced": false},
-            "scene": {"floor_plan": "FloorPlan1", "scene_num": 1, "dirty_and_empty": false,
-                "init_action": {"x": -0.25, "y": 0.9, "z": 0.25, "rotation": 90, "horizon": 30},
-                "object_toggles": [],
-                "object_poses": [
-                    {"objectName": "Mug_1", "position": {"x": 0.1, "y": 0.947, "z": 0.9},
-                        "rotation": {"x": 0.0, "y": 359.99, "z": 0.0}},
-                    {"objectName": "Gadget_1", "position": {"x": 0.1, "y": 0.947, "z": 0.9},
-                        "rotation": {"x": 0.0, "y": 0.0, "z": 0.0}}]},
-            "plan": {
-                "high_pddl": [
-                    {"high_idx": 0, "discrete_action": {"action": "GotoLocation", "args": ["countertop"]},
-                        "planner_action": {"action": "GotoLocation", "location": "loc|0|1|0|30"}},
-                    {"high_idx": "1", "discrete_action": {"action": "PickupObject"},
-                        "planner_action": {"objectId": mug, "coordinateReceptacleObjectId": counter}},
-                    {"high_idx": 2, "discrete_action": {"action": "PutObject"},
-                        "planner_action": {"objectId": mug, "receptacleObjectId": basin,
-                            "coordinateReceptacleObjectId": sink}},
-                    {"high_idx": 3, "discrete_action": {"action": "NoOp"}, "planner_action": {"value": 1}}],
-                "low_actions": [
-                    low(0, json!({"action": "MoveAhead"}), json!({})),
-                    low(0, json!({"action": "RotateLeft"}), json!({})),
-                    low(1, json!({"action": "PickupObject", "objectId": mug}), seen([100, 101, 140, 160])),
-                    low(2, json!({"action": "PutObject", "objectId": mug, "receptacleObjectId": basin}),
-                        seen([150, 101, 299, 300]))]},
-            "turk_annotations": {"anns": [{"task_desc": "Put a mug in the sink.",
-                "high_descs": ["Walk.", "Take the mug.", "Put it in the sink."]}]}
-        })
+        serde_json::from_str(include_str!("../../../tests/fuzz/traj_data.json")).unwrap()
     }
 
     /// A checkout with these files in its train split.

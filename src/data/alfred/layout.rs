@@ -44,6 +44,10 @@ fn read_cells(path: &Path) -> anyhow::Result<Vec<Cell>> {
     if shape.len() != 2 || shape[1] != 2 {
         bail!("holds an array of shape {shape:?}; n x 2 was expected");
     }
+    // Memory is taken for what the header says, so that has to be there.
+    if shape[0] > bytes.len() as u64 {
+        bail!("is cut off: its header says {} rows", shape[0]);
+    }
     let values: Vec<f64> = file.into_vec()?;
     let mut cells = Vec::with_capacity(values.len() / 2);
     for pair in values.chunks_exact(2) {
