@@ -16,7 +16,7 @@ pub enum Eyes {
     /// Trained on drawn frames.
     House {
         /// The network.
-        encoder: VisualEncoder,
+        encoder: Box<VisualEncoder>,
         /// Its weights.
         store: nn::VarStore,
     },
@@ -28,7 +28,7 @@ impl Eyes {
     /// A House encoder with fresh weights.
     pub fn house(spec: &VisualSpec, device: Device) -> Eyes {
         let store = nn::VarStore::new(device);
-        Eyes::House { encoder: VisualEncoder::new(&store.root(), spec), store }
+        Eyes::House { encoder: Box::new(VisualEncoder::new(&store.root(), spec)), store }
     }
 
     /// Where ResNet-18's weights are looked for.

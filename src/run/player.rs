@@ -51,9 +51,9 @@ pub(super) enum Note {
 }
 
 impl Play {
-    /// Tells the thread that waits.
-    pub fn tell(&self, note: Note) -> Result<(), mpsc::SendError<Note>> {
-        self.teller.lock().unwrap_or_else(PoisonError::into_inner).send(note)
+    /// Tells the thread that waits; false when nobody waits any more.
+    pub fn tell(&self, note: Note) -> bool {
+        self.teller.lock().unwrap_or_else(PoisonError::into_inner).send(note).is_ok()
     }
 }
 
@@ -200,7 +200,7 @@ struct Done {
 impl Drop for Done {
     fn drop(&mut self) {
         // Where nobody listens any more, nobody waits.
-        let _ = self.play.tell(Note::Done(self.number));
+        self.play.tell(Note::Done(self.number));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -70,7 +71,7 @@ impl Pretraining {
     ///
     /// # Errors
     /// When data or an earlier state cannot be read, the folder not be written, or there is a training in `out` already.
-    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Trained> {
+    pub fn run(&self, report: &mut dyn Report, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
         let training = self.out.join("training");
         anyhow::ensure!(
             self.resume || !training.exists(),

@@ -62,9 +62,9 @@ impl Table {
             let at = underway.at;
             let evaluation = &self.play.evaluation;
             let episode = guarded(|| Ok(underway.clone().close(evaluation)));
-            let episode = episode.unwrap_or_else(|_| Episode { failure: None, ..underway.episode });
+            let episode = episode.unwrap_or(Episode { failure: None, ..underway.episode });
             self.rollouts[seat] = None;
-            if self.record(|seats| seats[seat].take())?.is_some() && self.play.tell(Note::Over(at, episode)).is_err() {
+            if self.record(|seats| seats[seat].take())?.is_some() && !self.play.tell(Note::Over(at, episode)) {
                 return Ok(false);
             }
         }

@@ -1,12 +1,15 @@
 //! Trials: while it trains, an agent plays some tasks of a set, and its curve shows what losses do not.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use tch::Device;
 
-use super::evaluate::{Evaluation, Options};
+use super::evaluate::Evaluation;
+use super::options::Options;
+use super::player::MakeTeam;
 use super::progress::Scalars;
 use super::scenes::Scenes;
 use crate::agent::learned::SharedEmbedder;
@@ -53,13 +56,14 @@ pub fn hold(
     folder: &Path,
     sentences: &SharedEmbedder,
     device: Device,
-    stop: &AtomicBool,
+    stop: &Arc<AtomicBool>,
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
-    let make_team = || -> anyhow::Result<Box<dyn Team>> {
-        let policy = LearnedPolicy::load(folder, sentences.clone(), device)?;
+    let (folder, sentences) = (folder.to_owned(), sentences.clone());
+    let make_team: Arc<MakeTeam> = Arc::new(move || -> anyhow::Result<Box<dyn Team>> {
+        let policy = LearnedPolicy::load(&folder, sentences.clone(), device)?;
         Ok(Box::new(LearnedTeam::new(policy, LearnedTeam::SEATS)))
-    };
+    });
     let (mut episodes, mut successes, mut completed) = (0u32, 0u32, 0u32);
     evaluation.play(&evaluation.all(), &make_team, stop, &mut |episode| {
         episodes += 1;

@@ -282,7 +282,7 @@ fn tensors(at: &Path) -> Vec<Vec<u8>> {
     config["policy"]["embedding"] = 2.into();
     std::fs::write(at.join("config.json"), config.to_string()).unwrap();
     let config = Config::read(at).unwrap();
-    Networks::new(&config.visual, &config.policy, None, Device::Cpu).save(at, &config).unwrap();
+    Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu).save(at, &config).unwrap();
     vec![std::fs::read(at.join("model.safetensors")).unwrap()]
 }
 
