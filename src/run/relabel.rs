@@ -127,7 +127,7 @@ mod tests {
 
     use super::*;
     use crate::data::dataset::{Manifest, Writer};
-    use crate::data::items::{Composites, Items, Selection, Source};
+    use crate::data::items::{Composites, Items, Label, Selection, Source};
     use crate::data::summaries::Summaries;
     use crate::domain::task::SceneRef;
     use crate::domain::trajectory::Annotation;
@@ -238,7 +238,9 @@ mod tests {
             let selection = Selection { composites: Composites::Labels, labels_of: Some(source.into()) };
             let source =
                 Source { trajectories: &trajectories, held_out: &dataset.manifest().held_out, summaries: &summaries };
-            let items = Items::of(&source, Vec::new(), &selection, 0).unwrap();
+            let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();
+            let labels = vec![Some(Label { action: 0, object: 0 }); frames];
+            let items = Items::of(&source, labels, &selection, 0).unwrap();
             (items.training.len(), items.texts)
         };
         let (spans, of_rules) = texts("rules");
