@@ -1,6 +1,5 @@
 //! One thread of an evaluation: a table at which a team acts in several episodes at once.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -10,7 +9,7 @@ use super::booking::{Booking, policy_seed};
 use super::episode::{Episode, Step};
 use super::player::{Note, Play};
 use super::rollout::Rollout;
-use super::underway::{Underway, Watch};
+use super::underway::{Underway, Watch, guarded};
 use crate::agent::{Decision, ExpertPolicy, Policy, Team};
 use crate::house::House;
 use crate::house::grading::Grader;
@@ -61,8 +60,7 @@ impl Table {
             // Why it fell short is found while it still sits, so that somebody waits for that too.
             let at = underway.at;
             let evaluation = &self.play.evaluation;
-            let episode = guarded(|| Ok(underway.clone().close(evaluation)));
-            let episode = episode.unwrap_or(Episode { failure: None, ..underway.episode });
+            let episode = underway.close(evaluation);
             self.rollouts[seat] = None;
             if self.record(|seats| seats[seat].take())?.is_some() && !self.play.tell(Note::Over(at, episode)) {
                 return Ok(false);
@@ -230,17 +228,4 @@ fn lead(rollout: &mut Rollout, from: u32, episode: &mut Episode) -> anyhow::Resu
         episode.prefix += 1;
     }
     Ok(())
-}
-
-/// Runs something; what went wrong, a panic included, in words.
-fn guarded<T>(run: impl FnOnce() -> anyhow::Result<T>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(run)) {
-        Ok(Ok(value)) => Ok(value),
-        Ok(Err(error)) => Err(format!("{error:#}")),
-        Err(panic) => {
-            let text = panic.downcast_ref::<&str>().copied();
-            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-            Err(format!("panicked: {}", text.unwrap_or("without a message")))
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! Episodes under way, and the watch over them: whoever thinks too long can be left alone without losing what it did.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -61,13 +62,27 @@ impl Underway {
         episode.success = episode.error.is_none() && episode.completed == episode.of;
         if !episode.success && episode.error.is_none() {
             let task = &evaluation.tasks[self.booking.task];
-            let class = evaluation
-                .scenes
-                .setting(task)
-                .map(|setting| failure::classify(task, evaluation.options.grading, &setting, &episode.trace));
+            // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
+            let class = guarded(|| {
+                let setting = evaluation.scenes.setting(task)?;
+                Ok(failure::classify(task, evaluation.options.grading, &setting, &episode.trace))
+            });
             episode.failure = class.ok();
         }
         self.episode
+    }
+}
+
+/// Runs something; what went wrong, a panic included, in words.
+pub(super) fn guarded<T>(run: impl FnOnce() -> anyhow::Result<T>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => Err(format!("{error:#}")),
+        Err(panic) => {
+            let text = panic.downcast_ref::<&str>().copied();
+            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+            Err(format!("panicked: {}", text.unwrap_or("without a message")))
+        }
     }
 }
 
