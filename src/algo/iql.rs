@@ -18,6 +18,10 @@ pub struct Iql {
     pub weight_cap: f64,
     /// The share by which the target Q follows Q after each step.
     pub target_rate: f64,
+    /// The share of the steps in which the policy only clones the demonstrated skills: a critic that knows nothing yet weighs
+    /// at random. The paper has no such phase, and 140,000 steps.
+    #[serde(default)]
+    pub warmup_share: f64,
 }
 
 /// (V − Q̄)² times τ where V is below Q̄, else times 1 − τ. No gradient reaches `q`.

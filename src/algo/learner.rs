@@ -41,6 +41,11 @@ impl<'a> Learner<'a> {
         self.optimiser.steps()
     }
 
+    /// The share of all steps that is taken.
+    pub fn share(&self) -> f64 {
+        self.step() as f64 / self.optimisation.steps.max(1) as f64
+    }
+
     /// Whether all steps are taken.
     pub fn is_done(&self) -> bool {
         self.step() >= self.optimisation.steps

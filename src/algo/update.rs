@@ -3,135 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tch::{Device, Kind, Tensor, nn};
+use tch::{Kind, Tensor, nn};
 
+use super::batch::{Batch, Part, Transitions};
 use super::bc;
-use super::chain::{self, Chaining, Ends, Worth};
-use super::iql::{self, Iql, Tracking};
+use super::chain::Chaining;
+use super::critic::CriticLearner;
 use super::learner::{Learner, Optimisation};
-use crate::nets::critic::{Critic, Judgement};
+use super::terms::{NotFinite, Terms};
 use crate::nets::policy::{Logits, PolicyNet};
-use crate::nets::visual::SIDE;
 use crate::nets::weights::{self, Tensors};
-
-/// Transitions (s, a, s′) with what the agent was told, n of each.
-#[derive(Debug)]
-pub struct Transitions {
-    /// s: [n, channels, 7, 7] or [n, frames, channels, 7, 7], floats of any width.
-    pub observation: Tensor,
-    /// s′; absent where nothing judges it.
-    pub next: Option<Tensor>,
-    /// z, as the networks take it.
-    pub told: Tensor,
-    /// Actions, by index [n].
-    pub actions: Tensor,
-    /// Object classes, by index [n]; 0 for navigation.
-    pub objects: Tensor,
-    /// 1 on the transition into the span's last state, [n] floats.
-    pub terminal: Tensor,
-}
-
-/// Pairs of transitions to chain, m of them.
-#[derive(Debug)]
-pub struct Pairs {
-    /// A's transitions, told z_B.
-    pub first: Transitions,
-    /// 1 where equation 4 ends A, [m].
-    pub cut: Tensor,
-    /// "A. B." as A is told it, and B's transitions told the same; absent where equation 5 is off.
-    pub joint: Option<(Tensor, Transitions)>,
-}
-
-/// What one update learns from.
-#[derive(Debug)]
-pub struct Batch {
-    /// Demonstrated skills as they were described.
-    pub base: Transitions,
-    /// Chained pairs.
-    pub pairs: Option<Pairs>,
-}
-
-/// The demonstrated skills themselves.
-const BASE: &str = "";
-/// Equation 4: A told z_B.
-const CHAIN: &str = "chain";
-/// Equation 5: A told "A. B.".
-const LEAD: &str = "lead";
-/// Equation 5: B told "A. B.".
-const FOLLOW: &str = "follow";
-
-/// A part to be: its name and weight, the transitions, what they are told, and where they end.
-type Row<'a> = (&'static str, f64, &'a Transitions, &'a Tensor, &'a Tensor);
-
-/// Items that are averaged by themselves.
-struct Part {
-    name: &'static str,
-    start: i64,
-    len: i64,
-    weight: f64,
-}
-
-impl Part {
-    /// This part of a tensor over all items.
-    fn of(&self, all: &Tensor) -> Tensor {
-        all.narrow(0, self.start, self.len)
-    }
-
-    /// What a number of this part is called.
-    fn label(&self, name: &str) -> String {
-        if self.name == BASE { name.to_string() } else { format!("{}_{name}", self.name) }
-    }
-}
-
-/// The losses by name, looked at before any weight is changed.
-#[derive(Default)]
-struct Terms {
-    names: Vec<String>,
-    tensors: Vec<Tensor>,
-}
-
-impl Terms {
-    fn add(&mut self, name: String, tensor: &Tensor) {
-        self.names.push(name);
-        self.tensors.push(tensor.detach());
-    }
-
-    /// All of them, fetched at once.
-    fn numbers(self, step: u64) -> Result<BTreeMap<String, f64>, NotFinite> {
-        let stacked = Tensor::stack(&self.tensors, 0).to_kind(Kind::Double).to_device(Device::Cpu);
-        let values = (0..self.tensors.len() as i64).map(|i| stacked.double_value(&[i]));
-        let found: BTreeMap<String, f64> = self.names.into_iter().zip(values).collect();
-        match found.iter().find(|(_, value)| !value.is_finite()) {
-            Some((term, &value)) => Err(NotFinite { step, term: term.clone(), value }),
-            None => Ok(found),
-        }
-    }
-}
-
-/// The critic under training.
-pub struct CriticLearner<'a> {
-    online: &'a Critic,
-    target: &'a Critic,
-    target_store: &'a nn::VarStore,
-    learner: Learner<'a>,
-    tracking: Tracking,
-    iql: Iql,
-}
-
-impl<'a> CriticLearner<'a> {
-    /// A critic with its optimiser, and the target that follows it; both at step 0.
-    pub fn new(
-        (online, store): (&'a Critic, &'a nn::VarStore),
-        (target, target_store): (&'a Critic, &'a nn::VarStore),
-        optimisation: Optimisation,
-        iql: Iql,
-        seed: u64,
-    ) -> CriticLearner<'a> {
-        let mut tracking = Tracking::new(store, target_store);
-        tracking.follow(1.0);
-        CriticLearner { online, target, target_store, learner: Learner::new(store, optimisation, seed), tracking, iql }
-    }
-}
 
 /// A policy, and for IQL its critic, under training.
 pub struct Update<'a> {
@@ -139,18 +20,6 @@ pub struct Update<'a> {
     learner: Learner<'a>,
     critic: Option<CriticLearner<'a>>,
     chaining: Option<Chaining>,
-}
-
-/// A loss that is not a number; no weight was changed by it.
-#[derive(Debug, thiserror::Error)]
-#[error("step {step}: {term} is {value}; nothing was changed by this step, and the last saved state is kept")]
-pub struct NotFinite {
-    /// The step that failed, from 1.
-    pub step: u64,
-    /// The loss.
-    pub term: String,
-    /// What it came to.
-    pub value: f64,
 }
 
 impl<'a> Update<'a> {
@@ -181,17 +50,21 @@ impl<'a> Update<'a> {
     /// [`NotFinite`].
     pub fn update(&mut self, batch: &Batch, report: bool) -> Result<BTreeMap<String, f64>, NotFinite> {
         self.learner.begin_step();
-        let (all, parts) = self.relabel(batch);
+        let (all, parts) = batch.relabelled(self.chaining.as_ref());
         let mut terms = Terms::default();
         let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
         let logits = self.policy.forward(&all.observation, &all.told, true);
-        let policy_loss = policy_loss(&logits, &all, &parts, judged.as_ref().map(|judged| &judged.weights), &mut terms);
+        let weights = judged.as_ref().map(|judged| &judged.weights);
+        // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
+        let policy_loss = match &self.critic {
+            Some(critic) if critic.is_warming_up() => policy_loss(&logits, &all, &parts[..1], None, &mut terms),
+            _ => policy_loss(&logits, &all, &parts, weights, &mut terms),
+        };
         let critic_loss = judged.as_ref().map(|judged| judged.loss(&parts, &mut terms));
         let mut numbers = terms.numbers(self.learner.step() + 1)?;
         self.learner.minimise(&policy_loss);
         if let (Some(critic), Some(loss)) = (&mut self.critic, critic_loss) {
-            critic.learner.minimise(&loss);
-            critic.tracking.follow(critic.iql.target_rate);
+            critic.minimise(&loss);
         }
         if report {
             let base = |all: &Tensor| all.narrow(0, 0, batch.base.actions.size()[0]);
@@ -205,49 +78,10 @@ impl<'a> Update<'a> {
         Ok(numbers)
     }
 
-    /// The batch and its relabelled copies, one after the other.
-    fn relabel(&self, batch: &Batch) -> (Transitions, Vec<Part>) {
-        let base = &batch.base;
-        let mut rows: Vec<Row<'_>> = vec![(BASE, 1.0, base, &base.told, &base.terminal)];
-        if let (Some(pairs), Some(chaining)) = (&batch.pairs, &self.chaining) {
-            let (first, share) = (&pairs.first, chaining.weight / (chaining.chain + chaining.aggregate));
-            rows.push((CHAIN, share * chaining.chain, first, &first.told, &pairs.cut));
-            if let Some((told, second)) = &pairs.joint {
-                let share = share * chaining.aggregate / 2.0;
-                rows.push((LEAD, share, first, told, &first.terminal));
-                rows.push((FOLLOW, share, second, &second.told, &second.terminal));
-            }
-        }
-        let cat = |of: &dyn Fn(&Row<'_>) -> Tensor| match &rows[..] {
-            [row] => of(row),
-            rows => Tensor::cat(&rows.iter().map(of).collect::<Vec<_>>(), 0),
-        };
-        let next = |row: &Row<'_>| row.2.next.as_ref().unwrap_or(&row.2.observation).shallow_clone();
-        let all = Transitions {
-            observation: seen(&cat(&|row| row.2.observation.shallow_clone())),
-            next: base.next.is_some().then(|| seen(&cat(&next))),
-            told: cat(&|row| row.3.shallow_clone()),
-            actions: cat(&|row| row.2.actions.shallow_clone()),
-            objects: cat(&|row| row.2.objects.shallow_clone()),
-            terminal: cat(&|row| row.4.shallow_clone()),
-        };
-        let mut start = 0;
-        let part = |&(name, weight, _, _, terminal): &Row<'_>| {
-            let len = terminal.size()[0];
-            start += len;
-            Part { name, start: start - len, len, weight }
-        };
-        let parts = rows.iter().map(part).collect();
-        (all, parts)
-    }
-
     /// Every tensor of the training's state, by name.
     pub fn state(&self) -> Tensors {
-        let mut tensors = prefixed("policy.", self.learner.state());
-        if let Some(critic) = &self.critic {
-            tensors.extend(prefixed("critic.", critic.learner.state()));
-            tensors.extend(prefixed("target.", critic.target_store.variables().into_iter().collect()));
-        }
+        let mut tensors = weights::prefixed("policy.", self.learner.state());
+        tensors.extend(self.critic.iter().flat_map(CriticLearner::state));
         tensors
     }
 
@@ -258,78 +92,10 @@ impl<'a> Update<'a> {
     pub fn restore(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let own = self.state();
         weights::check(path, tensors, &own.iter().map(|(name, t)| (name.clone(), weights::Form::of(t))).collect())?;
-        self.learner.restore(step, &part_of(tensors, "policy."))?;
-        if let Some(critic) = &mut self.critic {
-            critic.learner.restore(step, &part_of(tensors, "critic."))?;
-            weights::copy(tensors, "target.", critic.target_store)?;
-        }
-        Ok(())
-    }
-}
-
-/// What the critic makes of all items.
-struct Judged {
-    judgement: Judgement,
-    /// min Q̄.
-    target_q: Tensor,
-    /// r + (1 − d) γ V(s′).
-    bootstrap: Tensor,
-    weights: Tensor,
-    expectile: f64,
-}
-
-impl CriticLearner<'_> {
-    fn judge(&self, all: &Transitions, parts: &[Part], chaining: Option<&Chaining>) -> Judged {
-        let next = all.next.as_ref().unwrap_or(&all.observation);
-        let target_q = self.target.least_q(&all.observation, &all.told, &all.actions, &all.objects);
-        let next_value = self.online.value(next, &all.told);
-        let judgement = self.online.judge(&all.observation, &all.told, &all.actions, &all.objects);
-        let worth = parts.iter().find(|part| part.name == CHAIN).zip(chaining).map(|(part, chaining)| {
-            let worth = match chaining.worth {
-                Worth::NextValue => part.of(&next_value),
-                Worth::PresentValue => part.of(&judgement.baseline),
-                Worth::TargetQ => part.of(&target_q),
-            };
-            chain::as_reward(&worth, chaining.clip)
-        });
-        let rewards: Vec<Tensor> = parts
-            .iter()
-            .map(|part| match (part.name, &worth) {
-                (CHAIN | LEAD, Some(worth)) => Ends::chained(&part.of(&all.terminal), worth).reward,
-                _ => Ends::of_skill(&part.of(&all.terminal)).reward,
-            })
-            .collect();
-        let bootstrap = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
-        let weights = iql::advantage_weights(&target_q, &judgement.baseline, self.iql.temperature, self.iql.weight_cap);
-        Judged { judgement, target_q, bootstrap, weights, expectile: self.iql.expectile }
-    }
-}
-
-impl Judged {
-    fn loss(&self, parts: &[Part], terms: &mut Terms) -> Tensor {
-        let value = iql::value_loss(&self.judgement.value, &self.target_q, self.expectile);
-        let [one, other] = [0, 1].map(|k| iql::q_loss(&self.judgement.q[k], &self.bootstrap));
-        let q = one + other;
-        let part_loss = |part: &Part| {
-            let (value, q) = (part.of(&value).mean(Kind::Float), part.of(&q).mean(Kind::Float));
-            terms.add(part.label("value_loss"), &value);
-            terms.add(part.label("q_loss"), &q);
-            (value + q) * part.weight
-        };
-        parts.iter().map(part_loss).sum()
-    }
-
-    /// Weights and values, those of chaining by their parts' names.
-    fn describe(&self, parts: &[Part], numbers: &mut BTreeMap<String, f64>) {
-        let value = &self.judgement.baseline;
-        for part in parts {
-            let found = [
-                ("weight_mean", part.of(&self.weights).mean(Kind::Double)),
-                ("weight_max", part.of(&self.weights).max().to_kind(Kind::Double)),
-                ("q_mean", part.of(&self.target_q).mean(Kind::Double)),
-                ("v_mean", part.of(value).mean(Kind::Double)),
-            ];
-            numbers.extend(found.map(|(name, tensor)| (part.label(name), tensor.double_value(&[]))));
+        self.learner.restore(step, &weights::under("policy.", tensors))?;
+        match &mut self.critic {
+            Some(critic) => critic.restore(step, tensors),
+            None => Ok(()),
         }
     }
 }
@@ -356,30 +122,19 @@ fn policy_loss(
     parts.iter().map(part_loss).sum()
 }
 
-/// Observations as the networks take them: [n, channels, 7, 7] in 32 bits.
-pub fn seen(observation: &Tensor) -> Tensor {
-    observation.to_kind(Kind::Float).reshape([observation.size()[0], -1, SIDE, SIDE])
-}
-
-fn prefixed(prefix: &str, tensors: Tensors) -> Tensors {
-    tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)).collect()
-}
-
-/// The tensors under `prefix`, without it.
-fn part_of(tensors: &Tensors, prefix: &str) -> Tensors {
-    let stripped =
-        |(name, tensor): (&String, &Tensor)| Some((name.strip_prefix(prefix)?.to_string(), tensor.shallow_clone()));
-    tensors.iter().filter_map(stripped).collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use tch::Device;
+
     use super::*;
     use crate::algo::adamw::AdamWConfig;
-    use crate::algo::chain::{Cut, Pairs as Source};
+    use crate::algo::batch::Pairs;
+    use crate::algo::chain::{Cut, Pairs as Source, Worth};
+    use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
-    use crate::nets::critic::{CriticSpec, Senses};
+    use crate::nets::critic::{Critic, CriticSpec, Senses};
     use crate::nets::policy::PolicySpec;
+    use crate::nets::visual::SIDE;
 
     const STATES: i64 = 3;
     const TEXTS: i64 = 3;
@@ -421,7 +176,7 @@ mod tests {
         }
     }
 
-    const IQL: Iql = Iql { discount: 0.9, expectile: 0.7, temperature: 3.0, weight_cap: 100.0, target_rate: 0.05 };
+    const IQL: Iql = Iql { discount: 0.9, expectile: 0.7, temperature: 3.0, weight_cap: 100.0, target_rate: 0.05, warmup_share: 0.0 };
 
     fn optimisation(steps: u64) -> Optimisation {
         Optimisation {
@@ -555,6 +310,29 @@ mod tests {
         {
             assert!(numbers.contains_key(name), "{name} is not among {numbers:?}");
         }
+    }
+
+    #[test]
+    fn while_the_critic_warms_up_the_policy_clones_the_demonstrated_skills_alone() {
+        let _chance = crate::nets::testing::chance();
+        let one = |critic: bool| {
+            let nets = nets();
+            let iql = Iql { warmup_share: 0.6, ..IQL };
+            let learner = CriticLearner::new(
+                (&nets.online.0, &nets.online.1),
+                (&nets.target.0, &nets.target.1),
+                optimisation(8),
+                iql,
+                1,
+            );
+            let mut update = Update::new((&nets.policy, &nets.store), critic.then_some(learner), None, optimisation(8), 1);
+            let batch = Batch { base: transitions(&CHAIN_OF_TWO), pairs: None };
+            let losses = (0..8).map(|_| update.update(&batch, false).unwrap()["action_loss"]);
+            losses.collect::<Vec<f64>>()
+        };
+        let (with, without) = (one(true), one(false));
+        assert_eq!(with[..5], without[..5]);
+        assert!(with[5] != without[5], "{with:?} {without:?}");
     }
 
     #[test]
