@@ -1,6 +1,12 @@
 //! Trainings through the program itself, from demonstrations to an agent that is evaluated.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use sprint_explorer::nets::resnet18;
 use sprint_explorer::nets::sentence::default_folder;
+use sprint_explorer::nets::weights::{self, Tensors};
+use tch::{Device, Tensor};
 
 use crate::program::Sprint;
 
@@ -39,6 +45,25 @@ tasks = 1
 swaps = 0
 "#;
 
+/// Behaviour cloning in miniature, through ResNet-18.
+const RESNET: &str = r#"
+extends = "l-bc"
+eyes = "resnet18"
+hold_out = 3
+
+[policy]
+channels = [4, 4, 4, 4]
+hidden = [8]
+
+[training]
+steps = 2
+batch = 8
+
+[appraisal]
+tasks = 1
+swaps = 0
+"#;
+
 /// A folder with a few labelled demonstrations; nothing where the sentence encoder is not there.
 fn demonstrations() -> Option<Sprint> {
     let sprint = Sprint::new();
@@ -47,11 +72,12 @@ fn demonstrations() -> Option<Sprint> {
         eprintln!("skipped: training needs the sentence encoder (`make setup` fetches it)");
         return None;
     }
-    std::fs::create_dir_all(sprint.path("home")).unwrap();
-    std::os::unix::fs::symlink(encoder.parent().unwrap(), sprint.path("home/encoders")).unwrap();
+    std::fs::create_dir_all(sprint.path("home/encoders")).unwrap();
+    std::os::unix::fs::symlink(&encoder, sprint.path("home/encoders/all-MiniLM-L6-v2")).unwrap();
     done(&sprint, "collect D --episodes 6 --seed 5 --lengths 2 --annotations 1");
     done(&sprint, "relabel D --with rules");
     std::fs::write(sprint.path("tiny.toml"), TINY).unwrap();
+    std::fs::write(sprint.path("resnet.toml"), RESNET).unwrap();
     Some(sprint)
 }
 
@@ -92,4 +118,37 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     let seeing = sprint.run("pretrain D --preset l-bc --out other --visual-from agent");
     assert_eq!(seeing.code, Some(1));
     assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
+}
+
+#[test]
+fn an_agent_that_sees_through_resnet18_needs_the_weights_it_was_trained_on() {
+    let Some(sprint) = demonstrations() else { return };
+    let file = sprint.path("home/encoders/resnet18.safetensors");
+    let without = sprint.run("pretrain D --preset resnet.toml --out agent");
+    assert_eq!(without.code, Some(1));
+    assert!(without.stderr.contains("convert_resnet18.py"), "{}", without.stderr);
+    std::fs::remove_dir_all(sprint.path("agent")).unwrap();
+    write_resnet18(&file, 0.01);
+    let eyes = sprint.run("pretrain D --preset resnet.toml --out agent --visual-from other");
+    assert_eq!(eyes.code, Some(1));
+    assert!(eyes.stderr.contains("no visual encoder to take"), "{}", eyes.stderr);
+    std::fs::remove_dir_all(sprint.path("agent")).unwrap();
+    done(&sprint, "pretrain D --preset resnet.toml --out agent");
+    let card = sprint.read("agent/README.md");
+    assert!(card.contains("ResNet-18") && !card.contains("of the visual encoder"), "{card}");
+    sprint.sample("tasks.json", 1, 1);
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
+    write_resnet18(&file, 0.02);
+    let others = sprint.run("eval --tasks tasks.json --checkpoint agent --out again");
+    assert_eq!(others.code, Some(1));
+    assert!(others.stderr.contains("the agent was trained on"), "{}", others.stderr);
+}
+
+/// Weights of torchvision's forms, all the same number.
+fn write_resnet18(file: &Path, number: f64) {
+    let tensors: Tensors = resnet18::forms()
+        .into_iter()
+        .map(|(name, form)| (name, Tensor::full(form.shape.as_slice(), number, (form.kind, Device::Cpu))))
+        .collect();
+    weights::write(file, &tensors, &BTreeMap::new()).unwrap();
 }

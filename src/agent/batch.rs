@@ -5,7 +5,8 @@
 
 use tch::{Device, Kind, Tensor};
 
-use super::checkpoint::{Config, Networks};
+use super::checkpoint::Networks;
+use super::config::Config;
 use super::learned::LearnedPolicy;
 use super::memory::{Memory, SharedEmbedder};
 use super::policy::Situation;

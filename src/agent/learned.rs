@@ -4,7 +4,8 @@ use std::path::Path;
 
 use tch::{Device, Tensor};
 
-use super::checkpoint::{Config, Networks};
+use super::checkpoint::Networks;
+use super::config::Config;
 use super::memory::Memory;
 pub use super::memory::SharedEmbedder;
 use super::policy::{Carried, Decision, Policy, Reading, Situation};
@@ -155,7 +156,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::agent::checkpoint::{Ontology, Provenance, SentenceSpec};
+    use crate::agent::config::{Ontology, Provenance, SentenceSpec};
     use crate::domain::SkillKind;
     use crate::house::grading::{Grader, Grading};
     use crate::house::testing::{kitchen_house, role, subtask};

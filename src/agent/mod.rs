@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod checkpoint;
+pub mod config;
 pub mod expert;
 pub mod goal;
 pub mod learned;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tch::{Device, Kind, Tensor};
 
-use super::checkpoint::Config;
+use super::config::Config;
 use super::goal;
 use super::memory::SharedEmbedder;
 use super::policy::Situation;

@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::Ending;
-use crate::agent::checkpoint::write_whole;
+use crate::data::whole;
 use crate::run::curves;
 
 /// Draws the curves of trainings.
@@ -43,7 +43,7 @@ impl PlotCurves {
             let bytes = if is_svg { plot.svg().into_bytes() } else { plot.png()? };
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-            write_whole(&folder.join(file.file_name().unwrap_or_default()), &bytes)?;
+            whole::write(&folder.join(file.file_name().unwrap_or_default()), &bytes)?;
             println!("{}", file.display());
         }
         Ok(Ending::Ok)

@@ -9,8 +9,9 @@ use super::Ending;
 use super::bar::Bars;
 use super::stop;
 use crate::agent::LearnedPolicy;
-use crate::agent::checkpoint::{Config, write_whole};
+use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
+use crate::data::whole;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -105,7 +106,7 @@ impl Pretrain {
         let findings = appraise(&mut policy, &pretraining.preset.appraisal, &mut bars)?;
         bars.end();
         let text = card(&name(&pretraining.out), &Config::read(&pretraining.out)?, &findings);
-        write_whole(&pretraining.out.join("README.md"), text.as_bytes())?;
+        whole::write(&pretraining.out.join("README.md"), text.as_bytes())?;
         eprint!("{text}");
         Ok(Ending::Ok)
     }

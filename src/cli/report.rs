@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 
 use super::Ending;
-use crate::data::json;
+use crate::data::{json, whole};
 use crate::run::finished::FinishedRun;
 use crate::run::folder::RunFolder;
 use crate::run::report::Summary;
@@ -40,7 +40,7 @@ impl Report {
                 .context("the same eval command writes the summary")?
                 .value;
             let page = out.join("report.html");
-            json::write_bytes(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
+            whole::write(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
             plot::write(out, plot::PROGRESS, &plot::progress_by_length(&[&summary]))?;
             eprintln!("wrote {}", page.display());
         } else {

@@ -9,9 +9,12 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{json, taskset};
+use super::{json, taskset, whole};
 use crate::domain::{Scene, TaskSet, Trajectory};
 use crate::house::validate;
+
+/// The file of a dataset's trajectories.
+const TRAJECTORIES: &str = "trajectories.jsonl.zst";
 
 /// How much of a split there is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -133,7 +136,7 @@ impl Dataset {
     /// # Errors
     /// When the file is absent; each item can also fail, naming the line.
     pub fn trajectories(&self) -> anyhow::Result<impl Iterator<Item = anyhow::Result<Trajectory>> + Send + use<>> {
-        let path = self.folder.join("trajectories.jsonl.zst");
+        let path = self.folder.join(TRAJECTORIES);
         let file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
         let reader = BufReader::new(zstd::Decoder::new(file)?);
         Ok(reader.lines().enumerate().map(move |(number, line)| {
@@ -147,7 +150,7 @@ impl Dataset {
     /// # Errors
     /// When the file cannot be read.
     pub fn digest(&self) -> anyhow::Result<String> {
-        let path = self.folder.join("trajectories.jsonl.zst");
+        let path = self.folder.join(TRAJECTORIES);
         let mut file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
         let mut hash = Sha256::new();
         std::io::copy(&mut file, &mut hash).with_context(|| path.display().to_string())?;
@@ -197,7 +200,7 @@ impl Writer {
         if old.exists() {
             std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
         }
-        let file = tempfile::NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
+        let file = whole::begin(&folder.join(TRAJECTORIES)).with_context(|| folder.display().to_string())?;
         Ok(Writer { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
     }
 
@@ -232,23 +235,11 @@ impl Writer {
     /// # Errors
     /// When a file cannot be written.
     pub fn finish(self, manifest: &Manifest) -> anyhow::Result<()> {
-        let path = self.folder.join("trajectories.jsonl.zst");
+        let path = self.folder.join(TRAJECTORIES);
         let file = self.trajectories.finish()?;
-        keep(file, &path)?;
+        whole::keep(file, &path).with_context(|| path.display().to_string())?;
         json::write(&self.folder.join("dataset.json"), manifest)
     }
-}
-
-/// Gives a temporary file its name, readable as other files are.
-fn keep(file: tempfile::NamedTempFile, path: &Path) -> anyhow::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    file.as_file().sync_all().with_context(|| path.display().to_string())?;
-    file.persist(path).with_context(|| path.display().to_string())?;
-    Ok(())
 }
 
 #[cfg(test)]

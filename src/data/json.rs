@@ -1,12 +1,14 @@
 //! Versioned JSON files: read strictly, written whole or not at all.
 
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
+
+use super::whole;
 
 /// No file of ours comes near this many bytes; a larger one (or an endless device) is refused before it fills the memory.
 const LARGEST: u64 = 1 << 30;
@@ -97,29 +99,7 @@ pub fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> 
 fn write_line(path: &Path, text: serde_json::Result<Vec<u8>>) -> anyhow::Result<()> {
     let mut text = text.with_context(|| format!("cannot write {}", path.display()))?;
     text.push(b'\n');
-    write_bytes(path, &text)
-}
-
-/// Writes a file atomically: into a temporary file beside it, then renamed. Makes the folder when there is none.
-///
-/// # Errors
-/// When the folder cannot be written to; the old file, if any, is untouched then.
-pub fn write_bytes(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let context = || format!("cannot write {}", path.display());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).with_context(context)?;
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // A temporary file is private; what replaces a document is as readable as the user's umask allows.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.prefix(".sprint-").tempfile_in(folder).with_context(context)?;
-    file.write_all(bytes).with_context(context)?;
-    file.as_file().sync_all().with_context(context)?;
-    file.persist(path).with_context(context)?;
-    Ok(())
+    whole::write(path, &text)
 }
 
 /// Bytes in hexadecimal.

@@ -9,5 +9,6 @@ pub mod lines;
 pub mod schema;
 pub mod summaries;
 pub mod taskset;
+pub mod whole;
 
 pub use dataset::Dataset;

@@ -48,7 +48,7 @@ fn blocks() -> impl Iterator<Item = (String, i64, i64, i64)> {
 }
 
 /// The name of every tensor that is used, with its form.
-fn forms() -> BTreeMap<String, Form> {
+pub fn forms() -> BTreeMap<String, Form> {
     let mut forms = BTreeMap::new();
     let mut layer = |conv: String, norm: String, shape: [i64; 4]| {
         forms.insert(format!("{conv}.weight"), Form::float(&shape));

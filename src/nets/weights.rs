@@ -10,6 +10,8 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tch::{Kind, Tensor, nn};
 
+use crate::data::whole;
+
 /// Tensors by name.
 pub type Tensors = BTreeMap<String, Tensor>;
 
@@ -220,6 +222,18 @@ pub fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<(
     })
 }
 
+/// The tensors with `prefix` before each name.
+pub fn prefixed(prefix: &str, tensors: Tensors) -> Tensors {
+    tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)).collect()
+}
+
+/// The tensors under `prefix`, without it.
+pub fn under(prefix: &str, tensors: &Tensors) -> Tensors {
+    let stripped =
+        |(name, tensor): (&String, &Tensor)| Some((name.strip_prefix(prefix)?.to_string(), tensor.shallow_clone()));
+    tensors.iter().filter_map(stripped).collect()
+}
+
 /// Writes tensors and metadata to a file, atomically: a reader sees the old file or the whole new one.
 ///
 /// The same tensors and metadata give the same bytes, so that a file's hash identifies its weights.
@@ -228,13 +242,10 @@ pub fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<(
 /// [`WeightsError::Unwritable`].
 pub fn write(path: &Path, tensors: &Tensors, metadata: &BTreeMap<String, String>) -> Result<(), WeightsError> {
     let bytes = encode(tensors, metadata);
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = bytes.and_then(|bytes| {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        let mut file = whole::begin(path)?;
         file.write_all(&bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(path)?;
-        Ok(())
+        whole::keep(file, path)
     });
     written.map_err(|source| WeightsError::Unwritable { path: path.into(), source })
 }

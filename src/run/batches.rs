@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
 use super::material::{Material, Told};
+use crate::algo::batch::{Batch, Pairs, Transitions};
 use crate::algo::chain::{Chaining, Pairs as Source};
-use crate::algo::update::{Batch, Pairs, Transitions};
 use crate::data::items::{Item, Span};
 use crate::nets::visual::SIDE;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::appraise::Findings;
-use crate::agent::checkpoint::Config;
+use crate::agent::config::Config;
 
 /// The method in words.
 fn method(config: &Config) -> &'static str {
@@ -52,8 +52,8 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
          ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
-         Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations in generated houses (dataset \
-         `{dataset}`): {visual_steps} steps of the visual encoder, {policy_steps} of the policy, seed {seed}.\n\n\
+         Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets \
+         `{dataset}`): {seen}{policy_steps} steps of the policy, seed {seed}.\n\n\
          ## Measured in generated houses that no training saw\n\n\
          `sprint pretrain` measures this at its end.\n\n\
          | | |\n|---|---|\n\
@@ -66,7 +66,11 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         method = method(config),
         trajectories = from.trajectories,
         dataset = from.dataset,
-        visual_steps = from.visual_steps,
+        seen = if config.visual.is_some() {
+            format!("{} steps of the visual encoder, ", from.visual_steps)
+        } else {
+            String::new()
+        },
         policy_steps = from.policy_steps,
         seed = from.seed,
         agent = findings.agent,
@@ -81,8 +85,8 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
          | takes the other one first | {} |\n\
          | from one start, takes the one and, with the instruction swapped, the other | {} |\n\n\
          ## Limits\n\n\
-         It knows only what its last frames show, and the houses and words of the generator; imported floor plans look \
-         different. It has no sign for being done.\n",
+         It knows only what its last frames show, and the houses and words of its demonstrations. It has no sign for being \
+         done.\n",
         findings.named, findings.other, findings.swapped
     );
     text

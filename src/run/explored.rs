@@ -14,7 +14,7 @@ use super::report::Summary;
 use super::rollout::{End, Rollout};
 use super::scenes::Scenes;
 use crate::agent::{ExpertPolicy, Policy};
-use crate::data::{json, taskset};
+use crate::data::{json, taskset, whole};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
 use crate::house::House;
@@ -71,7 +71,7 @@ pub fn write(explored: &Explored, path: &Path) -> anyhow::Result<()> {
         shard: None,
     };
     let mut folder = RunFolder::open(path, &manifest)?;
-    json::write_bytes(&path.join(RunFolder::TASKS), &bytes)?;
+    whole::write(&path.join(RunFolder::TASKS), &bytes)?;
     if named {
         json::write(&path.join(SCENES).join(format!("{}.json", explored.scene.name)), &*explored.scene)?;
     }

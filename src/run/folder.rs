@@ -12,7 +12,7 @@ use super::episode::{Episode, Key};
 use super::manifest::Manifest;
 use super::plot;
 use super::shard::Shard;
-use crate::data::json;
+use crate::data::{json, whole};
 use crate::domain::TaskSet;
 
 /// An open run folder, which no other process writes to.
@@ -126,8 +126,8 @@ impl RunFolder {
     /// # Errors
     /// When the folder cannot be written to.
     pub fn write_summary(&self, summary: &super::report::Summary) -> anyhow::Result<()> {
-        json::write_bytes(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
-        json::write_bytes(&self.path.join("summary.csv"), &summary.csv()?)?;
+        whole::write(&self.path.join("summary.md"), summary.markdown().as_bytes())?;
+        whole::write(&self.path.join("summary.csv"), &summary.csv()?)?;
         plot::write(&self.path, plot::PROGRESS, &plot::progress_by_length(&[summary]))?;
         json::write_pretty(&self.path.join(Self::SUMMARY), summary)
     }

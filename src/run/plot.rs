@@ -5,7 +5,7 @@ use std::path::Path;
 use super::chart::{Chart, Line};
 use super::drawing::Drawing;
 use super::report::Summary;
-use crate::data::json;
+use crate::data::whole;
 
 /// The name of the plot of progress by length, without its ending.
 pub const PROGRESS: &str = "progress_by_length";
@@ -32,6 +32,6 @@ pub fn progress_by_length(summaries: &[&Summary]) -> Drawing {
 /// # Errors
 /// When the folder cannot be written to.
 pub fn write(folder: &Path, name: &str, drawing: &Drawing) -> anyhow::Result<()> {
-    json::write_bytes(&folder.join(format!("{name}.svg")), drawing.svg().as_bytes())?;
-    json::write_bytes(&folder.join(format!("{name}.png")), &drawing.png()?)
+    whole::write(&folder.join(format!("{name}.svg")), drawing.svg().as_bytes())?;
+    whole::write(&folder.join(format!("{name}.png")), &drawing.png()?)
 }

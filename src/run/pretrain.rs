@@ -18,13 +18,15 @@ use super::progress::{Journal, Report, Scalars};
 use super::trainer::Trainer;
 use super::trials::{self, Trials};
 use super::visual_training;
-use crate::agent::checkpoint::{Config, Networks, Ontology, Provenance, SentenceSpec};
+use crate::agent::checkpoint::Networks;
+use crate::agent::config::{Config, Ontology, Provenance, SentenceSpec};
 use crate::agent::learned::SharedEmbedder;
 use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
 use crate::data::items::{Composites, Items, Source};
 use crate::data::summaries::Summaries;
+use crate::data::whole;
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::eyes::Eyes;
 use crate::nets::visual::VisualSpec;
@@ -138,12 +140,13 @@ impl Pretraining {
         );
         let trials =
             self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
-        let mut tried = 0;
+        let mut saved: Option<u64> = None;
         let mut keep = |step, scalars: &mut Scalars| -> anyhow::Result<()> {
             networks.save(&self.out, &config(step)?)?;
+            // A resumed training's first save comes `save_every` steps after the last one.
+            let before = saved.replace(step).unwrap_or(step.saturating_sub(self.preset.save_every));
             match &trials {
-                Some((trials, evaluation)) if trials.are_due(tried, step) => {
-                    tried = step;
+                Some((trials, evaluation)) if trials.are_due(before, step) => {
                     trials::hold(evaluation, &self.out, &self.sentences, self.device, stop, scalars)
                 }
                 _ => Ok(()),
@@ -240,7 +243,7 @@ impl Pretraining {
         match std::fs::read_to_string(&path) {
             Ok(begun) if begun == text => Ok(()),
             Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
-            Err(_) => crate::agent::checkpoint::write_whole(&path, text.as_bytes()),
+            Err(_) => whole::write(&path, text.as_bytes()),
         }
     }
 
@@ -251,7 +254,13 @@ impl Pretraining {
         report: &mut dyn Report,
         stop: &AtomicBool,
     ) -> anyhow::Result<bool> {
-        let Eyes::House { store: own, .. } = &networks.eyes else { return Ok(true) };
+        let Eyes::House { store: own, .. } = &networks.eyes else {
+            anyhow::ensure!(
+                self.visual_from.is_none(),
+                "the preset's eyes are ResNet-18: there is no visual encoder to take"
+            );
+            return Ok(true);
+        };
         if let Some(folder) = &self.visual_from {
             let given = self.given(folder)?.1.eyes;
             copy(given.store().context("its eyes are no House encoder")?, "", own)?;
@@ -331,9 +340,10 @@ impl Pretraining {
                 dataset: dataset.to_string(),
                 trajectories,
                 seed: self.preset.seed,
-                visual_steps: match &self.visual_from {
-                    Some(folder) => Config::read(folder)?.provenance.visual_steps,
-                    None => self.preset.visual_training.optimisation.steps,
+                visual_steps: match (self.preset.eyes, &self.visual_from) {
+                    (Sight::ResNet18, _) => 0,
+                    (Sight::House, Some(folder)) => Config::read(folder)?.provenance.visual_steps,
+                    (Sight::House, None) => self.preset.visual_training.optimisation.steps,
                 },
                 policy_steps,
             },

@@ -13,8 +13,10 @@ use super::batches::Batches;
 use super::presets::Preset;
 use super::progress::{Report, Scalars};
 use crate::agent::checkpoint::Networks;
+use crate::algo::batch::{Batch, Transitions, seen};
 use crate::algo::bc;
-use crate::algo::update::{Batch, CriticLearner, Transitions, Update, seen};
+use crate::algo::critic::CriticLearner;
+use crate::algo::update::Update;
 use crate::data::items::Span;
 use crate::nets::weights;
 

@@ -29,7 +29,7 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// Whether a trial is held at `step` when the one before was held at `before`.
+    /// Whether a trial is held at the save at `step`, when the save before it was at `before`.
     pub fn are_due(&self, before: u64, step: u64) -> bool {
         step / self.every.max(1) > before / self.every.max(1)
     }
@@ -89,8 +89,9 @@ mod tests {
         let mut held = Vec::new();
         for saved in [200, 400, 600, 800, 850] {
             if trials.are_due(before, saved) {
-                (before, _) = (saved, held.push(saved));
+                held.push(saved);
             }
+            before = saved;
         }
         assert_eq!(held, [400, 600]);
     }

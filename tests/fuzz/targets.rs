@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
-use sprint_explorer::agent::checkpoint::{Config, Networks};
+use sprint_explorer::agent::checkpoint::Networks;
+use sprint_explorer::agent::config::Config;
 use sprint_explorer::agent::{RandomPolicy, Solo, Team};
 use sprint_explorer::data::alfred::{self, tasks as lists};
 use sprint_explorer::data::features::{self, Features};

@@ -14,7 +14,7 @@ use anyhow::bail;
 pub use canvas::Canvas;
 
 use super::recording::Recording;
-use crate::data::json;
+use crate::data::whole;
 
 /// Writes a recording in the form that the file's ending asks for: `.gif` a film with captions, `.strip.png` the frames at
 /// which subtasks were done, `.png` the frame at step `at`, `.txt` a transcript, `.html` a page that replays it. Returns the
@@ -37,7 +37,7 @@ pub fn write(recording: &Recording, at: u32, path: &Path) -> anyhow::Result<u64>
     } else {
         bail!("{}: the ending says what is written; there are .gif, .png, .strip.png, .txt and .html", path.display());
     };
-    json::write_bytes(path, &bytes)?;
+    whole::write(path, &bytes)?;
     Ok(bytes.len() as u64)
 }
 
