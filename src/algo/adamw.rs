@@ -55,7 +55,8 @@ impl AdamW {
         self.steps += 1;
         let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.config;
         let steps = self.steps as f64;
-        let (rest1, rest2) = (1.0 - beta1.powf(steps), 1.0 - beta2.powf(steps));
+        let (rest1, root2) = (1.0 - beta1.powf(steps), (1.0 - beta2.powf(steps)).sqrt());
+        let rate = learning_rate / rest1 * root2;
         tch::no_grad(|| {
             for Slot { weight, mean, square } in self.slots.values_mut() {
                 let gradient = weight.grad();
@@ -65,11 +66,15 @@ impl AdamW {
                 if weight.dim() > 1 {
                     *weight *= 1.0 - learning_rate * weight_decay;
                 }
-                *mean *= beta1;
-                *mean += &gradient * (1.0 - beta1);
-                *square *= beta2;
-                *square += gradient.square() * (1.0 - beta2);
-                *weight -= &*mean / ((&*square / rest2).sqrt() + epsilon) * (learning_rate / rest1);
+                let _ = mean.lerp_(&gradient, 1.0 - beta1);
+                let _ = square.lerp_(&gradient.square(), 1.0 - beta2);
+                // In place, because memory is what this loop takes its time for; at a rate of 0 there is nothing to do.
+                if rate > 0.0 {
+                    let mut divisor = square.sqrt();
+                    divisor += epsilon * root2;
+                    divisor *= -1.0 / rate;
+                    let _ = weight.addcdiv_(mean, &divisor);
+                }
             }
         });
     }
