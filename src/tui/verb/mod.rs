@@ -5,6 +5,8 @@ mod parse;
 mod said;
 
 pub use parse::{TIMES, parse};
+#[cfg(test)]
+pub use said::example;
 pub use said::{SAID, Said, matching};
 
 use std::path::PathBuf;
@@ -107,6 +109,8 @@ pub enum Verb {
     Mouse,
     /// Follow a chain of instructions.
     Chain(String),
+    /// The same chain by another policy, side by side.
+    Against(String),
     /// Which link of the chain breaks.
     WhichLink(Draws),
     /// Stop work in the background.

@@ -55,6 +55,7 @@ pub fn parse(line: &str) -> Result<Verb, String> {
         "compare" | "ab" => Ok(Verb::Compare(text()?)),
         "swap" => Ok(Verb::Swap),
         "chain" => Ok(Verb::Chain(rest.to_string())),
+        "against" => Ok(Verb::Against(text()?)),
         "links" => {
             Ok(Verb::WhichLink(Draws { times: if rest.is_empty() { TIMES } else { number(rest)? }, only: None }))
         }
@@ -146,16 +147,7 @@ mod tests {
     #[test]
     fn every_listed_verb_can_be_read() {
         for said in SAID {
-            let argument = match said.arguments {
-                "" => "",
-                "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
-                "NAME" => "expert",
-                "N [TIMES]" => "2 4",
-                "best|north|..." => "south",
-                "panels|mind|..." => "world",
-                "[CONDITION]" | "CONDITION" => "failed",
-                _ => "next",
-            };
+            let argument = crate::tui::verb::example(said.arguments);
             assert!(parse(&format!("{} {argument}", said.name)).is_ok(), "{}", said.name);
         }
     }

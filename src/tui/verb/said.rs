@@ -44,6 +44,7 @@ pub const SAID: &[Said] = &[
     said("compare", "TEXT", "this instruction and another in the same state"),
     said("swap", "", "adopt the other instruction of the comparison"),
     said("chain", "A; B; ...", "follow a chain of instructions, link by link and as one"),
+    said("against", "NAME|N", "the same chain by another checkpoint, the expert or random, side by side"),
     said("links", "[N]", "which link breaks: N draws of each (8), from both entries"),
     said("link", "N [TIMES]", "the same for one link: from its recorded entry and the expert's"),
     said("values", "", "paint the value of every cell on the map; or end that"),
@@ -100,6 +101,21 @@ fn closeness(word: &str, text: &str) -> Option<usize> {
         rest = &rest[at + letter.len_utf8()..];
     }
     Some(cost)
+}
+
+/// Something that may follow a verb, for tests.
+#[cfg(test)]
+pub fn example(arguments: &str) -> &'static str {
+    match arguments {
+        "" => "",
+        "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
+        "NAME" => "expert",
+        "N [TIMES]" => "2 4",
+        "best|north|..." => "south",
+        "panels|mind|..." => "world",
+        "[CONDITION]" | "CONDITION" => "failed",
+        _ => "next",
+    }
 }
 
 #[cfg(test)]
