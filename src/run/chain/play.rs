@@ -85,7 +85,8 @@ impl Chain {
                 false => rollout.steps() - begun >= limit,
             };
             let mut last = None;
-            let failed = play.outcomes.last().is_some_and(|before: &Outcome| before.done == Some(false));
+            let breaks = |before: &Outcome| !before.reached || before.done == Some(false);
+            let failed = play.outcomes.last().is_some_and(breaks);
             while !failed && !spent(&rollout) && !stop.load(Ordering::Relaxed) {
                 let decision = rollout.decide(policy)?;
                 last = self.feel(policy, &mut rollout, &decision, link, &mut play)?;
@@ -191,5 +192,22 @@ mod tests {
         let steps: u32 = play.outcomes.iter().map(|outcome| outcome.steps).sum();
         assert_eq!((play.heat.len(), play.in_force.len()), (steps as usize, steps as usize));
         assert!(play.heat.iter().all(|heat| heat.len() == 2) && !play.by_value);
+    }
+
+    #[test]
+    fn nothing_is_reached_after_a_link_that_failed() {
+        let mut chain = chain();
+        let again = |n: usize| n % 2;
+        chain.links = (0..6).map(|n| chain.links[again(n)].clone()).collect();
+        if let Some((_, subtasks)) = &mut chain.graded {
+            *subtasks = (0..6).map(|n| subtasks[again(n)].clone()).collect();
+        }
+        for whole in [false, true] {
+            let play = chain.play(&mut RandomPolicy::new(), whole, &AtomicBool::new(false), &mut |_| ()).unwrap();
+            let broken = play.outcomes.iter().position(|outcome| outcome.done == Some(false)).unwrap();
+            let rest = &play.outcomes[broken + 1..];
+            assert!(rest.iter().all(|outcome| !outcome.reached && outcome.done.is_none() && outcome.steps == 0));
+            assert!(!rest.is_empty());
+        }
     }
 }

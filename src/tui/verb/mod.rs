@@ -5,8 +5,6 @@ mod parse;
 mod said;
 
 pub use parse::{TIMES, parse};
-#[cfg(test)]
-pub use said::example;
 pub use said::{SAID, Said, matching};
 
 use std::path::PathBuf;

@@ -103,21 +103,6 @@ fn closeness(word: &str, text: &str) -> Option<usize> {
     Some(cost)
 }
 
-/// Something that may follow a verb, for tests.
-#[cfg(test)]
-pub fn example(arguments: &str) -> &'static str {
-    match arguments {
-        "" => "",
-        "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
-        "NAME" => "expert",
-        "N [TIMES]" => "2 4",
-        "best|north|..." => "south",
-        "panels|mind|..." => "world",
-        "[CONDITION]" | "CONDITION" => "failed",
-        _ => "next",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -77,8 +77,11 @@ impl Widget for &App {
 
 /// Draws the encoded frame, or says that it is under way. What is opened over the page stays uncovered by it.
 fn picture(app: &App, area: Rect, buf: &mut Buffer) {
-    let hidden = app.mode == Mode::Help && app.graphics.protocol.floats();
-    match app.picture.as_ref().filter(|_| !hidden) {
+    // The help stands anywhere over it.
+    if app.mode == Mode::Help && app.graphics.protocol.floats() {
+        return;
+    }
+    match &app.picture {
         Some(picture) if picture.lies_over() => {
             let page = app.layout().map_or(area, |layout| layout.page);
             let top = match app.mode {

@@ -27,8 +27,11 @@ impl Widget for Reach<'_> {
             format!("hand: {slice}{}", object.class)
         });
         let pages = app.pages();
-        let more = if pages > 1 { format!("tab {}/{pages} · ", app.page_of_interactions + 1) } else { String::new() };
-        let inner = panel(buf, area, "In reach", &format!("{more}{hand}"));
+        let more = if pages > 1 { format!("tab {}/{pages}", app.page_of_interactions + 1) } else { String::new() };
+        let both = format!("{more} · {hand}");
+        // On a narrow screen the last row says it in place of a distance.
+        let above = pages > 1 && both.width() + 12 <= usize::from(area.width);
+        let inner = panel(buf, area, "In reach", if above { &both } else { &hand });
         let page = app.page_of_candidates();
         if page.is_empty() {
             put(
@@ -46,6 +49,8 @@ impl Widget for Reach<'_> {
         for ((at, candidate), place) in (0u16..).zip(page).zip(places(inner)) {
             let width = place.width;
             let style = if chosen == Some(candidate.action()) { THEME.chosen } else { THEME.key };
+            let tells = pages > 1 && !above && usize::from(at) + 1 == page.len();
+            let distance = format!("  {:.1} m", candidate.distance / 1000.0);
             let room = longest.min(usize::from(width) - 3 - 6);
             let spans = vec![
                 Span::styled(format!("{} ", at + 1), style),
@@ -53,7 +58,7 @@ impl Widget for Reach<'_> {
                     format!("{:<room$}", fit(&named(candidate), room)),
                     if chosen == Some(candidate.action()) { THEME.chosen } else { Default::default() },
                 ),
-                Span::styled(format!("  {:.1} m", candidate.distance / 1000.0), THEME.quiet),
+                Span::styled(if tells { format!("  {more}") } else { distance }, THEME.quiet),
             ];
             Line::from(spans).render(place, buf);
         }

@@ -130,32 +130,38 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 "there is no chain yet: type one (chain A; B; ...), or chain alone".into(),
             ));
         };
-        let is_own = rival.is_none();
-        let (who, policy) = match rival {
-            Some(Loaded { policy, checkpoint })
-                if self.engine.who() == (Who { name: policy.name().to_string(), checkpoint: checkpoint.clone() }) =>
-            {
-                return (self.tell)(Report::Refused(format!("{} acts already: name another", policy.name())));
+        let own = self.engine.who();
+        let mut runs = Vec::new();
+        if let Some(Loaded { policy, checkpoint }) = rival {
+            let who = Who { name: policy.name().to_string(), checkpoint };
+            if who == own {
+                return (self.tell)(Report::Refused(format!("{} acts already: name another", who.name)));
             }
-            Some(Loaded { policy, checkpoint }) => (Who { name: policy.name().to_string(), checkpoint }, Ok(policy)),
-            None => (self.engine.who(), self.spare_policy()),
-        };
-        let policy = match policy {
-            Ok(policy) => policy,
-            Err(error) => return self.refuse(&error),
-        };
+            runs.push((who, policy));
+        }
+        // The one that acts goes first, unless it has been through the chain already.
+        if runs.is_empty() || !self.followed.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&own) {
+            match self.spare_policy() {
+                Ok(policy) => runs.insert(0, (own.clone(), policy)),
+                Err(error) => return self.refuse(&error),
+            }
+        }
         let (tell, spare, followed) = (self.tell.clone(), self.spare.clone(), self.followed.clone());
         self.background.start(move |turn| {
-            let mut policy = policy;
             let say = |report: Report| turn.say(|| tell(report));
-            let known = followed.lock().unwrap_or_else(PoisonError::into_inner).get(&who).cloned();
-            let known = known.unwrap_or_else(|| Chained::new(&chain, who.clone()));
-            match known.work(&chain, policy.as_mut(), draws, &turn.stop, &say) {
-                Ok(known) => drop(followed.lock().unwrap_or_else(PoisonError::into_inner).insert(who.clone(), known)),
-                Err(error) => drop(say(Report::Refused(format!("{error:#}")))),
-            }
-            if is_own {
-                *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((who, policy));
+            for (who, mut policy) in runs {
+                let known = followed.lock().unwrap_or_else(PoisonError::into_inner).get(&who).cloned();
+                let known = known.unwrap_or_else(|| Chained::new(&chain, who.clone()));
+                match known.work(&chain, policy.as_mut(), draws, &turn.stop, &say) {
+                    Ok(known) if known.as_one.is_some() => {
+                        followed.lock().unwrap_or_else(PoisonError::into_inner).insert(who.clone(), known);
+                    }
+                    Ok(_) => {}
+                    Err(error) => drop(say(Report::Refused(format!("{error:#}")))),
+                }
+                if who == own {
+                    *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((who, policy));
+                }
             }
             say(Report::Working(None));
         });

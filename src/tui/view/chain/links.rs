@@ -30,8 +30,7 @@ impl Widget for Links<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let own = self.sides[0];
         let graded = if own.graded { "graded by the task" } else { "nobody grades these links" };
-        let right = self.app.working.as_ref().map_or(graded.to_string(), |working| format!("{working} ..."));
-        let inner = panel(buf, area, "Chain", &right);
+        let inner = panel(buf, area, "Chain", graded);
         let columns = Columns::fitting(usize::from(inner.width), self.sides);
         for (row, line) in (0..).zip(columns.head(self.sides)) {
             put(buf, inner, row, line, THEME.quiet);
