@@ -21,8 +21,8 @@ use links::Links;
 
 /// Rows that the selected link takes at least, where it is shown.
 const LINK: u16 = 6;
-/// Rows of a strip that shows anything: a title, and some links.
-const STRIP: u16 = 3;
+/// Links that a strip shows at least, where there are so many.
+const SHOWN: u16 = 4;
 
 /// The page.
 pub struct ChainPage<'a>(pub &'a App);
@@ -56,7 +56,7 @@ fn parts(area: Rect, links: u16, sides: u16) -> [Rect; 3] {
     let wanted = sides * (links + 1) + 1;
     let left = area.height - table;
     // A small screen shows strips rather than what is selected.
-    let strips = wanted.min(left.saturating_sub(LINK)).max((sides * STRIP + 1).min(left));
+    let strips = wanted.min(left.saturating_sub(LINK)).max((sides * (links.min(SHOWN) + 1) + 1).min(left));
     let link = if left - strips < 3 { 0 } else { left - strips };
     let strips = left - link;
     let from = |y: u16, height: u16| Rect { y: area.y + y, height, ..area };
@@ -75,10 +75,8 @@ mod tests {
                     let area = Rect { x: 0, y: 1, width: 80, height };
                     let [table, strips, link] = parts(area, links, sides);
                     assert_eq!(table.height + strips.height + link.height, height, "{links} links");
-                    assert!(
-                        table.height > 3 && strips.height > 3 * sides,
-                        "{links} links in {height} rows: {strips:?}"
-                    );
+                    let least = sides * (links.min(3) + 1);
+                    assert!(table.height > 3 && strips.height > least, "{links} links in {height} rows: {strips:?}");
                 }
             }
         }
