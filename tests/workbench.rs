@@ -114,12 +114,21 @@ fn a_chain_is_followed_its_links_replayed_and_one_alone() {
     session.see("no critic: p of what was done");
     session.see("entry   cell");
     session.press(":links 1\r");
-    session.see("of 1");
+    session.see("/1 ");
     session.see("breaks");
     session.press("j");
     session.see("Link 2");
     session.press("k:link 1 2\r");
-    session.see("of 2");
+    session.see("/2 ");
+    session.miss("plays of links");
+    // Another agent follows the same chain beside it; the one that acts does so already.
+    session.press("A");
+    session.see(": against");
+    session.press("expert\r");
+    session.see("Heat, expert");
+    session.see("Heat, random");
+    session.press(":against random\r");
+    session.see("random acts already");
     leave(session);
 }
 

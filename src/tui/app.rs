@@ -1,6 +1,5 @@
 //! The explorer's state: everything that the screen shows.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use ratatui::layout::{Rect, Size};
@@ -17,6 +16,7 @@ use super::graphics::overlay::Overlay;
 use super::graphics::{Job, Picture, Protocol};
 use super::keys::Mode;
 use super::layout::Layout;
+use super::log::{Entry, Log, Tone};
 use super::policies::PolicyKind;
 use super::theme::Ability;
 use super::timeline::Divergence;
@@ -28,39 +28,8 @@ use crate::house::view::Candidate;
 use crate::run::contrast::Contrast;
 use crate::run::landscape::Landscape;
 
-/// How a line of the log is meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
-    /// It was done.
-    Done,
-    /// It was impossible.
-    Impossible,
-    /// A subtask or the task is complete.
-    Good,
-    /// Something went wrong.
-    Bad,
-    /// What else is worth knowing.
-    Note,
-}
-
-/// A line of the log.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// At which step.
-    pub step: Option<u32>,
-    /// What happened.
-    pub text: String,
-    /// What it came to.
-    pub outcome: String,
-    /// How it is meant.
-    pub tone: Tone,
-}
-
 /// Columns that a picture needs so that its labels have names.
 const NAMED: u16 = 60;
-/// Lines that the log keeps.
-const LOG: usize = 500;
-
 /// How pictures are shown, and why.
 #[derive(Clone, Debug)]
 pub struct Graphics {
@@ -102,10 +71,10 @@ pub struct App {
     pub landscape: Option<(Arc<Landscape>, u32)>,
     /// The heading whose values are painted; the best without one.
     pub heading: Option<Heading>,
-    /// The chain that was followed last, and the one before it where another policy followed the same.
+    /// The chain that is followed.
     pub chain: Option<Chained>,
-    /// The same chain by another policy.
-    pub chain_before: Option<Chained>,
+    /// The same chain followed by another policy.
+    pub rival: Option<Chained>,
     /// Work in the background.
     pub working: Option<String>,
     /// The most that a step may cost on the wire, in bytes.
@@ -130,8 +99,8 @@ pub struct App {
     pub busy: Option<String>,
     /// Why the policy cannot go on.
     pub trouble: Option<String>,
-    /// What happened, oldest first.
-    pub log: VecDeque<Entry>,
+    /// What happened.
+    pub log: Log,
     /// What was noted since the last key.
     pub notice: Option<Entry>,
     /// The instruction line while somebody types.
@@ -191,14 +160,14 @@ impl App {
             landscape: None,
             heading: None,
             chain: None,
-            chain_before: None,
+            rival: None,
             working: None,
             bandwidth: None,
             coarseness: 0,
             pace: Pace::START,
             busy: Some("building the house".into()),
             trouble: None,
-            log: VecDeque::new(),
+            log: Log::default(),
             notice: None,
             editor: Editor::default(),
             palette: Editor::default(),
@@ -273,38 +242,6 @@ impl App {
         }
     }
 
-    /// Instructions that the typed text begins, the last used first: what was told before, then things in view.
-    pub fn completions(&self) -> Vec<String> {
-        let typed = self.editor.text();
-        let mut found: Vec<String> = Vec::new();
-        let bare = |text: &str| text.trim_end_matches('.').to_lowercase();
-        let mut add = |text: String| {
-            if text.len() > typed.len() && !found.iter().any(|known| bare(known) == bare(&text)) {
-                found.push(text);
-            }
-        };
-        let begins = |text: &str| text.to_lowercase().starts_with(&typed.to_lowercase());
-        self.editor.history().iter().rev().filter(|text| begins(text)).for_each(|text| add(text.clone()));
-        self.examples.iter().filter(|text| begins(text)).for_each(|text| add(text.clone()));
-        let (head, word) = typed.rsplit_once(' ').map_or(("", typed), |(head, word)| (head, word));
-        if !word.is_empty() {
-            for name in self.things_in_view().iter().filter(|name| name.starts_with(&word.to_lowercase())) {
-                add(format!("{head}{}{name}", if head.is_empty() { "" } else { " " }));
-            }
-        }
-        found
-    }
-
-    /// The names of the things that the frame shows, each once.
-    pub fn things_in_view(&self) -> Vec<&'static str> {
-        let Some(now) = &self.now else { return Vec::new() };
-        let classes = now.view.sightings.iter().filter_map(|seen| now.world.class_of(&now.scene, seen.instance));
-        let mut names: Vec<&str> = classes.map(crate::domain::Class::spoken).collect();
-        names.sort_unstable();
-        names.dedup();
-        names
-    }
-
     /// The frame to be encoded, as things stand.
     pub fn job(&self) -> Option<Job> {
         let now = self.now.as_ref()?;
@@ -360,17 +297,6 @@ impl App {
         let step = self.now.as_ref().map(|now| now.step);
         let entry = Entry { step, text: text.into(), outcome: String::new(), tone };
         self.notice = Some(entry.clone());
-        self.write(entry);
-    }
-
-    /// Adds an entry to the log, unless it is the last one again.
-    pub fn write(&mut self, entry: Entry) {
-        if self.log.back() == Some(&entry) {
-            return;
-        }
-        if self.log.len() == LOG {
-            self.log.pop_front();
-        }
-        self.log.push_back(entry);
+        self.log.write(entry);
     }
 }

@@ -123,6 +123,7 @@ const CHAIN: &[Binding] = &[
     bind("enter", &[Enter], Verb::Palette("chain ")),
     bind("w", &[Char('w')], Verb::WhichLink(Draws { times: TIMES, only: None })),
     bind("x", &[Char('x')], Verb::ReplayLink),
+    bind("A", &[Char('A')], Verb::Palette("against ")),
     bind("s", &[Char('s')], Verb::Stop),
 ];
 

@@ -33,6 +33,15 @@ impl PolicyKind {
     }
 }
 
+/// What tells policies apart: a name, and the hash of a checkpoint.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Who {
+    /// What it is called.
+    pub name: String,
+    /// SHA-256 of its checkpoint, where it has one.
+    pub checkpoint: Option<String>,
+}
+
 /// A policy that acts, and what identifies it beside its name.
 pub struct Loaded {
     /// The policy.
@@ -79,14 +88,26 @@ impl Policies {
     /// # Errors
     /// When there is no such agent; says which there are.
     pub fn choose(&mut self, wanted: &str) -> anyhow::Result<()> {
-        let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-        let found = self.agents.iter().position(|agent| agent.name == wanted).or(numbered);
-        match found.filter(|&at| at < self.agents.len()) {
-            Some(at) => {
-                self.chosen = at;
-                Ok(())
-            }
-            None => anyhow::bail!("there is no checkpoint {wanted:?}; there are: {}", self.agents().join(", ")),
+        self.chosen = self.find(wanted)?;
+        Ok(())
+    }
+
+    fn find(&self, wanted: &str) -> anyhow::Result<usize> {
+        let numbered = || wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let found = self.agents.iter().position(|agent| agent.name == wanted).or_else(numbered);
+        found.filter(|&at| at < self.agents.len()).ok_or_else(|| {
+            anyhow::anyhow!("there is no checkpoint {wanted:?}; there are: {}", self.agents().join(", "))
+        })
+    }
+
+    /// A policy by its name: a kind, or the name or number of an agent.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be loaded.
+    pub fn named(&self, wanted: &str) -> anyhow::Result<Loaded> {
+        match PolicyKind::ALL.into_iter().find(|kind| kind.name() == wanted) {
+            Some(kind) => self.make(kind),
+            None => (self.agents[self.find(wanted)?].load)(),
         }
     }
 

@@ -22,7 +22,7 @@ use super::config::Config;
 use super::engine::Engine;
 use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::Encoder;
-use super::graphics::{Protocol, detect};
+use super::graphics::{Protocol, detect, inline};
 use super::history;
 use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
@@ -190,7 +190,7 @@ impl<W: Write> Conversation<W> {
         }
         if encode && let Some(job) = self.app.job() {
             if job.protocol == Protocol::Kitty {
-                terminal::holds_pictures();
+                terminal::holds_pictures(inline::kitty_forget(job.in_tmux));
             }
             self.encoder.submit(job);
         }

@@ -13,12 +13,10 @@ use crossterm::terminal::{
 };
 use crossterm::{cursor, execute};
 
-use super::graphics::inline;
-
 /// Whether the terminal is ours; whoever gives it back first does so for all.
 static OWNED: AtomicBool = AtomicBool::new(false);
-/// Pictures were left with the terminal.
-static PICTURES: AtomicBool = AtomicBool::new(false);
+/// What makes the terminal forget the pictures that it holds.
+static FORGET: Mutex<Option<String>> = Mutex::new(None);
 /// The terminal sends what the mouse does.
 static MOUSE: AtomicBool = AtomicBool::new(false);
 /// Where error messages went before.
@@ -67,9 +65,9 @@ pub fn hear_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
     out.write_all(if on { HEAR_MOUSE } else { LEAVE_MOUSE })
 }
 
-/// Notes that the terminal holds pictures which it should forget in the end.
-pub fn holds_pictures() {
-    PICTURES.store(true, Ordering::SeqCst);
+/// Notes that the terminal holds pictures, and the sequence by which it should forget them in the end.
+pub fn holds_pictures(forget: String) {
+    *FORGET.lock().unwrap_or_else(PoisonError::into_inner) = Some(forget);
 }
 
 /// Gives the terminal back, once. Errors are passed over: a terminal that is gone needs nothing.
@@ -78,17 +76,16 @@ pub fn give_back() {
         return;
     }
     let mut out = io::stdout();
-    let _ = farewell(&mut out, PICTURES.load(Ordering::SeqCst), MOUSE.load(Ordering::SeqCst));
+    let forget = FORGET.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let _ = farewell(&mut out, forget.as_deref().unwrap_or(""), MOUSE.load(Ordering::SeqCst));
     let _ = disable_raw_mode();
     if let Some(saved) = STDERR.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = rustix::stdio::dup2_stderr(saved);
     }
 }
 
-fn farewell(out: &mut impl Write, pictures: bool, mouse: bool) -> io::Result<()> {
-    if pictures {
-        out.write_all(inline::kitty_forget().as_bytes())?;
-    }
+fn farewell(out: &mut impl Write, forget: &str, mouse: bool) -> io::Result<()> {
+    out.write_all(forget.as_bytes())?;
     if mouse {
         out.write_all(LEAVE_MOUSE)?;
     }
@@ -152,11 +149,12 @@ impl<W: Write> Write for Counted<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tui::graphics::inline;
 
     #[test]
     fn the_farewell_leaves_the_alternate_screen_shows_the_cursor_and_forgets_pictures() {
         let mut out = Vec::new();
-        farewell(&mut out, true, true).unwrap();
+        farewell(&mut out, &inline::kitty_forget(false), true).unwrap();
         let text = String::from_utf8(out).unwrap();
         let order = ["\x1b_Ga=d", "\x1b[?1000l", "\x1b[?2026l", "\x1b[?2004l", "\x1b[?1049l", "\x1b[?25h"];
         let places: Vec<_> =

@@ -14,7 +14,8 @@ use super::policies::{Policies, PolicyKind};
 use super::theme::Ability;
 use super::update::{Msg, update};
 use super::worker::Report;
-use crate::agent::{Decision, Mind};
+use crate::agent::values::ChoiceValue;
+use crate::agent::{Decision, Mind, Values};
 use crate::domain::task::SceneRef;
 use crate::domain::{Action, ActionType, Class, Instance, Role, SkillKind, Subtask, Trajectory};
 use crate::house::testing::{kitchen, named};
@@ -116,6 +117,15 @@ pub fn thought(now: &Snapshot) -> Report {
         "Pickup Mug".into(),
         None,
     )
+}
+
+/// What critics might say of it.
+pub fn values(now: &Snapshot) -> Values {
+    let kinds = [(ActionType::MoveAhead, 0.44), (ActionType::RotateLeft, 0.31), (ActionType::RotateRight, 0.47)];
+    let navigation = kinds.into_iter().map(|(kind, q)| ChoiceValue { kind, class: None, q });
+    let interactions = now.candidates.iter().zip([0.71, 0.28, -0.02]);
+    let interactions = interactions.map(|(one, q)| ChoiceValue { kind: one.kind, class: Some(one.class), q });
+    Values { state: 0.52, choices: navigation.chain(interactions).collect() }
 }
 
 /// A screen of that size in which the agent has just begun.

@@ -3,7 +3,7 @@
 use super::Engine;
 use crate::agent::Policy;
 use crate::run::episode::Author;
-use crate::tui::policies::{Loaded, PolicyKind};
+use crate::tui::policies::{Loaded, PolicyKind, Who};
 
 impl Engine {
     /// Loads the chosen policy; slow the first time for the agent. It decides from here on, having seen the last frames.
@@ -48,6 +48,14 @@ impl Engine {
         Ok(self.policies.make(self.kind)?.policy)
     }
 
+    /// A policy to be set beside the one that acts: the expert, chance, or a checkpoint by name or number.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be loaded.
+    pub fn rival(&self, wanted: &str) -> anyhow::Result<Loaded> {
+        self.policies.named(wanted)
+    }
+
     /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
     pub fn reseed(&mut self, seed: u64, samples: bool) {
         self.author.seed = seed;
@@ -61,6 +69,11 @@ impl Engine {
         self.author = author;
         self.look_back();
         self.plant();
+    }
+
+    /// What tells the policy that decides from others.
+    pub fn who(&self) -> Who {
+        Who { name: self.author.policy.clone(), checkpoint: self.author.checkpoint.clone() }
     }
 
     /// Who decides, and by which chance.

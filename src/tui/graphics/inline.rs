@@ -12,13 +12,15 @@ pub const KITTY_ID: u8 = 83;
 /// The most that kitty takes in one piece of a transmission, in base64 characters.
 const PIECE: usize = 4096;
 
-/// Transmits the frame for placeholders of this many cells. The terminal is told not to answer.
+/// Transmits the frame: in tmux with placeholders for this many cells, which it moves like any text; otherwise to be laid over
+/// cells by [`lay`], which older terminals know too. The terminal is told not to answer.
 pub fn kitty(job: &Job) -> String {
     let data = STANDARD.encode(png(job));
     let (columns, rows) = (job.cells.width, job.cells.height);
     let mut sequence = String::with_capacity(data.len() + 256);
     let mut pieces = data.as_bytes().chunks(PIECE).peekable();
-    let mut control = format!("a=T,U=1,f=100,i={KITTY_ID},c={columns},r={rows},q=2,");
+    let place = if job.in_tmux { format!("a=T,U=1,c={columns},r={rows}") } else { "a=t".into() };
+    let mut control = format!("{place},f=100,i={KITTY_ID},q=2,");
     while let Some(piece) = pieces.next() {
         let more = u8::from(pieces.peek().is_some());
         let piece = format!("\x1b_G{control}m={more};{}\x1b\\", String::from_utf8_lossy(piece));
@@ -28,14 +30,20 @@ pub fn kitty(job: &Job) -> String {
     sequence
 }
 
+/// Lays the uppermost `pixels` rows of the transmitted frame over so many cells from the cursor on, which stays where it is.
+pub fn lay(columns: u16, rows: u16, pixels: usize) -> String {
+    format!("\x1b_Ga=p,i={KITTY_ID},p=1,C=1,c={columns},r={rows},h={pixels},q=2\x1b\\")
+}
+
 /// A sequence that tmux hands on to its terminal (where `allow-passthrough` is on).
 fn through_tmux(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }
 
 /// Makes kitty forget the frame.
-pub fn kitty_forget() -> String {
-    format!("\x1b_Ga=d,d=I,i={KITTY_ID},q=2\x1b\\")
+pub fn kitty_forget(in_tmux: bool) -> String {
+    let sequence = format!("\x1b_Ga=d,d=I,i={KITTY_ID},q=2\x1b\\");
+    if in_tmux { through_tmux(&sequence) } else { sequence }
 }
 
 /// Draws the frame where the cursor is, in iTerm2's way.
@@ -76,7 +84,7 @@ mod tests {
     fn kitty_gets_a_png_in_small_pieces_and_is_told_not_to_answer() {
         let sequence = kitty(&job(Protocol::Kitty));
         let pieces: Vec<&str> = sequence.split_terminator("\x1b\\").collect();
-        assert!(pieces[0].starts_with("\x1b_Ga=T,U=1,f=100,i=83,c="), "{}", &pieces[0][..60]);
+        assert!(pieces[0].starts_with("\x1b_Ga=t,f=100,i=83,q=2,"), "{}", &pieces[0][..60]);
         let mut data = String::new();
         for (at, piece) in pieces.iter().enumerate() {
             let (control, piece) = piece.split_once(';').unwrap();
@@ -94,7 +102,7 @@ mod tests {
         let mut job = job(Protocol::Kitty);
         job.in_tmux = true;
         let sequence = kitty(&job);
-        assert!(sequence.starts_with("\x1bPtmux;\x1b\x1b_Ga=T") && sequence.ends_with("\x1b\x1b\\\x1b\\"));
+        assert!(sequence.starts_with("\x1bPtmux;\x1b\x1b_Ga=T,U=1,") && sequence.ends_with("\x1b\x1b\\\x1b\\"));
     }
 
     #[test]

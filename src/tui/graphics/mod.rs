@@ -28,7 +28,7 @@ use overlay::Overlay;
 /// How a picture can be shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// The kitty graphics protocol, with Unicode placeholders; the terminal scales.
+    /// The kitty graphics protocol; the terminal scales.
     Kitty,
     /// iTerm2's inline images; the terminal scales.
     Iterm2,
@@ -65,7 +65,7 @@ impl Protocol {
     /// Whether the picture is drawn by an escape sequence that the screen's own cells do not know of, so that covering and
     /// uncovering it needs a full repaint.
     pub fn floats(self) -> bool {
-        matches!(self, Protocol::Iterm2 | Protocol::Sixel)
+        matches!(self, Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel)
     }
 }
 
@@ -114,6 +114,8 @@ pub enum Content {
     Cells(Vec<(char, Style)>),
     /// A sequence that transmits the picture; placeholders then show it.
     Placed(String),
+    /// A sequence that transmits the picture, to be laid over blank cells, and its height in pixels.
+    Laid(String, usize),
     /// A sequence that draws the picture where the cursor is.
     Drawn(String),
 }
@@ -126,11 +128,18 @@ impl Picture {
         let content = match job.protocol {
             Protocol::HalfBlocks => Content::Cells(blocks::draw(job)),
             Protocol::Ascii => Content::Cells(classes::draw(job)),
-            Protocol::Kitty => Content::Placed(inline::kitty(job)),
+            Protocol::Kitty if job.in_tmux => Content::Placed(inline::kitty(job)),
+            Protocol::Kitty => Content::Laid(inline::kitty(job), job.frame.height),
             Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),
             Protocol::Sixel => Content::Drawn(sixel::draw(job)),
         };
         Picture { protocol: job.protocol, cells: job.cells, content }
+    }
+
+    /// Whether it lies over the cells, whatever is written there: what is opened over it has to be left out of its area, from
+    /// some row down.
+    pub fn lies_over(&self) -> bool {
+        matches!(self.content, Content::Laid(..))
     }
 }
 
@@ -139,10 +148,12 @@ const ONE: CellDiffOption = CellDiffOption::ForcedWidth(NonZeroU16::MIN);
 
 impl Widget for &Picture {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        if area.width < self.cells.width || area.height < self.cells.height || area.is_empty() {
+        let cut = !self.lies_over() && area.height < self.cells.height;
+        if area.width < self.cells.width || cut || area.is_empty() {
             return;
         }
-        let area = Rect { width: self.cells.width, height: self.cells.height, ..area };
+        let all = usize::from(self.cells.height).max(1);
+        let area = Rect { width: self.cells.width, height: self.cells.height.min(area.height), ..area };
         match &self.content {
             Content::Cells(cells) => {
                 for (position, (symbol, style)) in area.positions().zip(cells) {
@@ -161,6 +172,13 @@ impl Widget for &Picture {
                         buf[position].modifier = Modifier::empty();
                     }
                 }
+            }
+            Content::Laid(transmit, pixels) => {
+                for position in area.positions() {
+                    buf[position].reset();
+                }
+                let lay = inline::lay(area.width, area.height, pixels * usize::from(area.height) / all);
+                buf[area.as_position()].set_symbol(&format!("{transmit}{lay} ")).set_diff_option(ONE);
             }
             Content::Drawn(sequence) => {
                 for position in area.positions().skip(1) {

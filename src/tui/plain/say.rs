@@ -6,8 +6,9 @@ use crate::agent::Mind;
 use crate::domain::{ActionType, Instance};
 use crate::run::contrast::Contrast;
 use crate::run::rollout::End;
+use crate::tui::choices::{Sort, choices as table};
 use crate::tui::engine::{Engine, Event, Snapshot};
-use crate::tui::inspect::state;
+use crate::tui::inspect::{self, state};
 use crate::tui::timeline::{Divergence, words};
 
 /// Where the explorer is in what was tried.
@@ -105,6 +106,40 @@ pub(super) fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()
             writeln!(out, "task: {}{limit}", progress.subtasks.join("; "))?;
         }
         None => writeln!(out, "task: none; the instruction is not graded")?,
+    }
+    Ok(())
+}
+
+/// Every legal choice: how likely, how good.
+pub(super) fn choices(engine: &mut Engine, sort: Sort, out: &mut impl Write) -> anyhow::Result<()> {
+    let (decision, values) = engine.think()?.clone();
+    let now = engine.snapshot();
+    let entropy = decision.mind.as_ref().map_or(String::new(), |mind| format!(", entropy {:.2}", mind.entropy));
+    let value = values.as_ref().map_or("no critic".to_string(), |values| format!("V {:.2}", values.state));
+    writeln!(out, "{}: {value}{entropy}; sorted by {}", now.acts, sort.name())?;
+    for choice in table(&now, &decision, values.as_ref(), sort) {
+        let mark = if choice.chosen { '>' } else { ' ' };
+        let object = choice.class.map_or(String::new(), |class| format!(" {}", class.spoken()));
+        let number = |name: &str, x: Option<f32>| x.map_or(String::new(), |x| format!(", {name} {x:.2}"));
+        let (p, q) = (number("p", choice.probability), number("min Q", choice.q));
+        writeln!(out, "{mark} {}{object}{p}{q}{}", choice.kind, number("advantage", choice.advantage))?;
+    }
+    Ok(())
+}
+
+/// Everything in the house: where it is, and what can be done to it or why not.
+pub(super) fn things(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
+    for thing in inspect::things(now) {
+        let state = if thing.state.is_empty() { String::new() } else { format!(" ({})", thing.state) };
+        let seen = if thing.seen { "" } else { ", not in view" };
+        writeln!(
+            out,
+            "{}{state}, {}, {:.1} m{seen}: {}",
+            thing.class.spoken(),
+            thing.place,
+            thing.metres,
+            thing.verdict()
+        )?;
     }
     Ok(())
 }

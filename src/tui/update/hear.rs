@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::Effect;
 use super::pages::turn_to;
 use crate::run::rollout::End;
-use crate::tui::app::{App, Entry, Tone};
+use crate::tui::app::App;
 use crate::tui::chained::Chained;
 use crate::tui::graphics::classes::{self, Letters};
+use crate::tui::log::{Entry, Tone};
 use crate::tui::verb::Page;
 use crate::tui::worker::{Command, Report};
 
@@ -26,7 +27,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
                 app.landscape = None;
                 app.paints_values = false;
                 app.chain = None;
-                app.chain_before = None;
+                app.rival = None;
                 let known = app.now.as_ref().is_some_and(|now| now.instruction == snapshot.instruction);
                 if !known {
                     app.editor.remember(&snapshot.instruction);
@@ -40,7 +41,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             let before = app.now.replace(snapshot);
             if let Some(note) = app.now.as_ref().and_then(|now| arrival(before.as_deref(), now, new_episode)) {
                 let step = app.now.as_ref().map(|now| now.step);
-                app.write(Entry { step, text: note, outcome: String::new(), tone: Tone::Note });
+                app.log.write(Entry { step, text: note, outcome: String::new(), tone: Tone::Note });
             }
             let mut effects = vec![Effect::Encode];
             effects.extend(asked_again(app));
@@ -52,11 +53,21 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             let step = Some(event.step);
             if let Some(forked) = event.forked {
                 let text = format!("branch {forked}");
-                app.write(Entry { step: step.map(|step| step - 1), text, outcome: String::new(), tone: Tone::Note });
+                app.log.write(Entry {
+                    step: step.map(|step| step - 1),
+                    text,
+                    outcome: String::new(),
+                    tone: Tone::Note,
+                });
             }
-            app.write(Entry { step, text: action, outcome: event.outcome.to_string(), tone });
+            app.log.write(Entry { step, text: action, outcome: event.outcome.to_string(), tone });
             if let Some(subtask) = event.completed {
-                app.write(Entry { step, text: format!("done: {subtask}"), outcome: String::new(), tone: Tone::Good });
+                app.log.write(Entry {
+                    step,
+                    text: format!("done: {subtask}"),
+                    outcome: String::new(),
+                    tone: Tone::Good,
+                });
             }
             vec![]
         }
@@ -115,22 +126,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             vec![]
         }
         Report::Chained(chained) => {
-            let of = |chain: &Chained| chain.by_link.as_ref().map(|play| play.acts.clone());
-            let other = app.chain.take().filter(|before| before.links == chained.links && of(before).is_some());
-            if let Some(before) = other
-                && of(&before) != of(&chained)
-                && (of(&chained).is_some() || app.chain_before.is_none())
-            {
-                app.chain_before = Some(before);
-            }
-            if app
-                .chain_before
-                .as_ref()
-                .is_some_and(|before| before.links != chained.links || of(before) == of(&chained))
-            {
-                app.chain_before = None;
-            }
-            app.chain = Some(*chained);
+            take_in(app, *chained);
             vec![]
         }
         Report::Working(working) => {
@@ -150,6 +146,17 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
             app.note(Tone::Bad, reason.clone());
             app.trouble = Some(reason);
             vec![]
+        }
+    }
+}
+
+/// Shows a chain: in the place of what the same policy made of it, or beside what another one did.
+fn take_in(app: &mut App, chained: Chained) {
+    match &app.chain {
+        Some(known) if known.is_same_chain(&chained) && known.who != chained.who => app.rival = Some(chained),
+        _ => {
+            app.rival = app.rival.take().filter(|rival| rival.is_same_chain(&chained));
+            app.chain = Some(chained);
         }
     }
 }

@@ -2,8 +2,9 @@
 
 use super::Effect;
 use super::perform::perform;
-use crate::tui::app::{App, Tone};
+use crate::tui::app::App;
 use crate::tui::keys::Mode;
+use crate::tui::log::Tone;
 use crate::tui::verb;
 
 /// Opens a line or list over the screen; what keys meant before comes back when it closes.

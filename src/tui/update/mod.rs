@@ -145,9 +145,9 @@ mod tests {
     use super::*;
     use crate::domain::{Action, ActionType};
     use crate::house::{Outcome, Reason};
-    use crate::tui::app::Tone;
     use crate::tui::engine::Event;
     use crate::tui::graphics::Protocol;
+    use crate::tui::log::Tone;
     use crate::tui::testing;
     use crate::tui::theme::Ability;
     use crate::tui::worker::Going;
@@ -203,7 +203,7 @@ mod tests {
         let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
         update(&mut app, Msg::Report(Report::Instructed { old, new, note: "the task no longer applies" }));
         assert_eq!(app.replaced.as_deref(), Some("put the mug in the sink"));
-        assert!(app.log.back().unwrap().text.contains("open the fridge (the task no longer applies)"));
+        assert!(app.log.entries().next_back().unwrap().text.contains("open the fridge (the task no longer applies)"));
         press(&mut app, KeyCode::Char('i'));
         press(&mut app, KeyCode::Up);
         press(&mut app, KeyCode::Up);
@@ -217,7 +217,7 @@ mod tests {
         let open = Action::interact(ActionType::Open, fridge);
         assert_eq!(press(&mut app, KeyCode::Char('3')), [Effect::Send(Command::Act(open))]);
         assert_eq!(press(&mut app, KeyCode::Char('4')), []);
-        assert!(app.log.back().unwrap().text.contains("no interaction has the number 4"));
+        assert!(app.log.entries().next_back().unwrap().text.contains("no interaction has the number 4"));
     }
 
     #[test]
@@ -242,7 +242,7 @@ mod tests {
             forked: None,
         };
         update(&mut app, Msg::Report(Report::Stepped(event)));
-        let entry = app.log.back().unwrap();
+        let entry = app.log.entries().next_back().unwrap();
         assert_eq!((entry.text.as_str(), entry.outcome.as_str()), ("MoveAhead (you)", "something is in the way"));
         assert_eq!(entry.tone, Tone::Impossible);
     }

@@ -6,9 +6,10 @@ use super::travel::{go_on, travel};
 use super::{Effect, Farewell, send};
 use crate::domain::{Action, Heading};
 use crate::run::chain::Draws;
-use crate::tui::app::{App, Tone};
+use crate::tui::app::App;
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::keys::Mode;
+use crate::tui::log::Tone;
 use crate::tui::policies::PolicyKind;
 use crate::tui::verb::{self, Page, TIMES, Verb};
 use crate::tui::worker::{Command, Pace};
@@ -207,6 +208,11 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
             effects.push(Effect::Send(Command::WhichLink(draws)));
             effects
         }
+        Verb::Against(wanted) => {
+            let mut effects = turn_to(app, Page::Chain);
+            effects.push(Effect::Send(Command::Against(wanted)));
+            effects
+        }
         Verb::Stop => send(Command::Stop),
         Verb::Bandwidth(kilobytes) => {
             app.bandwidth = (kilobytes > 0).then(|| 1000 * u64::from(kilobytes));
@@ -219,8 +225,10 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
         }
         Verb::Copy => {
             let Some(now) = &app.now else { return vec![] };
-            let last = app.log.iter().rev().find(|entry| entry.step == Some(now.step) && !entry.outcome.is_empty());
-            let last = last.map_or(String::new(), |entry| format!(": {} · {}", entry.text, entry.outcome));
+            let last = app
+                .log
+                .done_at(now.step)
+                .map_or(String::new(), |entry| format!(": {} · {}", entry.text, entry.outcome));
             let text = format!("{} | {} step {}{last}", now.instruction, now.scene.name, now.step);
             app.note(Tone::Note, "copied");
             vec![Effect::Copy(text)]

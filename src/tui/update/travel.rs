@@ -1,8 +1,9 @@
 //! Going on, back and forth.
 
 use super::{Effect, send};
-use crate::tui::app::{App, Tone};
+use crate::tui::app::App;
 use crate::tui::keys::Mode;
+use crate::tui::log::Tone;
 use crate::tui::verb::Verb;
 use crate::tui::worker::{Command, Going};
 

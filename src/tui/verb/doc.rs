@@ -59,6 +59,7 @@ impl Verb {
             Verb::Palette("export ") => "write film, page, picture",
             Verb::Palette("compare ") => "another instruction",
             Verb::Palette("chain ") => "a new chain",
+            Verb::Palette("against ") => "another agent beside it",
             Verb::Palette(_) => "all verbs",
             Verb::Help => "these keys",
             Verb::Quit => "quit",
@@ -83,6 +84,7 @@ impl Verb {
             | Verb::Until(_)
             | Verb::Compare(_)
             | Verb::Chain(_)
+            | Verb::Against(_)
             | Verb::SaveTask(_)
             | Verb::Export(_)
             | Verb::Bandwidth(_)

@@ -107,6 +107,8 @@ pub enum Verb {
     Mouse,
     /// Follow a chain of instructions.
     Chain(String),
+    /// The same chain by another policy, side by side.
+    Against(String),
     /// Which link of the chain breaks.
     WhichLink(Draws),
     /// Stop work in the background.

@@ -55,6 +55,7 @@ pub fn parse(line: &str) -> Result<Verb, String> {
         "compare" | "ab" => Ok(Verb::Compare(text()?)),
         "swap" => Ok(Verb::Swap),
         "chain" => Ok(Verb::Chain(rest.to_string())),
+        "against" => Ok(Verb::Against(text()?)),
         "links" => {
             Ok(Verb::WhichLink(Draws { times: if rest.is_empty() { TIMES } else { number(rest)? }, only: None }))
         }
@@ -127,6 +128,20 @@ mod tests {
     use super::*;
     use crate::tui::verb::SAID;
 
+    /// Something that may follow a verb.
+    fn example(arguments: &str) -> &'static str {
+        match arguments {
+            "" => "",
+            "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
+            "NAME" => "expert",
+            "N [TIMES]" => "2 4",
+            "best|north|..." => "south",
+            "panels|mind|..." => "world",
+            "[CONDITION]" | "CONDITION" => "failed",
+            _ => "next",
+        }
+    }
+
     #[test]
     fn lines_are_read_as_verbs_and_mistakes_are_named() {
         assert_eq!(parse("step"), Ok(Verb::Step(1)));
@@ -146,16 +161,7 @@ mod tests {
     #[test]
     fn every_listed_verb_can_be_read() {
         for said in SAID {
-            let argument = match said.arguments {
-                "" => "",
-                "N|ACTION" | "[N]" | "N" | "NAME|N" | "KB" | "SEED" => "1",
-                "NAME" => "expert",
-                "N [TIMES]" => "2 4",
-                "best|north|..." => "south",
-                "panels|mind|..." => "world",
-                "[CONDITION]" | "CONDITION" => "failed",
-                _ => "next",
-            };
+            let argument = example(said.arguments);
             assert!(parse(&format!("{} {argument}", said.name)).is_ok(), "{}", said.name);
         }
     }

@@ -44,6 +44,7 @@ pub const SAID: &[Said] = &[
     said("compare", "TEXT", "this instruction and another in the same state"),
     said("swap", "", "adopt the other instruction of the comparison"),
     said("chain", "A; B; ...", "follow a chain of instructions, link by link and as one"),
+    said("against", "NAME|N", "the same chain by another checkpoint, the expert or random, side by side"),
     said("links", "[N]", "which link breaks: N draws of each (8), from both entries"),
     said("link", "N [TIMES]", "the same for one link: from its recorded entry and the expert's"),
     said("values", "", "paint the value of every cell on the map; or end that"),

@@ -7,9 +7,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{fit, panel, put};
+use super::{fit, panel, picture, put};
 use crate::tui::app::App;
-use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 use crate::tui::timeline::{Divergence, Timeline};
 
@@ -83,11 +82,7 @@ impl Branches<'_> {
             let name = fit(name, usize::from(head.width).saturating_sub(step.width()));
             put(buf, head, 0, format!("{name}{step}"), THEME.quiet);
         }
-        let covered = self.0.mode == Mode::Help && self.0.graphics.protocol.floats();
-        match &self.0.picture {
-            Some(picture) if !covered => picture.render(area, buf),
-            _ => put(buf, area, area.height / 2, "  drawing ...", THEME.quiet),
-        }
+        picture(self.0, area, buf);
     }
 }
 

@@ -46,7 +46,7 @@ fn head(contrast: &Contrast, area: Rect, buf: &mut Buffer) {
         let mind = side.decision.mind.as_ref();
         let entropy = mind.map_or(String::new(), |mind| format!(" · entropy {:.2}", mind.entropy));
         let value = match &side.values {
-            Some(values) => format!("V {:.2}", values.state),
+            Some(values) => format!("V {:.2}{}", values.state, difference(contrast, row > 0)),
             None => "this checkpoint has no critic".into(),
         };
         put(buf, inner, row + 1, format!("   would {} · {value}{entropy}", side.decision.action.kind), THEME.quiet);
@@ -62,6 +62,14 @@ fn head(contrast: &Contrast, area: Rect, buf: &mut Buffer) {
     };
     score("A against B", contrast.divergence, verdict(contrast.divergence), 4, buf);
     score("language", contrast.sensitivity, "A against 8 other instructions, on average", 5, buf);
+}
+
+/// By how much B's V is more than A's, for B.
+fn difference(contrast: &Contrast, is_other: bool) -> String {
+    match contrast.sides.each_ref().map(|side| side.values.as_ref()) {
+        [Some(a), Some(b)] if is_other => format!(", B - A {:+.2}", b.state - a.state),
+        _ => String::new(),
+    }
 }
 
 /// What a divergence means.

@@ -6,10 +6,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{panel, put};
+use super::{panel, picture};
 use crate::tui::app::App;
 use crate::tui::graphics::{Protocol, classes};
-use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 
 /// The panel with the picture.
@@ -30,13 +29,9 @@ impl Widget for Sees<'_> {
             }
             None => String::new(),
         };
-        let inner = panel(buf, area, app.overlay.title(), &right);
+        panel(buf, area, app.overlay.title(), &right);
         let Some(picture_area) = app.picture_area() else { return };
-        let covered = app.mode == Mode::Help && app.graphics.protocol.floats();
-        match &app.picture {
-            Some(picture) if !covered => picture.render(picture_area, buf),
-            _ => put(buf, inner, inner.height / 2, "  drawing ...", THEME.quiet),
-        }
+        picture(app, picture_area, buf);
         if app.graphics.protocol == Protocol::Ascii {
             let top = picture_area.bottom();
             legend(app, Rect { y: top, height: area.bottom().saturating_sub(top), ..area }, buf);

@@ -7,7 +7,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 use super::{panel, wrap};
-use crate::tui::app::{App, Entry, Tone};
+use crate::tui::app::App;
+use crate::tui::log::{Entry, Tone};
 use crate::tui::theme::THEME;
 
 /// The panel with the events.
@@ -26,7 +27,7 @@ impl Widget for Log<'_> {
 fn lines(app: &App, inner: Rect) -> impl Iterator<Item = (Option<u32>, Line<'static>)> {
     let rows = usize::from(inner.height);
     let mut lines: Vec<(Option<u32>, Line)> = Vec::new();
-    for entry in app.log.iter().rev() {
+    for entry in app.log.entries().rev() {
         if lines.len() >= rows {
             break;
         }

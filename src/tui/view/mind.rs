@@ -26,7 +26,10 @@ impl Widget for MindPanel<'_> {
         let mind = app.thought.as_ref().and_then(|(decision, _)| decision.mind.as_ref());
         let right = match (&app.busy, mind) {
             (Some(busy), _) => format!("{busy} ..."),
-            (None, Some(mind)) => format!("{} · entropy {:.2}", app.policy.name(), mind.entropy),
+            (None, Some(mind)) => {
+                let value = app.values.as_ref().map_or(String::new(), |values| format!(" · V {:.2}", values.state));
+                format!("{}{value} · entropy {:.2}", app.policy.name(), mind.entropy)
+            }
             (None, None) if app.thought.is_some() => format!("{} · no probabilities", app.policy.name()),
             (None, None) => app.policy.name().to_string(),
         };
@@ -117,20 +120,20 @@ fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
         ActionType::Put => ("masked: no place for it in reach", "no place"),
         ActionType::Open => ("masked: nothing to open in reach", "none near"),
         ActionType::Close => ("masked: nothing open in reach", "none open"),
-        ActionType::ToggleOn => ("masked: nothing to switch on in reach", "none near"),
-        ActionType::ToggleOff => ("masked: nothing on in reach", "none on"),
+        ActionType::ToggleOn => ("masked: nothing to switch on", "none near"),
+        ActionType::ToggleOff => ("masked: nothing is on here", "none on"),
         ActionType::Slice if held.is_none_or(|held| !held.class.is_knife()) => {
             ("masked: no knife in the hand", "no knife")
         }
         ActionType::Slice => ("masked: nothing to slice in reach", "none near"),
-        _ => ("masked", "masked"),
+        _ => ("masked: it just failed here", "just failed"),
     };
     if long.width() <= room { long } else { short }
 }
 
 /// One class a row, with bars.
 fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &Mind) {
-    put(buf, area, 0, "object", THEME.quiet);
+    put(buf, area, 0, if mind.objects.is_empty() { "" } else { "object" }, THEME.quiet);
     for (row, &(class, p, candidate)) in (1..area.height).zip(&mind.objects) {
         let style = object_style(target == Some(class), candidate);
         let name = fit(class.spoken(), 13);

@@ -75,6 +75,27 @@ impl Widget for &App {
     }
 }
 
+/// Draws the encoded frame, or says that it is under way. What is opened over the page stays uncovered by it.
+fn picture(app: &App, area: Rect, buf: &mut Buffer) {
+    // The help stands anywhere over it.
+    if app.mode == Mode::Help && app.graphics.protocol.floats() {
+        return;
+    }
+    match &app.picture {
+        Some(picture) if picture.lies_over() => {
+            let page = app.layout().map_or(area, |layout| layout.page);
+            let top = match app.mode {
+                Mode::Palette => palette::place(page).y,
+                Mode::Typing => suggestions::place(app, page).map_or(area.bottom(), |area| area.y),
+                Mode::Watch | Mode::Manual | Mode::Help => area.bottom(),
+            };
+            picture.render(Rect { height: area.height.min(top.saturating_sub(area.y)), ..area }, buf);
+        }
+        Some(picture) => picture.render(area, buf),
+        None => put(buf, area, area.height / 2, "  drawing ...", THEME.quiet),
+    }
+}
+
 fn too_small(area: Rect, buf: &mut Buffer) {
     let (width, height) = SMALLEST;
     let text = format!(

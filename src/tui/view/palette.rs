@@ -15,15 +15,19 @@ use crate::tui::verb::matching;
 pub struct Palette<'a>(pub &'a App);
 
 /// Verbs that are listed at a time.
-const ROWS: usize = 12;
+const ROWS: u16 = 12;
+
+/// Where it opens: under the list there is room for the whole of what the selected verb does.
+pub(super) fn place(page: Rect) -> Rect {
+    let height = (ROWS + 4).min(page.height);
+    Rect { y: page.bottom() - height, height, width: page.width.min(110), ..page }
+}
 
 impl Widget for Palette<'_> {
     fn render(self, page: Rect, buf: &mut Buffer) {
         let found = matching(self.0.palette.text());
-        let rows = found.len().clamp(1, ROWS.min(usize::from(page.height) - 4));
-        // Under the list the whole of what the selected verb does.
-        let height = rows as u16 + 4;
-        let area = Rect { y: page.bottom() - height, height, width: page.width.min(110), ..page };
+        let area = place(page);
+        let rows = usize::from(area.height) - 4;
         Clear.render(area, buf);
         let block = Block::bordered().title(Line::styled(" Verbs ", THEME.title)).padding(Padding::horizontal(1));
         let inner = block.inner(area);

@@ -4,8 +4,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
 
 use super::{fit, panel, put};
+use crate::house::view::Candidate;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -24,7 +26,12 @@ impl Widget for Reach<'_> {
             let slice = if object.slice_of.is_some() { "a slice of " } else { "" };
             format!("hand: {slice}{}", object.class)
         });
-        let inner = panel(buf, area, "In reach", &hand);
+        let pages = app.pages();
+        let more = if pages > 1 { format!("tab {}/{pages}", app.page_of_interactions + 1) } else { String::new() };
+        let both = format!("{more} · {hand}");
+        // On a narrow screen the last row says it in place of a distance.
+        let above = pages > 1 && both.width() + 12 <= usize::from(area.width);
+        let inner = panel(buf, area, "In reach", if above { &both } else { &hand });
         let page = app.page_of_candidates();
         if page.is_empty() {
             put(
@@ -37,21 +44,22 @@ impl Widget for Reach<'_> {
             return;
         }
         let chosen = app.thought.as_ref().map(|(decision, _)| decision.action);
-        let more = app.pages() > 1;
+        let named = |candidate: &Candidate| format!("{} {}", candidate.kind, candidate.class.name());
+        let longest = page.iter().map(|candidate| named(candidate).width()).max().unwrap_or(0);
         for ((at, candidate), place) in (0u16..).zip(page).zip(places(inner)) {
             let width = place.width;
             let style = if chosen == Some(candidate.action()) { THEME.chosen } else { THEME.key };
-            let name = fit(&format!("{} {}", candidate.kind, candidate.class.name()), usize::from(width) - 3 - 6);
-            let mut spans = vec![
+            let tells = pages > 1 && !above && usize::from(at) + 1 == page.len();
+            let distance = format!("  {:.1} m", candidate.distance / 1000.0);
+            let room = longest.min(usize::from(width) - 3 - 6);
+            let spans = vec![
                 Span::styled(format!("{} ", at + 1), style),
-                Span::styled(name, if chosen == Some(candidate.action()) { THEME.chosen } else { Default::default() }),
+                Span::styled(
+                    format!("{:<room$}", fit(&named(candidate), room)),
+                    if chosen == Some(candidate.action()) { THEME.chosen } else { Default::default() },
+                ),
+                Span::styled(if tells { format!("  {more}") } else { distance }, THEME.quiet),
             ];
-            if usize::from(at) + 1 == page.len() && more {
-                spans
-                    .push(Span::styled(format!("  tab {}/{}", app.page_of_interactions + 1, app.pages()), THEME.quiet));
-            } else {
-                spans.push(Span::styled(format!("  {:.1} m", candidate.distance / 1000.0), THEME.quiet));
-            }
             Line::from(spans).render(place, buf);
         }
     }

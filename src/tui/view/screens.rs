@@ -5,15 +5,15 @@ use std::sync::Arc;
 use termprofile::TermProfile;
 
 use crate::domain::{Action, ActionType, World};
-use crate::run::chain::{Outcome, Play, Rate, Trials};
+use crate::run::chain::{Handover, Outcome, Play, Rate, Trials};
 use crate::run::landscape::{Height, Landscape, Measure};
 use crate::tui::app::App;
 use crate::tui::chained::Chained;
 use crate::tui::engine::{Engine, Event};
 use crate::tui::graphics::Protocol;
 use crate::tui::keys::bindings;
-use crate::tui::policies::PolicyKind;
-use crate::tui::testing::{app, engine, screen, snapshot, thought};
+use crate::tui::policies::{PolicyKind, Who};
+use crate::tui::testing::{app, engine, screen, snapshot, thought, values};
 use crate::tui::theme::Ability;
 use crate::tui::update::{Effect, Msg, perform, update};
 use crate::tui::verb::{Page, Verb};
@@ -62,14 +62,16 @@ fn typing_shows_what_the_agent_is_told_now() {
 
 #[test]
 fn another_instruction_ends_the_task_and_the_expert_says_so() {
-    let mut app = app(120, 36, Protocol::HalfBlocks, Ability::FULL);
-    let mut engine = engine();
-    let note = engine.instruct("open the fridge").unwrap();
-    let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
-    update(&mut app, Msg::Report(Report::Instructed { old, new, note }));
-    update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
-    update(&mut app, Msg::Report(Report::Failed("the expert needs a task".into())));
-    check("no-task-120x36", &screen(&mut app));
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        let mut engine = engine();
+        let note = engine.instruct("open the fridge").unwrap();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Report(Report::Instructed { old, new, note }));
+        update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
+        update(&mut app, Msg::Report(Report::Failed("the expert needs a task".into())));
+        check(&format!("no-task-{width}x{height}"), &screen(&mut app));
+    }
 }
 
 #[test]
@@ -239,36 +241,96 @@ fn two_instructions_are_compared_and_swapped() {
     }
 }
 
-#[test]
-fn a_chain_shows_each_link_and_which_one_breaks() {
-    let outcome = |reached: bool, done: bool, steps| Outcome {
+/// A chain of three links by a policy: the second link is done or not, the heat is V or not.
+fn chained(name: &str, second: bool, by_value: bool) -> Chained {
+    let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| Outcome {
         reached,
         done: Some(done),
         steps,
         entry: World::default(),
         exit: World::default(),
-        handover: None,
+        handover: worth.filter(|_| by_value).map(|worth| Handover { worth, next: worth - 0.1, joined: 0.3 }),
     };
     let play = |second: bool| Play {
-        acts: "first".into(),
-        outcomes: vec![outcome(true, true, 9), outcome(true, second, 14), outcome(second, false, 0)],
+        outcomes: vec![
+            outcome(true, true, 9, Some(0.62)),
+            outcome(true, second, 14, Some(-0.07)),
+            outcome(second, false, 0, None),
+        ],
         heat: (0..23).map(|step| vec![1.0 - step as f32 / 23.0, step as f32 / 23.0, 0.1]).collect(),
-        by_value: false,
+        by_value,
         in_force: (0..23).map(|step| usize::from(step >= 9)).collect(),
     };
-    let rate = |done| Rate { done, of: 8 };
-    let chained = Chained {
+    Chained {
+        who: Who { name: name.into(), checkpoint: Some(name.into()) },
         links: vec!["Pick up the knife.".into(), "Slice the tomato.".into(), "Put a slice in the fridge.".into()],
+        start: "a kitchen".into(),
         graded: true,
-        by_link: Some(play(false)),
+        by_link: Some(play(second)),
         as_one: Some(play(true)),
-        trials: Some(Trials { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), Rate::default()] }),
-    };
-    for (name, width, height) in [("chain-80x24", 80, 24), ("chain-120x36", 120, 36)] {
+        trials: None,
+    }
+}
+
+#[test]
+fn a_chain_shows_each_link_and_which_one_breaks() {
+    let rate = |done| Rate { done, of: 8 };
+    let trials = Trials { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), Rate::default()] };
+    let chained = Chained { trials: Some(trials), ..chained("first", false, false) };
+    for (width, height) in SIZES {
         let (mut app, _) = forked(width, height);
         perform(&mut app, Verb::Show(Page::Chain));
         update(&mut app, Msg::Report(Report::Chained(Box::new(chained.clone()))));
-        check(name, &screen(&mut app));
+        check(&format!("chain-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn a_critic_shows_values_targets_and_advantages() {
+    for (width, height) in SIZES {
+        let (mut app, mut engine) = forked(width, height);
+        let now = snapshot(&mut engine);
+        let Report::Thought(decision, words, _) = thought(&now) else { panic!() };
+        update(&mut app, Msg::Report(Report::Thought(decision, words, Some(values(&now)))));
+        check(&format!("critic-watch-{width}x{height}"), &screen(&mut app));
+        perform(&mut app, Verb::Show(Page::Mind));
+        if let Some(now) = &mut app.now {
+            let mut time = (*now.time).clone();
+            for (beat, value) in time.beats.iter_mut().zip([0.2, 0.5, 0.4]) {
+                (beat.value, beat.q, beat.entropy, beat.chosen) =
+                    (Some(value), Some(value - 0.1), Some(1.0), Some(0.3));
+            }
+            now.time = Arc::new(time);
+        }
+        check(&format!("critic-mind-{width}x{height}"), &screen(&mut app));
+        perform(&mut app, Verb::Show(Page::Chain));
+        update(&mut app, Msg::Report(Report::Chained(Box::new(chained("sprint", true, true)))));
+        check(&format!("critic-chain-{width}x{height}"), &screen(&mut app));
+        engine.choose(PolicyKind::Random).unwrap();
+        let mut contrast = engine.contrast("open the fridge").unwrap();
+        contrast.sides[1].values = Some(values(&now));
+        contrast.sides[0].values = Some(values(&now));
+        update(&mut app, Msg::Report(Report::Compared(Box::new(contrast))));
+        check(&format!("critic-compare-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn two_policies_follow_the_same_chain_side_by_side() {
+    for (width, height) in [(80, 24), (120, 36), (200, 60)] {
+        let (mut app, _) = forked(width, height);
+        perform(&mut app, Verb::Show(Page::Chain));
+        for report in [chained("sprint", true, true), chained("first", false, false)] {
+            update(&mut app, Msg::Report(Report::Chained(Box::new(report))));
+        }
+        check(&format!("chains-{width}x{height}"), &screen(&mut app));
+        let again = Chained { trials: Some(Trials::default()), ..chained("first", false, false) };
+        update(&mut app, Msg::Report(Report::Chained(Box::new(again))));
+        assert_eq!(app.chain.as_ref().unwrap().who.name, "sprint", "each stays on its side");
+        assert!(app.rival.as_ref().unwrap().trials.is_some());
+        let elsewhere = Chained { start: "another kitchen".into(), ..chained("sprint", true, true) };
+        update(&mut app, Msg::Report(Report::Chained(Box::new(elsewhere))));
+        assert!(app.rival.is_none(), "another start is another chain");
     }
 }
 

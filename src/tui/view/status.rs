@@ -114,9 +114,10 @@ impl Widget for Status<'_> {
             (Mode::Watch, Page::Chain) => &[
                 ("enter", "new chain"),
                 ("w", "which link breaks"),
-                ("x", "replay one"),
+                ("x", "this one"),
+                ("A", "against"),
                 ("s", "stop"),
-                ("esc", "panels"),
+                ("?", "keys"),
             ],
             (Mode::Manual, _) => &[
                 ("arrows", "move"),

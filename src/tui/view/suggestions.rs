@@ -14,17 +14,20 @@ use crate::tui::theme::THEME;
 pub struct Suggestions<'a>(pub &'a App);
 
 /// Instructions that are listed at a time.
-const ROWS: usize = 8;
+const ROWS: u16 = 8;
+
+/// Where they open, unless nothing fits; as large whatever is typed.
+pub(super) fn place(app: &App, page: Rect) -> Option<Rect> {
+    let height = (ROWS + 2).min(page.height);
+    let area = Rect { y: page.bottom() - height, height, width: page.width.min(80), ..page };
+    (!app.completions().is_empty()).then_some(area)
+}
 
 impl Widget for Suggestions<'_> {
     fn render(self, page: Rect, buf: &mut Buffer) {
         let found = self.0.completions();
-        if found.is_empty() {
-            return;
-        }
         let title = if self.0.editor.text().is_empty() { " Told before, or sensible here " } else { " Tab completes " };
-        let height = found.len().min(ROWS) as u16 + 2;
-        let area = Rect { y: page.bottom() - height, height, width: page.width.min(80), ..page };
+        let Some(area) = place(self.0, page) else { return };
         Clear.render(area, buf);
         let block = Block::bordered().title(Line::styled(title, THEME.title)).padding(Padding::horizontal(1));
         let inner = block.inner(area);

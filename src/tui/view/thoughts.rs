@@ -57,8 +57,9 @@ impl Thoughts<'_> {
         };
         let right = format!("{} · {value}{entropy} · by {}", now.acts, app.sort.name());
         let inner = panel(buf, area, "Mind", &right);
-        let width = usize::from(inner.width).saturating_sub(55);
-        let head = format!("  {:<11} {:<18} {:>5} {:<width$} {:>6} {:>6}", "action", "object", "p", "", "min Q", "A");
+        let width = usize::from(inner.width).saturating_sub(56);
+        let head =
+            format!("  {:<11} {:<18} {:>5} {:<width$} {:>6} {:>9}", "action", "object", "p", "", "min Q", "advantage");
         put(buf, inner, 0, head, THEME.quiet);
         let rows = choices(now, decision, app.values.as_ref(), app.sort);
         let room = usize::from(inner.height).saturating_sub(2);
@@ -114,7 +115,7 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
         ),
         Span::styled(bar(p, width), if choice.chosen { THEME.chosen } else { THEME.bar }),
         Span::styled(format!(" {:>6}", number(choice.q)), style),
-        Span::styled(format!(" {:>6}", number(choice.advantage)), good),
+        Span::styled(format!(" {:>9}", choice.advantage.map_or_else(|| "-".into(), |a| format!("{a:+.2}"))), good),
     ])
 }
 
@@ -158,7 +159,8 @@ fn column(step: usize, steps: usize, room: usize) -> usize {
 }
 
 fn spark(name: &str, beats: &[Beat], at: u32, of: Curve<'_>, area: Rect, buf: &mut Buffer) {
-    const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    // Never a whole cell: the curve above keeps its own ground.
+    const LEVELS: [char; 7] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇'];
     let found: Vec<f32> = beats.iter().filter_map(of).collect();
     let (low, high) = found.iter().fold((f32::MAX, f32::MIN), |(low, high), &x| (low.min(x), high.max(x)));
     let label = if found.is_empty() { format!("{name:<9}") } else { format!("{name:<9}{low:>5.2} to {high:.2}") };
@@ -166,11 +168,11 @@ fn spark(name: &str, beats: &[Beat], at: u32, of: Curve<'_>, area: Rect, buf: &m
     let room = usize::from(area.width).saturating_sub(LABEL);
     for (step, beat) in beats.iter().enumerate() {
         let Some(x) = of(beat) else { continue };
-        let level = if high > low { ((x - low) / (high - low) * 7.0).round() as usize } else { 3 };
+        let level = if high > low { ((x - low) / (high - low) * 6.0).round() as usize } else { 3 };
         let x = area.x + LABEL as u16 + column(step, beats.len(), room) as u16;
         let style = if step as u32 + 1 == at { THEME.chosen } else { THEME.bar };
         if x < area.right() {
-            buf[(x, area.y)].set_char(LEVELS[level.min(7)]).set_style(style);
+            buf[(x, area.y)].set_char(LEVELS[level.min(6)]).set_style(style);
         }
     }
     debug_assert!(name.width() < LABEL);

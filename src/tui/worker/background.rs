@@ -10,15 +10,16 @@ use crate::domain::{Heading, Scene, World};
 use crate::run::chain::Draws;
 use crate::run::landscape::{Landscape, survey};
 use crate::tui::chained::Chained;
+use crate::tui::policies::{Loaded, Who};
 
 /// Finished surveys by who was asked, what it was told, and the house without the agent.
 pub(super) type Surveys = Arc<Mutex<HashMap<(Who, String, String), Arc<Landscape>>>>;
 
-/// A policy's name and its checkpoint's hash.
-type Who = (String, Option<String>);
-
 /// The policy that worked in the background last: loading one takes a while.
 pub(super) type Spare = Arc<Mutex<Option<(Who, Box<dyn Policy>)>>>;
+
+/// What is known of the chain, by each policy that followed it.
+pub(super) type Followed = Arc<Mutex<HashMap<Who, Chained>>>;
 
 /// Work on a thread of its own, one at a time.
 #[derive(Default)]
@@ -73,7 +74,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         let (told, step) = (self.engine.instruction().to_string(), self.engine.tree().at());
         let house = &self.engine.rollout().house;
         let (scene, world) = (house.scene().clone(), house.world().clone());
-        let key = (self.who(), told.clone(), without_agent(&scene, &world).digest());
+        let key = (self.engine.who(), told.clone(), without_agent(&scene, &world).digest());
         let known = self.surveys.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
         if let Some(known) = known {
             return (self.tell)(Report::Surveyed(known, step));
@@ -105,16 +106,11 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         true
     }
 
-    fn who(&self) -> Who {
-        let author = self.engine.author();
-        (author.policy.clone(), author.checkpoint.clone())
-    }
-
     /// A policy like the one that acts, for work beside the episode: the one that worked before, or a new one.
     fn spare_policy(&mut self) -> anyhow::Result<Box<dyn Policy>> {
         let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).take();
         match spare {
-            Some((who, mut policy)) if who == self.who() => {
+            Some((who, mut policy)) if who == self.engine.who() => {
                 policy.set_sampling(false);
                 Ok(policy)
             }
@@ -127,25 +123,46 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         }
     }
 
-    /// Follows the chain in the background; with `draws`, also which link breaks.
-    pub(super) fn follow(&mut self, draws: Option<Draws>) -> bool {
+    /// Follows the chain in the background, by the policy that acts or another; with `draws`, also which link breaks.
+    pub(super) fn follow(&mut self, rival: Option<Loaded>, draws: Option<Draws>) -> bool {
         let Some(chain) = self.chain.clone() else {
             return (self.tell)(Report::Refused(
                 "there is no chain yet: type one (chain A; B; ...), or chain alone".into(),
             ));
         };
-        let policy = match self.spare_policy() {
-            Ok(policy) => policy,
-            Err(error) => return self.refuse(&error),
-        };
-        let (tell, spare, who) = (self.tell.clone(), self.spare.clone(), self.who());
-        self.background.start(move |turn| {
-            let mut policy = policy;
-            let say = |report: Report| turn.say(|| tell(report));
-            if let Err(error) = Chained::work(&chain, policy.as_mut(), draws, &turn.stop, &say) {
-                say(Report::Refused(format!("{error:#}")));
+        let own = self.engine.who();
+        let mut runs = Vec::new();
+        if let Some(Loaded { policy, checkpoint }) = rival {
+            let who = Who { name: policy.name().to_string(), checkpoint };
+            if who == own {
+                return (self.tell)(Report::Refused(format!("{} acts already: name another", who.name)));
             }
-            *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((who, policy));
+            runs.push((who, policy));
+        }
+        // The one that acts goes first, unless it has been through the chain already.
+        if runs.is_empty() || !self.followed.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&own) {
+            match self.spare_policy() {
+                Ok(policy) => runs.insert(0, (own.clone(), policy)),
+                Err(error) => return self.refuse(&error),
+            }
+        }
+        let (tell, spare, followed) = (self.tell.clone(), self.spare.clone(), self.followed.clone());
+        self.background.start(move |turn| {
+            let say = |report: Report| turn.say(|| tell(report));
+            for (who, mut policy) in runs {
+                let known = followed.lock().unwrap_or_else(PoisonError::into_inner).get(&who).cloned();
+                let known = known.unwrap_or_else(|| Chained::new(&chain, who.clone()));
+                match known.work(&chain, policy.as_mut(), draws, &turn.stop, &say) {
+                    Ok(known) if known.as_one.is_some() => {
+                        followed.lock().unwrap_or_else(PoisonError::into_inner).insert(who.clone(), known);
+                    }
+                    Ok(_) => {}
+                    Err(error) => drop(say(Report::Refused(format!("{error:#}")))),
+                }
+                if who == own {
+                    *spare.lock().unwrap_or_else(PoisonError::into_inner) = Some((who, policy));
+                }
+            }
             say(Report::Working(None));
         });
         true

@@ -1,10 +1,10 @@
 //! What the screen asks of the worker.
 
-use crate::run::chain::Draws;
 use std::path::PathBuf;
 
 use super::Pace;
 use crate::domain::Action;
+use crate::run::chain::Draws;
 use crate::tui::breakpoints::Condition;
 use crate::tui::policies::PolicyKind;
 
@@ -60,6 +60,8 @@ pub enum Command {
     Chain(String),
     /// Which link of the last chain breaks, with so many draws of all links or one.
     WhichLink(Draws),
+    /// The last chain once more, by another policy: the expert, chance, or a checkpoint by name or number.
+    Against(String),
     /// Stop work in the background.
     Stop,
     /// Write what was explored as a run, into that folder or a new one.

@@ -19,7 +19,7 @@ use crate::run::chain::Chain;
 use crate::tui::breakpoints::Condition;
 use crate::tui::engine::Engine;
 use crate::tui::policies::PolicyKind;
-use background::{Background, Spare, Surveys};
+use background::{Background, Followed, Spare, Surveys};
 
 /// Starts the worker. `open` makes the engine on the worker's thread; reports go to `tell`, which says whether anybody still
 /// listens.
@@ -41,6 +41,7 @@ pub fn start(
             breaks: Vec::new(),
             until: None,
             chain: None,
+            followed: Followed::default(),
             surveys: Arc::default(),
             spare: Arc::default(),
             background: Background::default(),
@@ -62,6 +63,7 @@ struct Worker<T> {
     until: Option<Condition>,
     /// The chain that was followed last.
     chain: Option<Chain>,
+    followed: Followed,
     surveys: Surveys,
     spare: Spare,
     background: Background,

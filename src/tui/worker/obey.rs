@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
+use super::background::Followed;
 use super::{Command, Going, Report, Worker};
+use crate::run::chain::Chain;
 
 impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
     /// Carries out a command; false when nobody listens any more.
@@ -108,13 +110,27 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 let chain = self.engine.chain(&text);
                 match chain {
                     Ok(chain) => {
+                        // The same one again is another policy's turn, and what the others made of it stays.
+                        let is_known = |known: &Chain| known.links == chain.links && known.start == chain.start;
+                        if !self.chain.as_ref().is_some_and(is_known) {
+                            self.followed = Followed::default();
+                        }
                         self.chain = Some(chain);
-                        self.follow(None)
+                        self.follow(None, None)
                     }
                     Err(error) => self.refuse(&error),
                 }
             }
-            Command::WhichLink(draws) => self.follow(Some(draws)),
+            Command::WhichLink(draws) => self.follow(None, Some(draws)),
+            Command::Against(wanted) => {
+                (self.tell)(Report::Busy(Some(format!("loading {wanted}"))));
+                let rival = self.engine.rival(&wanted);
+                (self.tell)(Report::Busy(None));
+                match rival {
+                    Ok(rival) => self.follow(Some(rival), None),
+                    Err(error) => self.refuse(&error),
+                }
+            }
             Command::Stop => {
                 self.background.stop();
                 (self.tell)(Report::Working(None))

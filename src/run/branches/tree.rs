@@ -1,95 +1,8 @@
-//! Branches: everything that was tried from one start, as a tree of steps. One branch is in hand, at one of its steps; a step
-//! that was not taken there before grows a new branch, and the same step taken again follows the one that is there.
+//! The tree of steps itself.
 
-use std::sync::Arc;
-
-use super::episode::{Author, Episode, Step};
-use super::rollout::Rollout;
-use crate::agent::{Carried, Decision, Policy, Values};
-use crate::domain::World;
-use crate::house::grading::Grader;
-
-/// A state with everything that decides what follows from it.
-#[derive(Clone, Debug)]
-pub struct Moment {
-    /// The house.
-    pub world: Arc<World>,
-    /// How far the task is.
-    pub grader: Option<Grader>,
-    /// After how many steps the episode ends.
-    pub horizon: Option<u32>,
-    /// What the agent is told.
-    pub instruction: String,
-    /// Who decides.
-    pub author: Author,
-    /// What the policy carries.
-    pub carried: Carried,
-}
-
-impl Moment {
-    /// The present state of a rollout.
-    pub fn of(rollout: &Rollout, author: &Author, carried: Carried) -> Moment {
-        Moment {
-            world: Arc::new(rollout.house.world().clone()),
-            grader: rollout.grader.clone(),
-            horizon: rollout.horizon,
-            instruction: rollout.instruction.clone(),
-            author: author.clone(),
-            carried,
-        }
-    }
-
-    /// Brings a rollout to this state, `steps` into the episode.
-    pub fn restore(&self, rollout: &mut Rollout, steps: u32) {
-        rollout.instruction.clone_from(&self.instruction);
-        rollout.horizon = self.horizon;
-        rollout.resume((*self.world).clone(), self.grader.clone(), steps);
-    }
-}
-
-/// Frames that a trained agent looks back on, the present one included.
-pub const FRAMES: usize = 5;
-
-/// Lets a policy begin in the middle of an episode as if it had been there all along: it looks at the states before this one
-/// (`before`, the newest first), `now` steps into the episode.
-pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout, before: &[Moment], now: u32) {
-    policy.begin(author.seed);
-    policy.set_sampling(author.samples);
-    if before.is_empty() {
-        return;
-    }
-    let present = Moment::of(rollout, author, Carried::Nothing);
-    for (back, moment) in before.iter().enumerate().take(FRAMES - 1).rev() {
-        moment.restore(rollout, now.saturating_sub(back as u32 + 1));
-        // What it would have done is of no interest here; an expert may not even know.
-        let _ = rollout.decide(policy);
-    }
-    present.restore(rollout, now);
-}
-
-/// A step that was taken.
-#[derive(Clone, Debug)]
-pub struct Taken {
-    /// What was decided, and the mind behind it.
-    pub decision: Decision,
-    /// What was recorded of it; `told` and `by` are left out, they follow from the neighbours.
-    pub step: Step,
-    /// What the agent was told.
-    pub instruction: Arc<str>,
-    /// Who chose.
-    pub author: Author,
-    /// What the critics made of the state before it.
-    pub values: Option<Values>,
-}
-
-impl Taken {
-    /// Whether another step is the same choice: then it led to the same state.
-    fn is_same(&self, other: &Taken) -> bool {
-        self.decision.action == other.decision.action
-            && self.instruction == other.instruction
-            && self.author == other.author
-    }
-}
+use super::moment::Moment;
+use super::taken::Taken;
+use crate::agent::Carried;
 
 /// A state's place in the tree.
 pub type Place = usize;
@@ -213,36 +126,6 @@ impl Tree {
         line.into_iter().map(|place| (&self.twigs[place].moment, self.twigs[place].taken.as_ref())).collect()
     }
 
-    /// A branch as an episode of a run. Who chose is written where it changes, and at its first step.
-    pub fn episode(&self, branch: usize, task: &str) -> Episode {
-        let story = self.story(branch);
-        let start = story.first().map(|(moment, _)| *moment);
-        let mut told = start.map_or("", |start| start.instruction.as_str());
-        let mut by: Option<&Author> = None;
-        let mut trace = Vec::new();
-        for taken in story.iter().filter_map(|(_, taken)| *taken) {
-            let mut step = taken.step.clone();
-            step.told = (*taken.instruction != *told).then(|| taken.instruction.to_string());
-            step.by = (by != Some(&taken.author)).then(|| taken.author.clone());
-            (told, by) = (&taken.instruction, Some(&taken.author));
-            trace.push(step);
-        }
-        let completed = trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let of = start.and_then(|start| start.grader.as_ref()).map_or(0, |grader| grader.total() as u32);
-        Episode {
-            task: task.into(),
-            seed: 0,
-            start_hash: start.map_or_else(String::new, |start| start.world.digest()),
-            instruction: start.map_or_else(String::new, |start| start.instruction.clone()),
-            completed,
-            of,
-            success: of > 0 && completed == of,
-            steps: trace.len() as u32,
-            trace,
-            ..Episode::default()
-        }
-    }
-
     /// Every branch.
     pub fn branches(&self) -> &[Branch] {
         &self.branches
@@ -353,9 +236,13 @@ impl Tree {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::domain::{Action, ActionType};
+    use crate::agent::Decision;
+    use crate::domain::{Action, ActionType, World};
     use crate::house::Outcome;
+    use crate::run::episode::{Author, Step};
 
     fn moment(x: i16) -> Moment {
         let mut world = World::default();

@@ -1,0 +1,36 @@
+//! A branch as it is written down: as an episode of a run.
+
+use super::tree::Tree;
+use crate::run::episode::{Author, Episode};
+
+impl Tree {
+    /// A branch as an episode of a run. Who chose is written where it changes, and at its first step.
+    pub fn episode(&self, branch: usize, task: &str) -> Episode {
+        let story = self.story(branch);
+        let start = story.first().map(|(moment, _)| *moment);
+        let mut told = start.map_or("", |start| start.instruction.as_str());
+        let mut by: Option<&Author> = None;
+        let mut trace = Vec::new();
+        for taken in story.iter().filter_map(|(_, taken)| *taken) {
+            let mut step = taken.step.clone();
+            step.told = (*taken.instruction != *told).then(|| taken.instruction.to_string());
+            step.by = (by != Some(&taken.author)).then(|| taken.author.clone());
+            (told, by) = (&taken.instruction, Some(&taken.author));
+            trace.push(step);
+        }
+        let completed = trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
+        let of = start.and_then(|start| start.grader.as_ref()).map_or(0, |grader| grader.total() as u32);
+        Episode {
+            task: task.into(),
+            seed: 0,
+            start_hash: start.map_or_else(String::new, |start| start.world.digest()),
+            instruction: start.map_or_else(String::new, |start| start.instruction.clone()),
+            completed,
+            of,
+            success: of > 0 && completed == of,
+            steps: trace.len() as u32,
+            trace,
+            ..Episode::default()
+        }
+    }
+}
