@@ -176,7 +176,14 @@ mod tests {
         }
     }
 
-    const IQL: Iql = Iql { discount: 0.9, expectile: 0.7, temperature: 3.0, weight_cap: 100.0, target_rate: 0.05, warmup_share: 0.0 };
+    const IQL: Iql = Iql {
+        discount: 0.9,
+        expectile: 0.7,
+        temperature: 3.0,
+        weight_cap: 100.0,
+        target_rate: 0.05,
+        warmup_share: 0.0,
+    };
 
     fn optimisation(steps: u64) -> Optimisation {
         Optimisation {
@@ -325,7 +332,8 @@ mod tests {
                 iql,
                 1,
             );
-            let mut update = Update::new((&nets.policy, &nets.store), critic.then_some(learner), None, optimisation(8), 1);
+            let mut update =
+                Update::new((&nets.policy, &nets.store), critic.then_some(learner), None, optimisation(8), 1);
             let batch = Batch { base: transitions(&CHAIN_OF_TWO), pairs: None };
             let losses = (0..8).map(|_| update.update(&batch, false).unwrap()["action_loss"]);
             losses.collect::<Vec<f64>>()

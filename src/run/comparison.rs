@@ -152,10 +152,10 @@ impl Paired {
             table(["measure", "first", "second", "difference", "95 % interval"], rows)
         );
         text += &format!(
-            "McNemar: p {} ({} only in the first, {} only in the second).\n",
+            "McNemar: p {} (tasks solved more often in the first: {}, in the second: {}).\n",
             p(self.mcnemar_p),
-            self.regressions.len(),
-            self.fixes.len()
+            self.leaning[0],
+            self.leaning[1]
         );
         for (title, changes) in [("Regressions", &self.regressions), ("Fixes", &self.fixes)] {
             if !changes.is_empty() {
