@@ -154,10 +154,12 @@ mod tests {
     }
 
     #[test]
-    fn the_shipped_agent_loads() {
-        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first"));
-        let config = Config::read(folder).unwrap();
-        assert!(Networks::load(folder, &config, Device::Cpu).unwrap().critic.is_none());
+    fn the_shipped_agents_load() {
+        for (name, judges) in [("first", false), ("sprint", true)] {
+            let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
+            let config = Config::read(&folder).unwrap();
+            assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), judges);
+        }
     }
 
     #[test]

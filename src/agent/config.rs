@@ -54,7 +54,7 @@ pub struct Provenance {
     pub preset: String,
     /// The digest of the trajectories it was trained on.
     pub dataset: String,
-    /// How many trajectories those were.
+    /// How many of those were not held out.
     pub trajectories: u64,
     /// The seed of initialisation and data order.
     pub seed: u64,

@@ -1,6 +1,6 @@
 //! Pretraining: visual encoder, feature maps, sentences, policy; each stage can be stopped and taken up again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -119,8 +119,9 @@ impl Pretraining {
             return Ok(Trained::Stopped);
         };
         let resnet18 = networks.eyes.store().is_none().then(|| encoder.digest().to_owned());
+        let learned_from: BTreeSet<u32> = items.training.iter().map(|span| span.trajectory).collect();
         let config = |steps: u64| -> anyhow::Result<Config> {
-            let config = self.config(&digest, footage.trajectories.len() as u64, steps)?;
+            let config = self.config(&digest, learned_from.len() as u64, steps)?;
             let words = words.as_ref().map(|words| words.words().to_vec());
             Ok(Config { words, resnet18: resnet18.clone(), ..config })
         };
