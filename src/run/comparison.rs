@@ -46,7 +46,7 @@ pub struct Standing {
 
 impl Comparison {
     /// The format version this program writes.
-    pub const FORMAT: u32 = 1;
+    pub const FORMAT: u32 = 2;
 
     /// Compares every further run with the first; with it comes each run's summary.
     ///
