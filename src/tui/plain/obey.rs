@@ -96,17 +96,17 @@ impl Plain {
             }
             Verb::Branch(wanted) => {
                 self.engine.switch(self.engine.branch(&wanted)?)?;
-                here(&mut self.engine, out)?;
+                here(&self.engine, out)?;
             }
             Verb::NextBranch => {
                 let next = (self.engine.tree().branch() + 1) % self.engine.tree().branches().len();
                 self.engine.switch(next)?;
-                here(&mut self.engine, out)?;
+                here(&self.engine, out)?;
             }
-            Verb::Branches => branches(&mut self.engine, out)?,
+            Verb::Branches => branches(&self.engine, out)?,
             Verb::Name(name) => {
                 self.engine.rename(self.engine.tree().branch(), &name)?;
-                here(&mut self.engine, out)?;
+                here(&self.engine, out)?;
             }
             Verb::Diverge(wanted) => divergence(&self.engine.divergence(self.engine.branch(&wanted)?), out)?,
             Verb::Compare(other) => self.compare(other, out)?,
