@@ -44,8 +44,8 @@ pub fn damaged(input: &[u8], other: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
             5 | 6 => number(&bytes, rng).unwrap_or_else(|| flip(bytes, other, rng)),
             _ => flip(bytes, other, rng),
         };
+        bytes.truncate(LONGEST);
     }
-    bytes.truncate(LONGEST);
     bytes
 }
 
@@ -116,7 +116,11 @@ fn change(document: &mut Value, rng: &mut ChaCha8Rng) {
             match rng.random_range(0..3) {
                 0 => drop(items.remove(at)),
                 1 => items.insert(at, items[at].clone()),
-                _ => (0..rng.random_range(1..300)).for_each(|_| items.push(items[at].clone())),
+                _ => {
+                    let size = items[at].to_string().len().max(1);
+                    let more = rng.random_range(1..300).min(LONGEST / size);
+                    (0..more).for_each(|_| items.push(items[at].clone()));
+                }
             }
         }
         (0 | 1, Value::Object(fields)) if !fields.is_empty() => {
@@ -126,7 +130,9 @@ fn change(document: &mut Value, rng: &mut ChaCha8Rng) {
                 fields.insert("colour".into(), field.unwrap_or_default());
             }
         }
-        (2, Value::String(text)) => *text = text.repeat(rng.random_range(2..3000)),
+        (2, Value::String(text)) => {
+            *text = text.repeat(rng.random_range(2..3000).min(LONGEST / text.len().max(1)));
+        }
         (3, value) => *value = twin.unwrap_or_default(),
         (4, value) => *value = json!(TEXTS.choose(rng)),
         (5, value) => {
