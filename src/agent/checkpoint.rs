@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::Context;
 use tch::{Device, Tensor, nn};
 
 use super::config::Config;
@@ -101,7 +100,6 @@ impl Networks {
     /// # Errors
     /// When the folder cannot be written to.
     pub fn save(&self, folder: &Path, config: &Config) -> anyhow::Result<()> {
-        std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
         weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
         json::write_pretty(&folder.join("config.json"), config)
     }

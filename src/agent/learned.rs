@@ -156,7 +156,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::agent::config::{Ontology, Provenance, SentenceSpec};
+    use crate::agent::config::tests::small;
     use crate::domain::SkillKind;
     use crate::house::grading::{Grader, Grading};
     use crate::house::testing::{kitchen_house, role, subtask};
@@ -164,7 +164,6 @@ mod tests {
     use crate::nets::embedding_cache::Embedder;
     use crate::nets::policy::PolicySpec;
     use crate::nets::sentence::{SentenceEncoder, default_folder};
-    use crate::nets::visual::VisualSpec;
 
     /// A fresh agent with a critic; nothing where there is no sentence encoder.
     fn agent(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
@@ -175,22 +174,9 @@ mod tests {
         }
         let embedder = Embedder::new(SentenceEncoder::load(&folder, Device::Cpu).unwrap(), None);
         let embedding = embedder.encoder().width() as i64;
+        let small = small();
         let config = Config {
-            format_version: Config::FORMAT,
-            ontology: Ontology::current(),
-            visual: Some(VisualSpec { input: 112, channels: [4; 4] }),
-            resnet18: None,
-            method: None,
-            words: None,
-            policy: PolicySpec {
-                history: 5,
-                embedding,
-                channels: [4; 4],
-                hidden: vec![8],
-                dropout: 0.2,
-                goal,
-                attention: None,
-            },
+            policy: PolicySpec { embedding, goal, ..small.policy },
             critic: Some(CriticSpec {
                 channels: [4; 4],
                 hidden: vec![8],
@@ -199,15 +185,7 @@ mod tests {
                 object_embedding: 4,
                 shared_trunk: true,
             }),
-            sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
-            provenance: Provenance {
-                preset: "test".into(),
-                dataset: "none".into(),
-                trajectories: 0,
-                seed: 1,
-                visual_steps: 0,
-                policy_steps: 0,
-            },
+            ..small
         };
         let networks =
             Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);

@@ -103,7 +103,7 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Equations 5 and 6 over all parts.
+    /// The losses of V and both Q, averaged part by part and weighed.
     pub fn loss(&self, parts: &[Part], terms: &mut Terms) -> Tensor {
         let value = iql::value_loss(&self.judgement.value, &self.target_q, self.expectile);
         let [one, other] = [0, 1].map(|k| iql::q_loss(&self.judgement.q[k], &self.bootstrap));

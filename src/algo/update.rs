@@ -185,6 +185,17 @@ mod tests {
         warmup_share: 0.0,
     };
 
+    const CHAINING: Chaining = Chaining {
+        pairs: Source::Pool(1),
+        batch: 4,
+        cut: Cut::Uniform,
+        worth: Worth::NextValue,
+        clip: true,
+        weight: 1.0,
+        chain: 0.5,
+        aggregate: 0.5,
+    };
+
     fn optimisation(steps: u64) -> Optimisation {
         Optimisation {
             steps,
@@ -194,12 +205,12 @@ mod tests {
         }
     }
 
-    fn update<'a>(nets: &'a Nets, steps: u64, chaining: Option<Chaining>) -> Update<'a> {
+    fn update<'a>(nets: &'a Nets, steps: u64, iql: Iql, chaining: Option<Chaining>) -> Update<'a> {
         let critic = CriticLearner::new(
             (&nets.online.0, &nets.online.1),
             (&nets.target.0, &nets.target.1),
             optimisation(steps),
-            IQL,
+            iql,
             1,
         );
         Update::new((&nets.policy, &nets.store), Some(critic), chaining, optimisation(steps), 1)
@@ -233,6 +244,17 @@ mod tests {
         }
     }
 
+    /// Two skills of one step, A from 0 to 1 and B from 1 to 2, by themselves and chained; "A. B." is text 2.
+    fn chained_skills() -> Batch {
+        let (a, b) = ((0, 0, 0, 1, 1.0), (1, 1, 0, 2, 1.0));
+        let many = |row| transitions(&[row; 4]);
+        let base: Vec<_> = [a, b].into_iter().cycle().take(8).collect();
+        let first = Transitions { told: say(&[1; 4]), ..many(a) };
+        let cut = first.terminal.shallow_clone();
+        let joint = Some((say(&[2; 4]), Transitions { told: say(&[2; 4]), ..many(b) }));
+        Batch { base: transitions(&base), pairs: Some(Pairs { first, cut, joint }) }
+    }
+
     /// The chain: action 0 leads from state 0 to state 1 and from there to the end, action 1 back to state 0.
     const CHAIN_OF_TWO: [(i64, i64, i64, i64, f32); 4] =
         [(0, 0, 0, 1, 0.0), (0, 0, 1, 0, 0.0), (1, 0, 0, 2, 1.0), (1, 0, 1, 0, 0.0)];
@@ -258,7 +280,7 @@ mod tests {
         // Many rows: over few, the running variance of a batch norm is larger than the batch's own by n / (n - 1).
         let rows: Vec<_> = CHAIN_OF_TWO.into_iter().cycle().take(64).collect();
         let batch = Batch { base: transitions(&rows), pairs: None };
-        let mut update = update(&nets, 800, None);
+        let mut update = update(&nets, 800, IQL, None);
         while !update.is_done() {
             update.update(&batch, false).unwrap();
         }
@@ -282,31 +304,11 @@ mod tests {
     #[test]
     fn chaining_carries_the_worth_of_the_second_skill_to_the_first() {
         let _chance = crate::nets::testing::chance();
-        // A: 0 to 1. B: 1 to 2. "A. B." is text 2.
-        let (a, b) = ((0, 0, 0, 1, 1.0), (1, 1, 0, 2, 1.0));
-        let chaining = Chaining {
-            pairs: Source::Pool(1),
-            batch: 4,
-            cut: Cut::Uniform,
-            worth: Worth::NextValue,
-            clip: true,
-            weight: 1.0,
-            chain: 0.5,
-            aggregate: 0.5,
-        };
         let nets = nets();
-        let mut update = update(&nets, 300, Some(chaining));
-        let many = |row| transitions(&[row; 4]);
-        let batch = || {
-            let base: Vec<_> = [a, b].into_iter().cycle().take(8).collect();
-            let first = Transitions { told: say(&[1; 4]), ..many(a) };
-            let cut = first.terminal.shallow_clone();
-            let joint = Some((say(&[2; 4]), Transitions { told: say(&[2; 4]), ..many(b) }));
-            Batch { base: transitions(&base), pairs: Some(Pairs { first, cut, joint }) }
-        };
+        let mut update = update(&nets, 300, IQL, Some(CHAINING));
         let mut numbers = BTreeMap::new();
         while !update.is_done() {
-            numbers = update.update(&batch(), true).unwrap();
+            numbers = update.update(&chained_skills(), true).unwrap();
         }
         let values = nets.online.0.value(&look(&[0, 0, 1]), &say(&[1, 2, 2]));
         for i in 0..3 {
@@ -322,32 +324,30 @@ mod tests {
     #[test]
     fn while_the_critic_warms_up_the_policy_clones_the_demonstrated_skills_alone() {
         let _chance = crate::nets::testing::chance();
+        let warming = || Iql { warmup_share: 0.6, ..IQL };
         let one = |critic: bool| {
             let nets = nets();
-            let iql = Iql { warmup_share: 0.6, ..IQL };
-            let learner = CriticLearner::new(
-                (&nets.online.0, &nets.online.1),
-                (&nets.target.0, &nets.target.1),
-                optimisation(8),
-                iql,
-                1,
-            );
-            let mut update =
-                Update::new((&nets.policy, &nets.store), critic.then_some(learner), None, optimisation(8), 1);
+            let mut update = match critic {
+                true => update(&nets, 8, warming(), None),
+                false => Update::new((&nets.policy, &nets.store), None, None, optimisation(8), 1),
+            };
             let batch = Batch { base: transitions(&CHAIN_OF_TWO), pairs: None };
-            let losses = (0..8).map(|_| update.update(&batch, false).unwrap()["action_loss"]);
-            losses.collect::<Vec<f64>>()
+            (0..8).map(|_| update.update(&batch, false).unwrap()["action_loss"]).collect::<Vec<f64>>()
         };
         let (with, without) = (one(true), one(false));
         assert_eq!(with[..5], without[..5]);
         assert!(with[5] != without[5], "{with:?} {without:?}");
+        let nets = nets();
+        let mut update = update(&nets, 8, warming(), Some(CHAINING));
+        let mut clones = || update.update(&chained_skills(), false).unwrap().contains_key("chain_action_loss");
+        assert_eq!([0; 8].map(|_| clones()), [false, false, false, false, false, true, true, true]);
     }
 
     #[test]
     fn a_loss_that_is_no_number_is_named_and_changes_nothing() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();
-        let mut update = update(&nets, 10, None);
+        let mut update = update(&nets, 10, IQL, None);
         let mut base = transitions(&CHAIN_OF_TWO);
         update.update(&Batch { base: transitions(&CHAIN_OF_TWO), pairs: None }, false).unwrap();
         let before: Tensors = update.state().into_iter().map(|(name, tensor)| (name, tensor.copy())).collect();

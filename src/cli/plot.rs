@@ -1,8 +1,7 @@
 //! `sprint plot`: draws the curves of trainings.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 
 use super::Ending;
@@ -41,9 +40,7 @@ impl PlotCurves {
         for file in files {
             let is_svg = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
             let bytes = if is_svg { plot.svg().into_bytes() } else { plot.png()? };
-            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-            whole::write(&folder.join(file.file_name().unwrap_or_default()), &bytes)?;
+            whole::write(&file, &bytes)?;
             println!("{}", file.display());
         }
         Ok(Ending::Ok)

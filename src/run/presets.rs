@@ -179,6 +179,9 @@ impl Preset {
             anyhow::ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
             attention.check(self.policy.embedding).context("policy")?;
         }
+        if let Some(share) = self.iql.as_ref().map(|iql| iql.warmup_share) {
+            anyhow::ensure!((0.0..=1.0).contains(&share), "iql.warmup_share is {share}, which is not a share");
+        }
         let Some(chaining) = &self.chaining else { return Ok(()) };
         anyhow::ensure!(self.critic.is_some(), "chaining needs a critic");
         anyhow::ensure!(chaining.batch > 0, "chaining.batch is 0");
@@ -288,6 +291,7 @@ mod tests {
         refused("critic = false\niql = false", "chaining needs a critic");
         refused("[policy]\ngoal = [4, 4, 4, 4]", "goals have none");
         refused("[chaining]\nbatch = 0", "chaining.batch");
+        refused("[iql]\nwarmup_share = 3000.0", "iql.warmup_share");
         refused("eyes = \"ears\"", "resnet18");
     }
 }

@@ -37,6 +37,11 @@ const PATIENCE: u32 = 2;
 const SLACK: u32 = 8;
 
 impl Chain {
+    /// Whether both are the same instructions from the same state.
+    pub fn is_same(&self, other: &Chain) -> bool {
+        self.links == other.links && self.start == other.start
+    }
+
     fn house(&self, world: &World) -> House {
         House::new(self.scene.clone(), world.clone())
     }

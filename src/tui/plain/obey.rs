@@ -119,7 +119,7 @@ impl Plain {
             }
             Verb::Chain(text) => {
                 let chain = self.engine.chain(&text)?;
-                if !self.chain.as_ref().is_some_and(|known| known.links == chain.links && known.start == chain.start) {
+                if !self.chain.as_ref().is_some_and(|known| known.is_same(&chain)) {
                     self.followed.clear();
                 }
                 self.chain = Some(chain);

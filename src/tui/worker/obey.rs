@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use super::background::Followed;
 use super::{Command, Going, Report, Worker};
-use crate::run::chain::Chain;
 
 impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
     /// Carries out a command; false when nobody listens any more.
@@ -111,8 +110,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 match chain {
                     Ok(chain) => {
                         // The same one again is another policy's turn, and what the others made of it stays.
-                        let is_known = |known: &Chain| known.links == chain.links && known.start == chain.start;
-                        if !self.chain.as_ref().is_some_and(is_known) {
+                        if !self.chain.as_ref().is_some_and(|known| known.is_same(&chain)) {
                             self.followed = Followed::default();
                         }
                         self.chain = Some(chain);
