@@ -118,6 +118,9 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     let seeing = sprint.run("pretrain D --preset l-bc --out other --visual-from agent");
     assert_eq!(seeing.code, Some(1));
     assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
+    assert!(!sprint.path("other").exists(), "a refused training left something behind");
+    let trying = sprint.run("pretrain D --preset tiny.toml --out other --trials nowhere.json");
+    assert!(trying.stderr.contains("nowhere.json") && !sprint.path("other").exists(), "{}", trying.stderr);
 }
 
 #[test]
@@ -127,12 +130,12 @@ fn an_agent_that_sees_through_resnet18_needs_the_weights_it_was_trained_on() {
     let without = sprint.run("pretrain D --preset resnet.toml --out agent");
     assert_eq!(without.code, Some(1));
     assert!(without.stderr.contains("convert_resnet18.py"), "{}", without.stderr);
-    std::fs::remove_dir_all(sprint.path("agent")).unwrap();
+    assert!(!sprint.path("agent").exists(), "a refused training left something behind");
     write_resnet18(&file, 0.01);
     let eyes = sprint.run("pretrain D --preset resnet.toml --out agent --visual-from other");
     assert_eq!(eyes.code, Some(1));
     assert!(eyes.stderr.contains("no visual encoder to take"), "{}", eyes.stderr);
-    std::fs::remove_dir_all(sprint.path("agent")).unwrap();
+    assert!(!sprint.path("agent").exists(), "a refused training left something behind");
     done(&sprint, "pretrain D --preset resnet.toml --out agent");
     let card = sprint.read("agent/README.md");
     assert!(card.contains("ResNet-18") && !card.contains("of the visual encoder"), "{card}");

@@ -1,6 +1,9 @@
 //! Pretraining: visual encoder, feature maps, sentences, policy; each stage can be stopped and taken up again.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod beginning;
+mod description;
+
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,23 +16,18 @@ use super::encoding;
 use super::events::Events;
 use super::footage::Footage;
 use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
-use super::presets::{Preset, Sight};
+use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
 use super::trainer::Trainer;
 use super::trials::{self, Trials};
-use super::visual_training;
-use crate::agent::checkpoint::Networks;
-use crate::agent::config::{Config, Ontology, Provenance, SentenceSpec};
+use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
 use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
 use crate::data::items::{Composites, Items, Source};
 use crate::data::summaries::Summaries;
-use crate::data::whole;
 use crate::language::vocabulary::Vocabulary;
-use crate::nets::eyes::Eyes;
-use crate::nets::visual::VisualSpec;
 
 /// What to train, on what, into where.
 pub struct Pretraining {
@@ -80,23 +78,21 @@ impl Pretraining {
             "{} holds a training already: use --resume, or another folder",
             self.out.display()
         );
+        // What can be refused is refused before the folder is touched.
+        let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+        let footage = Footage::open(&datasets)?;
+        let networks = self.networks()?;
+        let trials =
+            self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
         std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
         let mut report = Events::open(&training, &mut report)?;
-        let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
-        let footage = Footage::open(&datasets)?;
-        tch::manual_seed(self.preset.seed as i64);
-        let Preset { policy, critic, .. } = &self.preset;
-        let networks = Networks::new(self.eyes()?, policy, critic.as_ref(), self.device);
         if !self.train_visual(&networks, &footage, &mut report, stop)? {
             return Ok(Trained::Stopped);
         }
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
         let digest = digests.join("-");
-        if let Some(folder) = &self.policy_from {
-            self.start_from(folder, &networks)?;
-        }
         let encoder = networks.eyes.frozen()?;
         let Some(features) = encoding::features(&*encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
@@ -139,8 +135,6 @@ impl Pretraining {
             (self.preset.seed, self.preset.training.batch),
             self.device,
         );
-        let trials =
-            self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
         let mut saved: Option<u64> = None;
         let mut keep = |step, scalars: &mut Scalars| -> anyhow::Result<()> {
             networks.save(&self.out, &config(step)?)?;
@@ -196,110 +190,6 @@ impl Pretraining {
         Summaries::read(&folders, self.preset.data.labels_of.as_deref())
     }
 
-    /// What a saved state belongs to.
-    fn identity(&self, encoder: &str, data: &str, config: &Config) -> BTreeMap<String, String> {
-        [
-            ("format_version", "1".to_string()),
-            ("dataset", data.to_string()),
-            ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
-            ("visual_encoder", encoder.to_string()),
-            ("sentence_encoder", config.sentence_encoder.digest.clone()),
-            ("embedding", config.policy.embedding.to_string()),
-            ("seed", self.preset.seed.to_string()),
-        ]
-        .map(|(name, value)| (name.to_string(), value))
-        .into()
-    }
-
-    /// Begins with a checkpoint's policy, and with its critic where both have one of the same size.
-    fn start_from(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
-        let (config, given) = self.given(folder)?;
-        let file = folder.join("config.json");
-        let (found, own) = (&config.policy, &self.preset.policy);
-        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
-        let own = self.config("", 0, 0)?.sentence_encoder;
-        let found = &config.sentence_encoder;
-        anyhow::ensure!(
-            found.digest == own.digest,
-            "{}: sentence_encoder is {} ({}), this training's is {} ({})",
-            file.display(),
-            found.name,
-            found.digest,
-            own.name,
-            own.digest
-        );
-        copy(&given.policy_store, "", &networks.policy_store)?;
-        if config.critic == self.preset.critic
-            && let (Some(given), Some(own)) = (&given.critic, &networks.critic)
-        {
-            copy(&given.online_store, "", &own.online_store)?;
-        }
-        Ok(())
-    }
-
-    /// A training goes on only with the preset it began with.
-    fn keep_preset(&self) -> anyhow::Result<()> {
-        let path = self.out.join("training/preset.toml");
-        let text = toml::to_string(&self.preset)?;
-        match std::fs::read_to_string(&path) {
-            Ok(begun) if begun == text => Ok(()),
-            Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
-            Err(_) => whole::write(&path, text.as_bytes()),
-        }
-    }
-
-    fn train_visual(
-        &self,
-        networks: &Networks,
-        footage: &Footage,
-        report: &mut dyn Report,
-        stop: &AtomicBool,
-    ) -> anyhow::Result<bool> {
-        let Eyes::House { store: own, .. } = &networks.eyes else {
-            anyhow::ensure!(
-                self.visual_from.is_none(),
-                "the preset's eyes are ResNet-18: there is no visual encoder to take"
-            );
-            return Ok(true);
-        };
-        if let Some(folder) = &self.visual_from {
-            let given = self.given(folder)?.1.eyes;
-            copy(given.store().context("its eyes are no House encoder")?, "", own)?;
-            return Ok(true);
-        }
-        let state = self.out.join("training/visual.safetensors");
-        // The heads live in a store of their own shape, so the trained encoder is copied out of it.
-        let mut store = tch::nn::VarStore::new(self.device);
-        let encoder = crate::nets::visual::VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
-        let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
-        store.freeze();
-        copy(&store, "encoder.", own)?;
-        Ok(finished)
-    }
-
-    /// What the agent will see through: a House encoder with fresh weights, or ResNet-18.
-    fn eyes(&self) -> anyhow::Result<Eyes> {
-        match self.preset.eyes {
-            Sight::House => Ok(Eyes::house(&self.preset.visual, self.device)),
-            Sight::ResNet18 => Eyes::resnet18(&Eyes::resnet18_file(), self.device),
-        }
-    }
-
-    /// The House encoder's size, where there is one.
-    fn visual(&self) -> Option<&VisualSpec> {
-        (self.preset.eyes == Sight::House).then_some(&self.preset.visual)
-    }
-
-    /// A checkpoint whose visual encoder is of the preset's kind and size.
-    fn given(&self, folder: &Path) -> anyhow::Result<(Config, Networks)> {
-        let config = Config::read(folder)?;
-        let file = folder.join("config.json");
-        let (found, own) = (config.visual.as_ref(), self.visual());
-        anyhow::ensure!(found == own, "{}: visual is {found:?}, the preset's is {own:?}", file.display());
-        let networks = Networks::load(folder, &config, self.device)?;
-        Ok((config, networks))
-    }
-
     fn embed(&self, texts: &[String], report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<Tensor>> {
         let mut rows = Vec::new();
         let mut embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -314,52 +204,4 @@ impl Pretraining {
         anyhow::ensure!(!rows.is_empty(), "no trajectory has an annotation");
         Ok(Some(Tensor::cat(&rows, 0)))
     }
-
-    fn config(&self, dataset: &str, trajectories: u64, policy_steps: u64) -> anyhow::Result<Config> {
-        let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-        anyhow::ensure!(
-            self.preset.policy.embedding == embedder.encoder().width() as i64 || self.preset.policy.attention.is_some(),
-            "the preset's policy.embedding is {}, the sentence encoder's width is {}",
-            self.preset.policy.embedding,
-            embedder.encoder().width()
-        );
-        Ok(Config {
-            format_version: Config::FORMAT,
-            ontology: Ontology::current(),
-            visual: self.visual().cloned(),
-            resnet18: None,
-            method: Some(self.preset.method().to_string()),
-            policy: self.preset.policy.clone(),
-            critic: self.preset.critic.clone(),
-            words: None,
-            sentence_encoder: SentenceSpec {
-                name: self.sentence_encoder.clone(),
-                digest: embedder.encoder().digest().to_string(),
-            },
-            provenance: Provenance {
-                preset: self.preset.name.clone(),
-                dataset: dataset.to_string(),
-                trajectories,
-                seed: self.preset.seed,
-                visual_steps: match (self.preset.eyes, &self.visual_from) {
-                    (Sight::ResNet18, _) => 0,
-                    (Sight::House, Some(folder)) => Config::read(folder)?.provenance.visual_steps,
-                    (Sight::House, None) => self.preset.visual_training.optimisation.steps,
-                },
-                policy_steps,
-            },
-        })
-    }
-}
-
-/// Copies the tensors of one store, those under `prefix`, over another's.
-fn copy(from: &tch::nn::VarStore, prefix: &str, to: &tch::nn::VarStore) -> anyhow::Result<()> {
-    let from = from.variables();
-    tch::no_grad(|| {
-        for (name, mut tensor) in to.variables() {
-            let name = format!("{prefix}{name}");
-            tensor.f_copy_(from.get(&name).with_context(|| format!("the tensor {name} is missing"))?)?;
-        }
-        Ok(())
-    })
 }

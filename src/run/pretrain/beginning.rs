@@ -1,0 +1,127 @@
+//! What a training begins with: fresh networks, or another checkpoint's.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::Context;
+use tch::nn::VarStore;
+
+use super::Pretraining;
+use crate::agent::checkpoint::Networks;
+use crate::agent::config::Config;
+use crate::nets::eyes::Eyes;
+use crate::nets::visual::VisualEncoder;
+use crate::run::footage::Footage;
+use crate::run::presets::Sight;
+use crate::run::progress::Report;
+use crate::run::visual_training;
+
+impl Pretraining {
+    /// The networks before their first step: fresh ones, with what other checkpoints were asked for.
+    pub(super) fn networks(&self) -> anyhow::Result<Networks> {
+        self.check_sentences()?;
+        tch::manual_seed(self.preset.seed as i64);
+        let networks = Networks::new(self.eyes()?, &self.preset.policy, self.preset.critic.as_ref(), self.device);
+        if let Some(folder) = &self.visual_from {
+            self.see_as(folder, &networks)?;
+        }
+        if let Some(folder) = &self.policy_from {
+            self.start_from(folder, &networks)?;
+        }
+        Ok(networks)
+    }
+
+    /// An episodic transformer embeds words by itself; all others are told what the sentence encoder makes of a text.
+    fn check_sentences(&self) -> anyhow::Result<()> {
+        let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        let (own, width) = (self.preset.policy.embedding, embedder.encoder().width());
+        anyhow::ensure!(
+            own == width as i64 || self.preset.policy.attention.is_some(),
+            "the preset's policy.embedding is {own}, the sentence encoder's width is {width}"
+        );
+        Ok(())
+    }
+
+    /// What the agent will see through: a House encoder with fresh weights, or ResNet-18.
+    fn eyes(&self) -> anyhow::Result<Eyes> {
+        match self.preset.eyes {
+            Sight::House => Ok(Eyes::house(&self.preset.visual, self.device)),
+            Sight::ResNet18 => Eyes::resnet18(&Eyes::resnet18_file(), self.device),
+        }
+    }
+
+    /// Trains the visual encoder, where there is one and no other checkpoint's was asked for; false when it was stopped.
+    pub(super) fn train_visual(
+        &self,
+        networks: &Networks,
+        footage: &Footage,
+        report: &mut dyn Report,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<bool> {
+        let (Eyes::House { store: own, .. }, None) = (&networks.eyes, &self.visual_from) else { return Ok(true) };
+        let state = self.out.join("training/visual.safetensors");
+        // The heads live in a store of their own shape, so the trained encoder is copied out of it.
+        let mut store = VarStore::new(self.device);
+        let encoder = VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
+        let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
+        store.freeze();
+        copy(&store, "encoder.", own)?;
+        Ok(finished)
+    }
+
+    /// Takes a checkpoint's visual encoder.
+    fn see_as(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
+        let own =
+            networks.eyes.store().context("the preset's eyes are ResNet-18: there is no visual encoder to take")?;
+        let given = self.given(folder)?.1.eyes;
+        copy(given.store().context("its eyes are no House encoder")?, "", own)
+    }
+
+    /// Begins with a checkpoint's policy, and with its critic where both have one of the same size.
+    fn start_from(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
+        let (config, given) = self.given(folder)?;
+        let file = folder.join("config.json");
+        let (found, own) = (&config.policy, &self.preset.policy);
+        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+        let own = self.config("", 0, 0)?.sentence_encoder;
+        let found = &config.sentence_encoder;
+        anyhow::ensure!(
+            found.digest == own.digest,
+            "{}: sentence_encoder is {} ({}), this training's is {} ({})",
+            file.display(),
+            found.name,
+            found.digest,
+            own.name,
+            own.digest
+        );
+        copy(&given.policy_store, "", &networks.policy_store)?;
+        if config.critic == self.preset.critic
+            && let (Some(given), Some(own)) = (&given.critic, &networks.critic)
+        {
+            copy(&given.online_store, "", &own.online_store)?;
+        }
+        Ok(())
+    }
+
+    /// A checkpoint whose visual encoder is of the preset's kind and size.
+    fn given(&self, folder: &Path) -> anyhow::Result<(Config, Networks)> {
+        let config = Config::read(folder)?;
+        let file = folder.join("config.json");
+        let (found, own) = (config.visual.as_ref(), self.visual());
+        anyhow::ensure!(found == own, "{}: visual is {found:?}, the preset's is {own:?}", file.display());
+        let networks = Networks::load(folder, &config, self.device)?;
+        Ok((config, networks))
+    }
+}
+
+/// Copies the tensors of one store, those under `prefix`, over another's.
+fn copy(from: &VarStore, prefix: &str, to: &VarStore) -> anyhow::Result<()> {
+    let from = from.variables();
+    tch::no_grad(|| {
+        for (name, mut tensor) in to.variables() {
+            let name = format!("{prefix}{name}");
+            tensor.f_copy_(from.get(&name).with_context(|| format!("the tensor {name} is missing"))?)?;
+        }
+        Ok(())
+    })
+}

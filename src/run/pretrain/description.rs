@@ -1,0 +1,73 @@
+//! What a training says of itself: in its checkpoint, its state and its folder.
+
+use std::collections::BTreeMap;
+
+use super::Pretraining;
+use crate::agent::config::{Config, Ontology, Provenance, SentenceSpec};
+use crate::data::whole;
+use crate::nets::visual::VisualSpec;
+use crate::run::presets::Sight;
+
+impl Pretraining {
+    /// The checkpoint's config after so many steps of the policy.
+    pub(super) fn config(&self, dataset: &str, trajectories: u64, policy_steps: u64) -> anyhow::Result<Config> {
+        let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+        Ok(Config {
+            format_version: Config::FORMAT,
+            ontology: Ontology::current(),
+            visual: self.visual().cloned(),
+            resnet18: None,
+            method: Some(self.preset.method().to_string()),
+            policy: self.preset.policy.clone(),
+            critic: self.preset.critic.clone(),
+            words: None,
+            sentence_encoder: SentenceSpec {
+                name: self.sentence_encoder.clone(),
+                digest: embedder.encoder().digest().to_string(),
+            },
+            provenance: Provenance {
+                preset: self.preset.name.clone(),
+                dataset: dataset.to_string(),
+                trajectories,
+                seed: self.preset.seed,
+                visual_steps: match (self.preset.eyes, &self.visual_from) {
+                    (Sight::ResNet18, _) => 0,
+                    (Sight::House, Some(folder)) => Config::read(folder)?.provenance.visual_steps,
+                    (Sight::House, None) => self.preset.visual_training.optimisation.steps,
+                },
+                policy_steps,
+            },
+        })
+    }
+
+    /// What a saved state belongs to.
+    pub(super) fn identity(&self, encoder: &str, data: &str, config: &Config) -> BTreeMap<String, String> {
+        [
+            ("format_version", "1".to_string()),
+            ("dataset", data.to_string()),
+            ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
+            ("visual_encoder", encoder.to_string()),
+            ("sentence_encoder", config.sentence_encoder.digest.clone()),
+            ("embedding", config.policy.embedding.to_string()),
+            ("seed", self.preset.seed.to_string()),
+        ]
+        .map(|(name, value)| (name.to_string(), value))
+        .into()
+    }
+
+    /// The House encoder's size, where there is one.
+    pub(super) fn visual(&self) -> Option<&VisualSpec> {
+        (self.preset.eyes == Sight::House).then_some(&self.preset.visual)
+    }
+
+    /// A training goes on only with the preset it began with.
+    pub(super) fn keep_preset(&self) -> anyhow::Result<()> {
+        let path = self.out.join("training/preset.toml");
+        let text = toml::to_string(&self.preset)?;
+        match std::fs::read_to_string(&path) {
+            Ok(begun) if begun == text => Ok(()),
+            Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
+            Err(_) => whole::write(&path, text.as_bytes()),
+        }
+    }
+}
