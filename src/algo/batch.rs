@@ -20,6 +20,8 @@ pub struct Transitions {
     pub objects: Tensor,
     /// 1 on the transition into the span's last state, [n] floats.
     pub terminal: Tensor,
+    /// 1 where the action was taken and led to s′, 0 where it is only what would have been right, [n] floats.
+    pub taken: Tensor,
 }
 
 /// Pairs of transitions to chain, m of them.
@@ -102,6 +104,7 @@ impl Batch {
             actions: cat(&|row| row.2.actions.shallow_clone()),
             objects: cat(&|row| row.2.objects.shallow_clone()),
             terminal: cat(&|row| row.4.shallow_clone()),
+            taken: cat(&|row| row.2.taken.shallow_clone()),
         };
         let mut start = 0;
         let part = |&(name, weight, _, _, terminal): &Row<'_>| {

@@ -86,7 +86,8 @@ impl<'a> CriticLearner<'a> {
             .collect();
         let bootstrap = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
         let weights = iql::advantage_weights(&target_q, &judgement.baseline, self.iql.temperature, self.iql.weight_cap);
-        Judged { judgement, target_q, bootstrap, weights, expectile: self.iql.expectile }
+        let taken = all.taken.shallow_clone();
+        Judged { judgement, target_q, bootstrap, weights, taken, expectile: self.iql.expectile }
     }
 }
 
@@ -99,17 +100,21 @@ pub(super) struct Judged {
     bootstrap: Tensor,
     /// exp(β (Q − V)), capped: what a policy's surprise at each item weighs.
     pub weights: Tensor,
+    taken: Tensor,
     expectile: f64,
 }
 
 impl Judged {
-    /// The losses of V and both Q, averaged part by part and weighed.
+    /// The losses of V and both Q, averaged part by part over what was taken, and weighed: what would have been right led
+    /// nowhere, so the policy alone learns from it.
     pub fn loss(&self, parts: &[Part], terms: &mut Terms) -> Tensor {
         let value = iql::value_loss(&self.judgement.value, &self.target_q, self.expectile);
         let [one, other] = [0, 1].map(|k| iql::q_loss(&self.judgement.q[k], &self.bootstrap));
         let q = one + other;
         let part_loss = |part: &Part| {
-            let (value, q) = (part.of(&value).mean(Kind::Float), part.of(&q).mean(Kind::Float));
+            let taken = part.of(&self.taken);
+            let count = taken.sum(Kind::Float).clamp_min(1.0);
+            let [value, q] = [&value, &q].map(|loss| (part.of(loss) * &taken).sum(Kind::Float) / &count);
             terms.add(part.label("value_loss"), &value);
             terms.add(part.label("q_loss"), &q);
             (value + q) * part.weight

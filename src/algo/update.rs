@@ -241,6 +241,7 @@ mod tests {
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
             actions: Tensor::from_slice(&actions),
             terminal: Tensor::from_slice(&rows.iter().map(|row| row.4).collect::<Vec<f32>>()),
+            taken: Tensor::ones([rows.len() as i64], (Kind::Float, Device::Cpu)),
         }
     }
 
@@ -341,6 +342,23 @@ mod tests {
         let mut update = update(&nets, 8, warming(), Some(CHAINING));
         let mut clones = || update.update(&chained_skills(), false).unwrap().contains_key("chain_action_loss");
         assert_eq!([0; 8].map(|_| clones()), [false, false, false, false, false, true, true, true]);
+    }
+
+    #[test]
+    fn the_policy_learns_what_would_have_been_right_and_the_critic_does_not() {
+        let _chance = crate::nets::testing::chance();
+        // The last transition ends the skill, or does not: only a critic can tell.
+        let losses = |taken: f32, terminal: f32| {
+            let nets = nets();
+            let mut rows = CHAIN_OF_TWO;
+            rows[3].4 = terminal;
+            let base = Transitions { taken: Tensor::from_slice(&[1.0, 1.0, 1.0, taken]), ..transitions(&rows) };
+            update(&nets, 1, IQL, None).update(&Batch { base, pairs: None }, false).unwrap()
+        };
+        let (loss, other) = (losses(0.0, 0.0), losses(0.0, 1.0));
+        assert_eq!(loss, other);
+        assert!(losses(1.0, 0.0)["q_loss"] != losses(1.0, 1.0)["q_loss"]);
+        assert_eq!(loss["action_loss"], losses(1.0, 0.0)["action_loss"]);
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct Label {
     pub action: u8,
     /// Position in the object head; 0 for navigation.
     pub object: u8,
+    /// Whether it was done and led to the next frame; otherwise it is what would have been right.
+    pub taken: bool,
 }
 
 /// Which runs of two or more skills are learned from, and under which text.
@@ -46,12 +48,15 @@ pub struct Selection {
     /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels_of: Option<String>,
+    /// Whether the policy learns too what would have been right where chance or a learner did something else.
+    #[serde(default)]
+    pub corrections: bool,
 }
 
 impl Selection {
     /// A selection of composites; with labels, of the only source there is.
     pub fn of(composites: Composites) -> Selection {
-        Selection { composites, labels_of: None }
+        Selection { composites, labels_of: None, corrections: false }
     }
 }
 
@@ -120,7 +125,7 @@ pub struct Item {
 impl Items {
     /// All primitives, and the composites that are selected, once for each aligned annotation. Held out are every `hold_out`th
     /// trajectory and the splits other than `train`; dropped are the wholes that [`Source::held_out`] names, and spans in which
-    /// nothing has a label. `labels` are those of all frames.
+    /// nothing has a label. `labels` are those of all frames; without [`Selection::corrections`] those not taken are left out.
     ///
     /// # Errors
     /// When composites should have labels and one has none.
@@ -130,6 +135,8 @@ impl Items {
         selection: &Selection,
         hold_out: usize,
     ) -> anyhow::Result<Items> {
+        let learned = |label: &Label| label.taken || selection.corrections;
+        let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
         let mut items = Items { labels, firsts: vec![0], ..Items::default() };
         let mut numbers = HashMap::new();
         let mut first = 0;
@@ -295,7 +302,7 @@ mod tests {
 
     fn labels(trajectories: &[Trajectory]) -> Vec<Option<Label>> {
         let of = |trajectory: &Trajectory| {
-            let label = Some(Label { action: 0, object: 0 });
+            let label = Some(Label { action: 0, object: 0, taken: true });
             std::iter::repeat_n(label, trajectory.actions.len()).chain([None])
         };
         trajectories.iter().flat_map(of).collect()
@@ -356,19 +363,22 @@ mod tests {
     }
 
     #[test]
-    fn a_step_without_a_label_is_never_drawn_and_a_span_of_them_is_left_out() {
+    fn a_step_without_a_label_or_a_correction_unasked_for_is_never_drawn_and_a_span_of_them_is_left_out() {
         let one = [trajectory(vec![0, 2], 5)];
         let mut labels = labels(&one);
         labels[..2].fill(None);
-        labels[3] = None;
-        let summaries = Summaries::default();
-        let source = Source { trajectories: &one, held_out: &[], summaries: &summaries };
-        let items = Items::of(&source, labels, &Selection::of(Composites::Whole), 0).unwrap();
-        assert_eq!(edges(&items), [(0, 2, 5), (0, 0, 5)]);
-        let mut frames: Vec<u32> = items.draw(&items.training, 1, 0, 50).iter().map(|item| item.frame).collect();
-        frames.sort_unstable();
-        frames.dedup();
-        assert_eq!(frames, [2, 4]);
+        labels[3] = Some(Label { action: 0, object: 0, taken: false });
+        let drawn = |corrections| {
+            let summaries = Summaries::default();
+            let source = Source { trajectories: &one, held_out: &[], summaries: &summaries };
+            let selection = Selection { corrections, ..Selection::of(Composites::Whole) };
+            let items = Items::of(&source, labels.clone(), &selection, 0).unwrap();
+            assert_eq!(edges(&items), [(0, 2, 5), (0, 0, 5)]);
+            let frames = items.draw(&items.training, 1, 0, 50).iter().map(|item| item.frame).collect();
+            Vec::from_iter::<std::collections::BTreeSet<u32>>(frames)
+        };
+        assert_eq!(drawn(false), [2, 4]);
+        assert_eq!(drawn(true), [2, 3, 4]);
     }
 
     #[test]
@@ -382,7 +392,7 @@ mod tests {
     #[test]
     fn a_selection_is_written_in_kebab_case() {
         let read: Selection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
-        assert_eq!(read, Selection { composites: Composites::Labels, labels_of: Some("rules".into()) });
+        assert_eq!(read, Selection { labels_of: Some("rules".into()), ..Selection::of(Composites::Labels) });
         assert!(toml::from_str::<Selection>("composites = \"some\"").is_err());
     }
 }

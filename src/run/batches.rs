@@ -109,10 +109,8 @@ impl<'a> Batches<'a> {
                 (first, second, joint)
             }
         };
-        let cut: Vec<f32> = first
-            .iter()
-            .map(|item| f32::from(u8::from(rng.random_bool(chaining.cut.chance(item.end - item.frame)))))
-            .collect();
+        let cut: Vec<f32> =
+            first.iter().map(|item| flag(rng.random_bool(chaining.cut.chance(item.end - item.frame)))).collect();
         let joint = match chaining.aggregate > 0.0 {
             true => Some((joint.shallow_clone(), self.transitions(&second, joint)?)),
             false => None,
@@ -147,14 +145,15 @@ impl<'a> Batches<'a> {
 
     fn transitions(&self, items: &[Item], told: Tensor) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
-        let (mut actions, mut objects) = (Vec::new(), Vec::new());
+        let (mut actions, mut objects, mut taken) = (Vec::new(), Vec::new(), Vec::new());
         for item in items {
             let label = self.material.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
             objects.push(i64::from(label.object));
+            taken.push(flag(label.taken));
         }
-        let terminal: Vec<f32> = items.iter().map(|item| f32::from(u8::from(item.frame + 1 == item.end))).collect();
+        let terminal: Vec<f32> = items.iter().map(|item| flag(item.frame + 1 == item.end)).collect();
         // Both observations share all frames but two, which are gathered once.
         let last = u32::from(self.judged);
         let stack = |item: &Item| Item { frame: item.frame + last, ..*item }.stack(self.history + last);
@@ -168,6 +167,11 @@ impl<'a> Batches<'a> {
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
             terminal: Tensor::from_slice(&terminal).to_device(self.device),
+            taken: Tensor::from_slice(&taken).to_device(self.device),
         })
     }
+}
+
+fn flag(set: bool) -> f32 {
+    f32::from(u8::from(set))
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::data::dataset::Dataset;
 use crate::data::items::Label;
 use crate::domain::task::SceneRef;
-use crate::domain::{Action, Scene, Trajectory, World};
+use crate::domain::{Scene, Trajectory, World};
 use crate::house::{generate, rules};
 
 /// The trajectories of datasets with the scenes they play in.
@@ -119,38 +119,21 @@ impl Footage {
         Ok((scene, world))
     }
 
-    /// What a learner should do in every frame, which is what the expert would do; nothing in the last of a trajectory.
+    /// What a learner should do in every frame, which is what the expert would do; nothing in the last of a trajectory. Where
+    /// chance or a learner acted otherwise, it was not taken.
     ///
     /// # Errors
     /// Never for a footage that was opened.
     pub fn labels(&self) -> anyhow::Result<Vec<Option<Label>>> {
-        self.labelled(Trajectory::choice)
-    }
-
-    /// What the expert did and what led to the next frame: nothing where chance or a learner acted in its place, since that is
-    /// no demonstration, and what the expert would have done led nowhere.
-    ///
-    /// # Errors
-    /// Never for a footage that was opened.
-    pub fn transitions(&self) -> anyhow::Result<Vec<Option<Label>>> {
-        self.labelled(|trajectory, step| {
-            trajectory.actions.get(step).copied().filter(|&taken| trajectory.choice(step) == Some(taken))
-        })
-    }
-
-    fn labelled(
-        &self,
-        action: impl Fn(&Trajectory, usize) -> Option<Action> + Sync,
-    ) -> anyhow::Result<Vec<Option<Label>>> {
         let of = |trajectory: usize| -> anyhow::Result<Vec<Option<Label>>> {
             let recorded = &self.trajectories[trajectory];
             let mut labels = Vec::with_capacity(recorded.actions.len() + 1);
             self.replay(trajectory, |scene, world, step| {
-                let action = action(recorded, step).filter(|_| step < recorded.actions.len());
-                labels.push(action.map(|action| {
+                let taken = recorded.actions.get(step).copied();
+                labels.push(taken.and(recorded.choice(step)).map(|action| {
                     let class = action.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
                     let object = if class.in_vocabulary() { class.index() as u8 } else { 0 };
-                    Label { action: action.kind.index() as u8, object }
+                    Label { action: action.kind.index() as u8, object, taken: taken == Some(action) }
                 }));
                 Ok(())
             })?;
@@ -175,16 +158,15 @@ mod tests {
     use crate::run::visual_training::testing::footage;
 
     #[test]
-    fn what_the_expert_only_would_have_done_is_a_label_and_no_transition() {
+    fn what_the_expert_only_would_have_done_is_a_label_that_was_not_taken() {
         let mut footage = footage();
         let mut choices = footage.trajectories[0].actions.clone();
         choices[1..3].fill(Action::navigate(ActionType::MoveAhead));
         footage.trajectories[0].choices = choices;
-        let kinds = |labels: Vec<Option<super::Label>>| -> Vec<Option<usize>> {
-            labels[..5].iter().map(|label| label.map(|label| usize::from(label.action))).collect()
-        };
-        let [left, ahead] = [ActionType::RotateLeft, ActionType::MoveAhead].map(|kind| Some(kind.index()));
-        assert_eq!(kinds(footage.labels().unwrap()), [left, ahead, ahead, left, None]);
-        assert_eq!(kinds(footage.transitions().unwrap()), [left, None, None, left, None]);
+        let labels = footage.labels().unwrap();
+        let found: Vec<_> = labels[..5].iter().map(|l| l.map(|l| (usize::from(l.action), l.taken))).collect();
+        let [left, ahead] = [ActionType::RotateLeft, ActionType::MoveAhead].map(ActionType::index);
+        let right = [Some((left, true)), Some((ahead, false)), Some((ahead, false)), Some((left, true)), None];
+        assert_eq!(found, right);
     }
 }

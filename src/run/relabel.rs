@@ -235,11 +235,12 @@ mod tests {
         let trajectories: Vec<Trajectory> = dataset.trajectories().unwrap().map(Result::unwrap).collect();
         let texts = |source| {
             let summaries = Summaries::read(&[folder.path()], Some(source)).unwrap();
-            let selection = Selection { composites: Composites::Labels, labels_of: Some(source.into()) };
+            let selection =
+                Selection { composites: Composites::Labels, labels_of: Some(source.into()), corrections: false };
             let source =
                 Source { trajectories: &trajectories, held_out: &dataset.manifest().held_out, summaries: &summaries };
             let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();
-            let labels = vec![Some(Label { action: 0, object: 0 }); frames];
+            let labels = vec![Some(Label { action: 0, object: 0, taken: true }); frames];
             let items = Items::of(&source, labels, &selection, 0).unwrap();
             (items.training.len(), items.texts)
         };

@@ -263,7 +263,11 @@ mod tests {
     }
 
     fn items() -> Items {
-        let label = |frame: u64| Label { action: (frame % 12) as u8, object: (frame % 2 * (frame % 12)) as u8 };
+        let label = |frame: u64| Label {
+            action: (frame % 12) as u8,
+            object: (frame % 2 * (frame % 12)) as u8,
+            taken: frame % 5 > 0,
+        };
         let span = |text, first: u32| Span { trajectory: 0, skills: 0..1, first, start: first, end: first + 5, text };
         Items {
             labels: (0..FRAMES).map(|frame| Some(label(frame))).collect(),

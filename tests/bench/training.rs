@@ -107,7 +107,11 @@ fn features(preset: &Preset) -> anyhow::Result<Features> {
 }
 
 fn items() -> Items {
-    let label = |frame: u32| Label { action: (frame % 12) as u8, object: if frame.is_multiple_of(4) { 7 } else { 0 } };
+    let label = |frame: u32| Label {
+        action: (frame % 12) as u8,
+        object: if frame.is_multiple_of(4) { 7 } else { 0 },
+        taken: true,
+    };
     let span = |number: u32| {
         let (start, trajectory) = (number * SPAN, number / 3);
         let first = trajectory * 3 * SPAN;

@@ -99,9 +99,7 @@ impl Pretraining {
         };
         let summaries = self.summaries()?;
         let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
-        // A critic learns from what happened, a clone from what the expert would have done as well.
-        let labels = if self.preset.iql.is_some() { footage.transitions()? } else { footage.labels()? };
-        let items = Items::of(&source, labels, &self.preset.data, self.preset.hold_out)?;
+        let items = Items::of(&source, footage.labels()?, &self.preset.data, self.preset.hold_out)?;
         anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
         let words = self.preset.policy.attention.as_ref().map(|attention| {
             let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
