@@ -5,9 +5,10 @@
 explore: build ## set up, build, and start the explorer (ARGS="--seed 7" passes options on)
 	@target/release/sprint explore $(ARGS)
 
+# Tests run side by side: threads of libtorch's own would only wait for each other.
 test: setup ## set up, and run all tests
 	python3 -B -m unittest -q tests/setup_test.py
-	cargo test --release --locked
+	OMP_NUM_THREADS=1 cargo test --release --locked
 
 setup: ## find or fetch libtorch and the sentence encoder
 	@command -v python3 >/dev/null || { echo "set-up failed: python3 is missing; run \`apt install python3 python3-pip\`" >&2; exit 1; }

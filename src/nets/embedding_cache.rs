@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,8 @@ struct Header {
 /// Bytes before and after a record's floats: the text's sha256, and a checksum of all before it.
 const KEY: usize = 32;
 const CHECK: usize = 8;
+/// Bytes that are read at once while looking for keys.
+const READ_AHEAD: usize = 1 << 20;
 
 /// An append-only file of embeddings: a JSON line, then records of one length. Several processes may share it.
 #[derive(Debug)]
@@ -81,21 +83,21 @@ impl EmbeddingCache {
         Ok(())
     }
 
-    /// Reads the records that were appended since, by this process or another; call it with the lock held.
+    /// Finds the records that were appended since, by this process or another; call it with the lock held. What a record holds
+    /// is checked when it is asked for.
     fn read_new(&mut self) -> anyhow::Result<()> {
-        let length = self.record();
-        let mut bytes = Vec::new();
-        self.file.seek(SeekFrom::Start(self.end))?;
-        self.file.try_clone()?.read_to_end(&mut bytes)?;
-        for record in bytes.chunks(length) {
-            if record.len() < length || checksum(&record[..length - CHECK]) != record[length - CHECK..] {
-                self.file.set_len(self.end)?;
-                break;
-            }
+        let (length, size) = (self.record() as u64, self.file.metadata()?.len());
+        let mut file = BufReader::with_capacity(READ_AHEAD, self.file.try_clone()?);
+        file.seek(SeekFrom::Start(self.end))?;
+        while self.end + length <= size {
             let mut key = [0; KEY];
-            key.copy_from_slice(&record[..KEY]);
+            file.read_exact(&mut key)?;
+            file.seek_relative((length as usize - KEY) as i64)?;
             self.records.insert(key, self.end);
-            self.end += length as u64;
+            self.end += length;
+        }
+        if self.end < size {
+            self.file.set_len(self.end)?;
         }
         Ok(())
     }
@@ -115,15 +117,22 @@ impl EmbeddingCache {
         self.records.is_empty()
     }
 
-    /// A text's embedding, if it is stored.
+    /// A text's embedding, if it is stored. A record that was damaged is forgotten, so that it is written anew.
     ///
     /// # Errors
     /// When the file cannot be read any more.
-    pub fn get(&self, text: &str) -> anyhow::Result<Option<Vec<f32>>> {
-        let Some(&start) = self.records.get(&key(text)) else { return Ok(None) };
-        let mut bytes = vec![0; self.width * size_of::<f32>()];
-        self.file.read_exact_at(&mut bytes, start + KEY as u64).with_context(|| self.path.display().to_string())?;
-        Ok(Some(bytes.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect()))
+    pub fn get(&mut self, text: &str) -> anyhow::Result<Option<Vec<f32>>> {
+        let key = key(text);
+        let Some(&start) = self.records.get(&key) else { return Ok(None) };
+        let mut bytes = vec![0; self.record()];
+        self.file.read_exact_at(&mut bytes, start).with_context(|| self.path.display().to_string())?;
+        let (checked, check) = bytes.split_at(bytes.len() - CHECK);
+        if checksum(checked) != check {
+            self.records.remove(&key);
+            return Ok(None);
+        }
+        let floats = checked[KEY..].chunks_exact(4);
+        Ok(Some(floats.map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect()))
     }
 
     /// Appends embeddings; texts that are stored already are passed over.
@@ -204,7 +213,7 @@ impl Embedder {
         let mut known: HashMap<&str, Vec<f32>> = HashMap::new();
         let mut missing: Vec<&str> = Vec::new();
         for text in texts.iter().copied().collect::<BTreeSet<&str>>() {
-            match self.cache.as_ref().map(|cache| cache.get(text)).transpose()?.flatten() {
+            match self.cache.as_mut().map(|cache| cache.get(text)).transpose()?.flatten() {
                 Some(embedding) => drop(known.insert(text, embedding)),
                 None => missing.push(text),
             }
@@ -234,7 +243,7 @@ mod tests {
         first.add([("slice the apple", &[1.0f32, -0.5, f32::MIN_POSITIVE][..]), ("", &[0.0, 0.0, 1.0])]).unwrap();
         second.add([("slice the apple", &[9.0f32, 9.0, 9.0][..]), ("other", &[2.0, 2.0, 2.0])]).unwrap();
         assert_eq!(second.len(), 3, "the second writer sees what the first wrote, and does not write it again");
-        let third = EmbeddingCache::open(folder.path(), "0123456789abcdef0", 3).unwrap();
+        let mut third = EmbeddingCache::open(folder.path(), "0123456789abcdef0", 3).unwrap();
         assert_eq!(third.get("slice the apple").unwrap(), Some(vec![1.0, -0.5, f32::MIN_POSITIVE]));
         assert_eq!(third.get("").unwrap(), Some(vec![0.0, 0.0, 1.0]));
         assert_eq!(third.get("slice the potato").unwrap(), None);
@@ -253,6 +262,22 @@ mod tests {
         cache.add([("b", &[3.0f32, 4.0][..])]).unwrap();
         assert_eq!(open().get("b").unwrap(), Some(vec![3.0, 4.0]));
         assert_eq!(std::fs::metadata(&path).unwrap().len(), whole);
+    }
+
+    #[test]
+    fn a_damaged_record_is_not_believed_and_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = || EmbeddingCache::open(folder.path(), "e", 2).unwrap();
+        open().add([("a", &[1.0f32, 2.0][..]), ("b", &[3.0, 4.0])]).unwrap();
+        let path = folder.path().join("e.embeddings");
+        let mut bytes = std::fs::read(&path).unwrap();
+        let last = bytes.len() - CHECK - 1;
+        bytes[last] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        let mut cache = open();
+        assert_eq!((cache.get("a").unwrap(), cache.get("b").unwrap()), (Some(vec![1.0, 2.0]), None));
+        cache.add([("b", &[3.0f32, 4.0][..])]).unwrap();
+        assert_eq!((cache.get("b").unwrap(), open().get("b").unwrap()), (Some(vec![3.0, 4.0]), Some(vec![3.0, 4.0])));
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub struct Collection {
 
 /// Episodes in one house.
 const PER_HOUSE: usize = 4;
-/// Houses between two writes.
+/// Houses between two writes, at most.
 const GROUP: usize = 32;
 /// The longest disturbance, in steps.
 const LONGEST: u32 = 4;
@@ -60,8 +60,9 @@ impl Collection {
         let mut counts = Counts::default();
         let mut next = 0u64;
         while (counts.trajectories as usize) < self.episodes {
-            let houses: Vec<u64> = (next..next + GROUP as u64).collect();
-            next += GROUP as u64;
+            let missing = self.episodes - counts.trajectories as usize;
+            let houses: Vec<u64> = (next..).take(GROUP.min(missing.div_ceil(PER_HOUSE))).collect();
+            next += houses.len() as u64;
             anyhow::ensure!(next < 1_000_000, "too few of the generated tasks could be demonstrated");
             let in_house = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, &number: &u64| {
                 let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
@@ -72,7 +73,7 @@ impl Collection {
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            for trajectory in made.into_iter().flatten().take(self.episodes - counts.trajectories as usize) {
+            for trajectory in made.into_iter().flatten().take(missing) {
                 let annotations = trajectory.annotations.len() as u64;
                 counts.trajectories += 1;
                 counts.annotated_primitives += annotations * trajectory.skills.len() as u64;
