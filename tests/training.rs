@@ -106,6 +106,18 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
 }
 
 #[test]
+fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
+    let Some(sprint) = demonstrations() else { return };
+    let tiny = TINY.replace("\"sprint\"", "\"am\"").replace("pairs = { pool = 4 }\n", "").replace("swaps = 0\n", "");
+    std::fs::write(sprint.path("am.toml"), tiny.replace("[critic]", "goal = [4, 4, 4, 4]\n\n[critic]")).unwrap();
+    done(&sprint, "pretrain D --preset am.toml --out agent");
+    assert!(!sprint.read("agent/README.md").contains("two objects in view"));
+    sprint.sample("tasks.json", 1, 2);
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
+    assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
+}
+
+#[test]
 fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     let Some(sprint) = demonstrations() else { return };
     done(&sprint, "pretrain D --preset tiny.toml --out agent --steps 2");

@@ -79,15 +79,19 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
     for (skill, rate) in &findings.by_skill {
         let _ = writeln!(text, "| of these, {skill} | {rate} |");
     }
-    let _ = write!(
-        text,
-        "| two objects in view, told to take one: takes that one first | {} |\n\
-         | takes the other one first | {} |\n\
-         | from one start, takes the one and, with the instruction swapped, the other | {} |\n\n\
-         ## Limits\n\n\
+    if findings.swapped.trials > 0 {
+        let _ = write!(
+            text,
+            "| two objects in view, told to take one: takes that one first | {} |\n\
+             | takes the other one first | {} |\n\
+             | from one start, takes the one and, with the instruction swapped, the other | {} |\n",
+            findings.named, findings.other, findings.swapped
+        );
+    }
+    text.push_str(
+        "\n## Limits\n\n\
          It knows only what its last frames show, and the houses and words of its demonstrations. It has no sign for being \
          done.\n",
-        findings.named, findings.other, findings.swapped
     );
     text
 }

@@ -179,6 +179,12 @@ impl Preset {
             anyhow::ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
             attention.check(self.policy.embedding).context("policy")?;
         }
+        let is_told = self.policy.goal.is_none() || self.appraisal.swaps == 0;
+        anyhow::ensure!(
+            is_told,
+            "appraisal.swaps is {}, but with policy.goal no instruction is read",
+            self.appraisal.swaps
+        );
         if let Some(share) = self.iql.as_ref().map(|iql| iql.warmup_share) {
             anyhow::ensure!((0.0..=1.0).contains(&share), "iql.warmup_share is {share}, which is not a share");
         }
@@ -289,7 +295,8 @@ mod tests {
         };
         refused("critic = false", "critic and iql");
         refused("critic = false\niql = false", "chaining needs a critic");
-        refused("[policy]\ngoal = [4, 4, 4, 4]", "goals have none");
+        refused("[policy]\ngoal = [4, 4, 4, 4]", "no instruction is read");
+        refused("[policy]\ngoal = [4, 4, 4, 4]\n[appraisal]\nswaps = 0", "goals have none");
         refused("[chaining]\nbatch = 0", "chaining.batch");
         refused("[iql]\nwarmup_share = 3000.0", "iql.warmup_share");
         refused("eyes = \"ears\"", "resnet18");
