@@ -179,12 +179,10 @@ impl Preset {
             anyhow::ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
             attention.check(self.policy.embedding).context("policy")?;
         }
-        let is_told = self.policy.goal.is_none() || self.appraisal.swaps == 0;
-        anyhow::ensure!(
-            is_told,
-            "appraisal.swaps is {}, but with policy.goal no instruction is read",
-            self.appraisal.swaps
-        );
+        if self.policy.goal.is_some() {
+            let swaps = self.appraisal.swaps;
+            anyhow::ensure!(swaps == 0, "appraisal.swaps is {swaps}, but with policy.goal no instruction is read");
+        }
         if let Some(share) = self.iql.as_ref().map(|iql| iql.warmup_share) {
             anyhow::ensure!((0.0..=1.0).contains(&share), "iql.warmup_share is {share}, which is not a share");
         }
