@@ -1,17 +1,20 @@
-//! `sprint collect`: demonstrations in generated houses.
+//! `sprint collect`: demonstrations in generated houses, or of given tasks.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
+use anyhow::ensure;
 use clap::{Args, ValueEnum};
 
 use super::Ending;
 use super::bar::Bars;
 use super::stop;
+use crate::data::taskset;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::collect::Collection;
+use crate::run::collect::{Collection, Source};
+use crate::run::scenes::Scenes;
 
 /// Collects demonstrations.
 #[derive(Args)]
@@ -20,7 +23,10 @@ pub struct Collect {
     out: PathBuf,
     /// Where to collect
     #[arg(long, default_value = "generated")]
-    scenes: Scenes,
+    scenes: Where,
+    /// The tasks to demonstrate, each once and told in its own words, instead of tasks in generated houses
+    #[arg(long, value_name = "TASKS", conflicts_with_all = ["scenes", "episodes", "lengths", "annotations"])]
+    tasks: Option<PathBuf>,
     /// How many demonstrations
     #[arg(long, default_value_t = 1000)]
     episodes: usize,
@@ -42,7 +48,7 @@ pub struct Collect {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Scenes {
+enum Where {
     /// Generated houses
     Generated,
 }
@@ -54,10 +60,10 @@ impl Collect {
     /// When the folder cannot be written to.
     #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
-        let Scenes::Generated = self.scenes;
-        anyhow::ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
+        let Where::Generated = self.scenes;
+        ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
-        anyhow::ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
+        ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
         let learner = match self.learner {
             Some(folder) => {
                 let embedder = Embedder::open(&default_folder(), best_device())?;
@@ -65,15 +71,14 @@ impl Collect {
             }
             None => None,
         };
-        let collection = Collection {
-            out: self.out,
-            episodes: self.episodes,
-            seed: self.seed,
-            lengths: self.lengths,
-            noise: self.noise,
-            annotations: self.annotations,
-            learner,
+        let source = match self.tasks {
+            Some(file) => {
+                let set = taskset::read(&file)?.value;
+                Source::Tasks { scenes: Scenes::of(&file, &set), tasks: set.tasks }
+            }
+            None => Source::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations },
         };
+        let collection = Collection { out: self.out, source, seed: self.seed, noise: self.noise, learner };
         let stop = stop::on_signals()?;
         let mut bars = Bars::new();
         let collected = collection.run(&mut bars, &stop)?;

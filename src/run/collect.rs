@@ -1,9 +1,12 @@
-//! Collects demonstrations in generated houses: what the demonstrator would do in every state, while chance or a learner
-//! disturbs what is done.
+//! Collects demonstrations in generated houses or of given tasks: what the demonstrator would do in every state, while chance or
+//! a learner disturbs what is done.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -11,6 +14,7 @@ use tch::Device;
 
 use super::progress::{Report, Scalars};
 use super::rollout::Rollout;
+use super::scenes::{Scenes, Setting};
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
 use crate::agent::seeker::Seeker;
 use crate::agent::{Decision, Policy};
@@ -26,24 +30,40 @@ use crate::language::phrases;
 pub struct Collection {
     /// The dataset's folder.
     pub out: PathBuf,
-    /// How many trajectories.
-    pub episodes: usize,
+    /// Of what.
+    pub source: Source,
     /// Drives houses, tasks, words and chance.
     pub seed: u64,
-    /// Task lengths, drawn uniformly; a length may be listed more than once.
-    pub lengths: Vec<usize>,
     /// The share of steps at which chance takes over for a few steps.
     pub noise: f64,
-    /// Phrasings of each trajectory.
-    pub annotations: usize,
     /// A checkpoint that acts instead of the demonstrator, with its sentence encoder: the demonstrator then only says what it
     /// would do, and finishes what is left at the horizon.
     pub learner: Option<(PathBuf, SharedEmbedder)>,
 }
 
+/// What is demonstrated.
+pub enum Source {
+    /// Tasks that the generator finds in houses of its own.
+    Generated {
+        /// How many trajectories.
+        episodes: usize,
+        /// Task lengths, drawn uniformly; a length may be listed more than once.
+        lengths: Vec<usize>,
+        /// Phrasings of each trajectory.
+        annotations: usize,
+    },
+    /// Each of these tasks once, in its own words.
+    Tasks {
+        /// The tasks.
+        tasks: Vec<Task>,
+        /// Where they play.
+        scenes: Scenes,
+    },
+}
+
 /// Episodes in one house.
 const PER_HOUSE: usize = 4;
-/// Houses between two writes, at most.
+/// Houses, or given tasks, between two writes, at most.
 const GROUP: usize = 32;
 /// The longest disturbance, in steps.
 const LONGEST: u32 = 4;
@@ -51,48 +71,55 @@ const LONGEST: u32 = 4;
 const SLACK: u32 = 40;
 
 impl Collection {
-    /// Collects; the same trajectories for any number of threads. Returns how many, or `None` when it was stopped: nothing is kept then.
+    /// Collects; the same trajectories for any number of threads. Returns how many, or `None` when it was stopped: nothing is
+    /// kept then. A task that the demonstrator cannot do gives no trajectory.
     ///
     /// # Errors
-    /// When the folder cannot be written to or the learner not be loaded.
+    /// When the folder cannot be written to, the learner not be loaded, or a given task does not fit its scene.
     pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<usize>> {
         let mut writer = Writer::new(&self.out)?;
         let mut counts = Counts::default();
+        let mut scenes = BTreeSet::new();
         let mut next = 0u64;
-        while (counts.trajectories as usize) < self.episodes {
-            let missing = self.episodes - counts.trajectories as usize;
-            let houses: Vec<u64> = (next..).take(GROUP.min(missing.div_ceil(PER_HOUSE))).collect();
-            next += houses.len() as u64;
+        while let Some(lots) = self.source.lots(next, counts.trajectories as usize) {
+            next = lots.end;
             anyhow::ensure!(next < 1_000_000, "too few of the generated tasks could be demonstrated");
-            let in_house = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, &number: &u64| {
+            let lot = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
                 let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
-                if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.house(number, learner.as_mut()) }
+                if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.lot(number, learner.as_mut()) }
             };
             let made: Vec<Vec<Trajectory>> =
-                houses.par_iter().map_init(|| self.load(), in_house).collect::<anyhow::Result<_>>()?;
+                lots.into_par_iter().map_init(|| self.load(), lot).collect::<anyhow::Result<_>>()?;
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
+            let missing = self.source.most() - counts.trajectories as usize;
             for trajectory in made.into_iter().flatten().take(missing) {
-                let annotations = trajectory.annotations.len() as u64;
-                counts.trajectories += 1;
-                counts.annotated_primitives += annotations * trajectory.skills.len() as u64;
-                counts.aligned_primitives += annotations * trajectory.skills.len() as u64;
-                counts.spans += annotations * (trajectory.skills.len() * (trajectory.skills.len() - 1) / 2) as u64;
-                counts.spans_after_holdout = counts.spans;
+                count(&trajectory, &mut counts);
+                self.keep_scene(&trajectory.scene, &writer, &mut scenes)?;
                 writer.trajectory(&trajectory)?;
             }
-            report.step(&Scalars::new("episodes", counts.trajectories, self.episodes as u64))?;
+            report.step(&Scalars::new("episodes", self.source.done(next, &counts), self.source.most() as u64))?;
         }
         writer.finish(&Manifest {
             format_version: Manifest::FORMAT,
-            source: "generated".into(),
+            source: self.source.name().into(),
             counts: [("train".to_string(), counts)].into(),
-            scenes: 0,
+            scenes: scenes.len() as u64,
             held_out: Vec::new(),
             skipped: Vec::new(),
         })?;
         Ok(Some(counts.trajectories as usize))
+    }
+
+    /// Writes a scene that comes from a file beside the trajectories, once.
+    fn keep_scene(&self, reference: &SceneRef, writer: &Writer, kept: &mut BTreeSet<String>) -> anyhow::Result<()> {
+        if let (SceneRef::Named(name), Source::Tasks { scenes, .. }) = (reference, &self.source)
+            && kept.insert(name.clone())
+        {
+            writer.scene(&*scenes.scene(reference)?.0)?;
+        }
+        Ok(())
     }
 
     fn load(&self) -> anyhow::Result<Option<LearnedPolicy>> {
@@ -102,44 +129,126 @@ impl Collection {
         Ok(Some(policy))
     }
 
-    /// The trajectories of one house.
-    fn house(&self, number: u64, mut learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
+    /// The trajectories of one house, or of one given task.
+    fn lot(&self, number: u64, learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(number + 1);
+        match &self.source {
+            Source::Generated { lengths, annotations, .. } => {
+                self.house(number, (lengths, *annotations), learner, &mut rng)
+            }
+            Source::Tasks { tasks, scenes } => {
+                let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
+                let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
+                let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
+                let episode = Episode { collection: self, task, setting, id, annotations };
+                Ok(episode.play(learner, &mut rng)?.into_iter().collect())
+            }
+        }
+    }
+
+    fn house(
+        &self,
+        number: u64,
+        (lengths, annotations): (&[usize], usize),
+        mut learner: Option<&mut LearnedPolicy>,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Vec<Trajectory>> {
         let room = Room::ALL[(number % 4) as usize];
         let seed = self.seed * 1_000_000 + number;
         let (scene, world) = generate::house(room, seed);
         let scene = std::sync::Arc::new(scene);
         let mut made = Vec::new();
         for position in 0..PER_HOUSE {
-            let length = self.lengths.get(rng.random_range(0..self.lengths.len().max(1))).copied().unwrap_or(1);
+            let length = lengths.get(rng.random_range(0..lengths.len().max(1))).copied().unwrap_or(1);
             let reference = SceneRef::Generated { room, seed };
-            let Some(task) = generate::task(&scene, &world, reference, length, &mut rng) else { continue };
+            let Some(task) = generate::task(&scene, &world, reference, length, rng) else { continue };
             let start = task.start.clone().unwrap_or_else(|| world.clone());
             let id = format!("{}-{position}", scene.name);
-            let episode = Episode { collection: self, scene: &scene, task: &task, start, id };
-            made.extend(episode.play(learner.as_deref_mut(), &mut rng)?);
+            let annotations = phrasings(&scene, &start, &task, annotations, rng);
+            let setting = Setting { scene: scene.clone(), world: start };
+            let episode = Episode { collection: self, task: &task, setting, id, annotations };
+            made.extend(episode.play(learner.as_deref_mut(), rng)?);
         }
         Ok(made)
     }
 }
 
+impl Source {
+    /// Which lots come next, when those before `next` gave so many trajectories.
+    fn lots(&self, next: u64, made: usize) -> Option<Range<u64>> {
+        let count = match self {
+            Source::Generated { episodes, .. } => GROUP.min(episodes.saturating_sub(made).div_ceil(PER_HOUSE)),
+            Source::Tasks { tasks, .. } => GROUP.min(tasks.len() - (next as usize).min(tasks.len())),
+        };
+        (count > 0).then(|| next..next + count as u64)
+    }
+
+    /// The most trajectories that there will be.
+    fn most(&self) -> usize {
+        match self {
+            Source::Generated { episodes, .. } => *episodes,
+            Source::Tasks { tasks, .. } => tasks.len(),
+        }
+    }
+
+    /// How far it has come, of [`Source::most`].
+    fn done(&self, next: u64, counts: &Counts) -> u64 {
+        match self {
+            Source::Generated { .. } => counts.trajectories,
+            Source::Tasks { .. } => next,
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Source::Generated { .. } => "generated",
+            Source::Tasks { .. } => "tasks",
+        }
+    }
+}
+
+fn count(trajectory: &Trajectory, counts: &mut Counts) {
+    let (skills, annotations) = (trajectory.skills.len() as u64, trajectory.annotations.len() as u64);
+    let aligned = trajectory.annotations.iter().filter(|words| words.steps.len() as u64 == skills).count() as u64;
+    counts.trajectories += 1;
+    counts.annotated_primitives += annotations * skills;
+    counts.aligned_primitives += aligned * skills;
+    counts.spans += annotations * (skills * skills.saturating_sub(1) / 2);
+    counts.spans_after_holdout += aligned * (skills * skills.saturating_sub(1) / 2);
+}
+
+/// What a task itself says. Of a single skill, the instruction is its sentence.
+fn own_words(task: &Task) -> Annotation {
+    let alone = task.subtasks.len() == 1 && task.sentences.is_empty();
+    let steps = if alone { vec![task.instruction.clone()] } else { task.sentences.clone() };
+    Annotation { goal: task.instruction.clone(), steps }
+}
+
+/// What the grammar says of a task, several times over.
+fn phrasings(scene: &Scene, start: &World, task: &Task, times: usize, rng: &mut ChaCha8Rng) -> Vec<Annotation> {
+    let Task { roles, subtasks, .. } = task;
+    let origins = phrases::origins(scene, start, roles);
+    let story = phrases::Story { roles, subtasks, origins: &origins };
+    let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
+    (0..times.max(1)).map(annotate).collect()
+}
+
 struct Episode<'a> {
     collection: &'a Collection,
-    scene: &'a std::sync::Arc<Scene>,
     task: &'a Task,
-    start: World,
+    setting: Setting,
     id: String,
+    annotations: Vec<Annotation>,
 }
 
 impl Episode<'_> {
     /// Plays a task to its end; `None` when the demonstrator sees no way or takes too long.
     fn play(self, mut learner: Option<&mut LearnedPolicy>, rng: &mut ChaCha8Rng) -> anyhow::Result<Option<Trajectory>> {
         let Task { roles, subtasks, .. } = self.task;
-        let annotations = self.annotations(rng);
-        let told = annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
+        let told = self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
         let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
-        let house = House::new(self.scene.clone(), self.start.clone());
+        let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
         let mut rollout = Rollout::new(house, told, Some(grader), None);
         let mut seeker = Seeker::new();
         if let Some(learner) = learner.as_deref_mut() {
@@ -179,24 +288,16 @@ impl Episode<'_> {
             id: self.id,
             split: "train".into(),
             scene: self.task.scene.clone(),
-            start: self.start,
+            start: self.setting.world,
             actions,
             roles: roles.clone(),
             skills: subtasks.clone(),
             skill_starts,
             goal: self.task.goal.clone(),
-            annotations,
+            annotations: self.annotations,
             boxes: Vec::new(),
             choices,
         }))
-    }
-
-    fn annotations(&self, rng: &mut ChaCha8Rng) -> Vec<Annotation> {
-        let Task { roles, subtasks, .. } = self.task;
-        let origins = phrases::origins(self.scene, &self.start, roles);
-        let story = phrases::Story { roles, subtasks, origins: &origins };
-        let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
-        (0..self.collection.annotations.max(1)).map(annotate).collect()
     }
 }
 
@@ -213,4 +314,57 @@ fn disturbance(house: &mut House, rng: &mut ChaCha8Rng) -> Action {
         8 => ActionType::LookUp,
         _ => ActionType::LookDown,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::dataset::Dataset;
+    use crate::data::json;
+    use crate::domain::{Class, Role};
+
+    struct Silent;
+
+    impl Report for Silent {
+        fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Two tasks: one in a scene file of the folder, in a person's words, and one that the demonstrator cannot do.
+    fn tasks(folder: &std::path::Path) -> Vec<Task> {
+        let (scene, world) = generate::house(Room::Kitchen, 3);
+        json::write(&folder.join(format!("{}.json", scene.name)), &scene).unwrap();
+        let reference = SceneRef::Named(scene.name.clone());
+        let task = generate::task(&scene, &world, reference, 1, &mut ChaCha8Rng::seed_from_u64(5)).unwrap();
+        let task = Task { start: Some(world), instruction: "do that for me".into(), sentences: Vec::new(), ..task };
+        let mut hopeless = Task { id: "hopeless".into(), ..task.clone() };
+        hopeless.subtasks[0].object = hopeless.roles.len() as u8;
+        hopeless.roles.push(Role { class: Class::named("Desk").unwrap(), ..task.roles[0].clone() });
+        vec![hopeless, task]
+    }
+
+    #[test]
+    fn given_tasks_are_demonstrated_in_their_own_words_and_their_scenes_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let tasks = tasks(folder.path());
+        let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
+        let collection = Collection {
+            out: folder.path().join("D"),
+            source: Source::Tasks { tasks: tasks.clone(), scenes },
+            seed: 1,
+            noise: 0.0,
+            learner: None,
+        };
+        assert_eq!(collection.run(&mut Silent, &AtomicBool::new(false)).unwrap(), Some(1));
+        let dataset = Dataset::open(&collection.out).unwrap();
+        let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
+        let told = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
+        assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![told]));
+        let scene = dataset.scenes().unwrap().into_values().next().unwrap();
+        let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None);
+        let mut rollout = Rollout::new(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
+        made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision { action, mind: None })));
+        assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
+    }
 }

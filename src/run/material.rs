@@ -56,9 +56,10 @@ impl<'a> Maps<'a> {
     pub fn gather(&self, frames: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
         match self {
             Maps::Memory(features) => {
-                let mut bytes = Vec::new();
-                features.gather_all(frames, &mut bytes)?;
-                let width = features.width();
+                let (frames, width): (Vec<usize>, _) = (frames.collect(), features.width());
+                // One allocation: growing step by step cost as much as reading.
+                let mut bytes = Vec::with_capacity(frames.len() * width);
+                features.gather_all(frames.into_iter(), &mut bytes)?;
                 let rows = (bytes.len() / width.max(1)) as i64;
                 Ok(Tensor::f_from_data_size(&bytes, &[rows, width as i64 / 2], Kind::Half)?.to_device(device))
             }

@@ -18,7 +18,7 @@ use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
 use sprint_explorer::nets::embedding_cache::EmbeddingCache;
 use sprint_explorer::nets::weights;
-use sprint_explorer::run::collect::Collection;
+use sprint_explorer::run::collect::{Collection, Source};
 use sprint_explorer::run::comparison::Comparison;
 use sprint_explorer::run::evaluate::Evaluation;
 use sprint_explorer::run::finished::FinishedRun;
@@ -188,11 +188,9 @@ impl Report for Silent {
 fn collected(at: &Path, file: &str) -> Vec<Vec<u8>> {
     let collection = Collection {
         out: at.to_owned(),
-        episodes: 3,
+        source: Source::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
         seed: 3,
-        lengths: vec![1, 2],
         noise: 0.0,
-        annotations: 1,
         learner: None,
     };
     collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
