@@ -72,11 +72,6 @@ impl Part {
         all.narrow(0, self.start, self.len)
     }
 
-    /// How many items it has.
-    pub fn len(&self) -> i64 {
-        self.len
-    }
-
     /// What a number of this part is called.
     pub fn label(&self, name: &str) -> String {
         if self.name == BASE { name.to_string() } else { format!("{}_{name}", self.name) }

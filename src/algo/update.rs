@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tch::{Kind, Tensor, nn};
 
-use super::batch::{Batch, Part};
+use super::batch::{Batch, Part, Transitions};
 use super::bc;
 use super::chain::Chaining;
 use super::critic::CriticLearner;
@@ -53,15 +53,13 @@ impl<'a> Update<'a> {
         let (all, parts) = batch.relabelled(self.chaining.as_ref());
         let mut terms = Terms::default();
         let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
+        let logits = self.policy.forward(&all.observation, &all.told, true);
+        let weights = judged.as_ref().map(|judged| &judged.weights);
         // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
-        let (learned, weights) = match (&self.critic, &judged) {
-            (Some(critic), Some(judged)) if !critic.is_warming_up() => (&parts[..], Some(&judged.weights)),
-            _ => (&parts[..1], None),
+        let policy_loss = match &self.critic {
+            Some(critic) if critic.is_warming_up() => policy_loss(&logits, &all, &parts[..1], None, &mut terms),
+            _ => policy_loss(&logits, &all, &parts, weights, &mut terms),
         };
-        let rows = learned.iter().map(Part::len).sum();
-        let of = |all: &Tensor| all.narrow(0, 0, rows);
-        let logits = self.policy.forward(&of(&all.observation), &of(&all.told), true);
-        let policy_loss = policy_loss(&logits, (&of(&all.actions), &of(&all.objects)), learned, weights, &mut terms);
         let critic_loss = judged.as_ref().map(|judged| judged.loss(&parts, &mut terms));
         let mut numbers = terms.numbers(self.learner.step() + 1)?;
         self.learner.minimise(&policy_loss);
@@ -69,7 +67,7 @@ impl<'a> Update<'a> {
             critic.minimise(&loss);
         }
         if report {
-            let base = |all: &Tensor| parts[0].of(all);
+            let base = |all: &Tensor| all.narrow(0, 0, batch.base.actions.size()[0]);
             let shown = Logits { actions: base(&logits.actions), objects: base(&logits.objects) };
             let (actions, objects) = bc::accuracy(&shown, &batch.base.actions, &batch.base.objects);
             numbers.extend([("action_accuracy".into(), actions), ("object_accuracy".into(), objects)]);
@@ -106,14 +104,14 @@ impl<'a> Update<'a> {
 /// interactions. Without weights, behaviour cloning.
 fn policy_loss(
     logits: &Logits,
-    (actions, objects): (&Tensor, &Tensor),
+    all: &Transitions,
     parts: &[Part],
     weights: Option<&Tensor>,
     terms: &mut Terms,
 ) -> Tensor {
     let weigh = |surprise: Tensor| weights.map_or_else(|| surprise.shallow_clone(), |weights| &surprise * weights);
-    let bc::Surprise { action, object } = bc::surprise(logits, actions, objects);
-    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(objects));
+    let bc::Surprise { action, object } = bc::surprise(logits, &all.actions, &all.objects);
+    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(&all.objects));
     let part_loss = |part: &Part| {
         let action = part.of(&action).mean(Kind::Float);
         let object = part.of(&object).sum(Kind::Float) / part.of(&interactions).sum(Kind::Float).clamp_min(1.0);
@@ -130,7 +128,7 @@ mod tests {
 
     use super::*;
     use crate::algo::adamw::AdamWConfig;
-    use crate::algo::batch::{Pairs, Transitions};
+    use crate::algo::batch::Pairs;
     use crate::algo::chain::{Cut, Pairs as Source, Worth};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
