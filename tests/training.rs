@@ -106,6 +106,22 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
 }
 
 #[test]
+fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
+    let Some(sprint) = demonstrations() else { return };
+    let corrected = TINY.replace("[visual]", "[data]\ncorrections = true\n\n[visual]");
+    std::fs::write(sprint.path("corrected.toml"), corrected).unwrap();
+    done(&sprint, "pretrain D --preset tiny.toml --out agent");
+    sprint.sample("tasks.json", 1, 2);
+    let both = sprint.run("collect C --tasks tasks.json --episodes 3");
+    assert!(both.stderr.contains("'--tasks <TASKS>' cannot be used with '--episodes <EPISODES>'"), "{}", both.stderr);
+    done(&sprint, "collect C --tasks tasks.json --learner agent");
+    assert!(sprint.read("C/dataset.json").contains("\"source\":\"tasks\""), "{}", sprint.read("C/dataset.json"));
+    done(&sprint, "relabel C --with rules");
+    done(&sprint, "pretrain D C --preset corrected.toml --visual-from agent --policy-from agent --out better");
+    assert!(sprint.read("better/config.json") != sprint.read("agent/config.json"), "it says what it learned from");
+}
+
+#[test]
 fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
     let Some(sprint) = demonstrations() else { return };
     let tiny = TINY.replace("\"sprint\"", "\"am\"").replace("pairs = { pool = 4 }\n", "").replace("swaps = 0\n", "");
