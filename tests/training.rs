@@ -117,7 +117,8 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     done(&sprint, "collect C --tasks tasks.json --learner agent");
     assert!(sprint.read("C/dataset.json").contains("\"source\":\"tasks\""), "{}", sprint.read("C/dataset.json"));
     done(&sprint, "relabel C --with rules");
-    done(&sprint, "pretrain D C --preset corrected.toml --visual-from agent --policy-from agent --out better");
+    let from = "--visual-from agent --policy-from agent --critic-from agent";
+    done(&sprint, &format!("pretrain D C --preset corrected.toml {from} --out better"));
     assert!(sprint.read("better/config.json") != sprint.read("agent/config.json"), "it says what it learned from");
 }
 
@@ -147,6 +148,8 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     assert_eq!(seeing.code, Some(1));
     assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
     assert!(!sprint.path("other").exists(), "a refused training left something behind");
+    let judging = sprint.run("pretrain D --preset l-bc --out other --critic-from agent");
+    assert!(judging.stderr.contains("has no critic") && !sprint.path("other").exists(), "{}", judging.stderr);
     let trying = sprint.run("pretrain D --preset tiny.toml --out other --trials nowhere.json");
     assert!(trying.stderr.contains("nowhere.json") && !sprint.path("other").exists(), "{}", trying.stderr);
 }

@@ -46,6 +46,9 @@ pub struct Pretrain {
     /// Start from this checkpoint's policy instead of a fresh one
     #[arg(long, value_name = "DIR")]
     policy_from: Option<PathBuf>,
+    /// Start from this checkpoint's critic instead of a fresh one
+    #[arg(long, value_name = "DIR")]
+    critic_from: Option<PathBuf>,
     /// Steps of the visual encoder's training, instead of the preset's
     #[arg(long, value_name = "N")]
     encoder_steps: Option<u64>,
@@ -90,6 +93,7 @@ impl Pretrain {
             resume: self.resume,
             visual_from: self.visual_from,
             policy_from: self.policy_from,
+            critic_from: self.critic_from,
             trials: self.trials.map(|tasks| Trials { tasks, limit: self.trials_limit, every: self.trials_every }),
             sentences: sentences.clone(),
             sentence_encoder: name(&folder),

@@ -26,6 +26,13 @@ pub struct CriticSpec {
     pub shared_trunk: bool,
 }
 
+impl CriticSpec {
+    /// Whether a critic of this size can take another's weights: dropout is no matter of size.
+    pub fn fits(&self, other: &CriticSpec) -> bool {
+        CriticSpec { dropout: other.dropout, ..self.clone() } == *other
+    }
+}
+
 /// What a critic is told and sees: its inputs' sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Senses {

@@ -30,6 +30,13 @@ pub struct PolicySpec {
     pub attention: Option<AttentionSpec>,
 }
 
+impl PolicySpec {
+    /// Whether a network of this size can take another's weights: dropout is no matter of size.
+    pub fn fits(&self, other: &PolicySpec) -> bool {
+        PolicySpec { dropout: other.dropout, ..self.clone() } == *other
+    }
+}
+
 /// Logits of both heads.
 #[derive(Debug)]
 pub struct Logits {
@@ -110,6 +117,12 @@ mod tests {
 
     fn spec(goal: Option<[i64; 4]>) -> PolicySpec {
         PolicySpec { history: 5, embedding: 6, channels: [8; 4], hidden: vec![16], dropout: 0.2, goal, attention: None }
+    }
+
+    #[test]
+    fn weights_fit_a_network_of_their_size_whatever_is_dropped_in_training() {
+        assert!(PolicySpec { dropout: 0.0, ..spec(None) }.fits(&spec(None)));
+        assert!(!PolicySpec { history: 4, ..spec(None) }.fits(&spec(None)));
     }
 
     #[test]

@@ -26,7 +26,10 @@ impl Pretraining {
             self.see_as(folder, &networks)?;
         }
         if let Some(folder) = &self.policy_from {
-            self.start_from(folder, &networks)?;
+            self.act_as(folder, &networks)?;
+        }
+        if let Some(folder) = &self.critic_from {
+            self.judge_as(folder, &networks)?;
         }
         Ok(networks)
     }
@@ -77,30 +80,43 @@ impl Pretraining {
         copy(given.store().context("its eyes are no House encoder")?, "", own)
     }
 
-    /// Begins with a checkpoint's policy, and with its critic where both have one of the same size.
-    fn start_from(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
-        let (config, given) = self.given(folder)?;
-        let file = folder.join("config.json");
+    /// Begins with a checkpoint's policy.
+    fn act_as(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
+        let (config, given) = self.told_alike(folder)?;
         let (found, own) = (&config.policy, &self.preset.policy);
-        anyhow::ensure!(found == own, "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+        let file = folder.join("config.json");
+        anyhow::ensure!(found.fits(own), "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+        copy(&given.policy_store, "", &networks.policy_store)
+    }
+
+    /// Begins with a checkpoint's critic.
+    fn judge_as(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
+        let own = self.preset.critic.as_ref().context("the preset's method has no critic to begin with another's")?;
+        let (config, given) = self.told_alike(folder)?;
+        let file = folder.join("config.json");
+        let found = config.critic.with_context(|| format!("{}: there is no critic", file.display()))?;
+        anyhow::ensure!(found.fits(own), "{}: critic is {found:?}, the preset's is {own:?}", file.display());
+        match (&given.critic, &networks.critic) {
+            (Some(given), Some(own)) => copy(&given.online_store, "", &own.online_store),
+            _ => Ok(()),
+        }
+    }
+
+    /// A checkpoint that sees and is told as this training's agent.
+    fn told_alike(&self, folder: &Path) -> anyhow::Result<(Config, Networks)> {
+        let (config, given) = self.given(folder)?;
         let own = self.config("", 0, 0)?.sentence_encoder;
         let found = &config.sentence_encoder;
         anyhow::ensure!(
             found.digest == own.digest,
             "{}: sentence_encoder is {} ({}), this training's is {} ({})",
-            file.display(),
+            folder.join("config.json").display(),
             found.name,
             found.digest,
             own.name,
             own.digest
         );
-        copy(&given.policy_store, "", &networks.policy_store)?;
-        if config.critic == self.preset.critic
-            && let (Some(given), Some(own)) = (&given.critic, &networks.critic)
-        {
-            copy(&given.online_store, "", &own.online_store)?;
-        }
-        Ok(())
+        Ok((config, given))
     }
 
     /// A checkpoint whose visual encoder is of the preset's kind and size.

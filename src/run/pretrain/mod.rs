@@ -43,6 +43,8 @@ pub struct Pretraining {
     pub visual_from: Option<PathBuf>,
     /// A checkpoint whose policy is the start, instead of a fresh one.
     pub policy_from: Option<PathBuf>,
+    /// A checkpoint whose critic is the start, instead of a fresh one.
+    pub critic_from: Option<PathBuf>,
     /// Tasks that the agent tries while it trains.
     pub trials: Option<Trials>,
     /// Embeds the instructions.
