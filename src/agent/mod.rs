@@ -1,5 +1,6 @@
 //! Agents: what decides the next action.
 
+pub mod average;
 pub mod batch;
 pub mod checkpoint;
 pub mod config;

@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod appraised;
+mod average;
 mod bar;
 mod collect;
 mod compare;
@@ -72,6 +74,8 @@ enum Command {
     Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
+    /// Average the policies of checkpoints that were trained on from a common start
+    Average(average::Average),
     /// Draw the curves of trainings to SVG and PNG
     Plot(plot::PlotCurves),
     /// Re-run recorded demonstrations in the simulator
@@ -141,6 +145,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Relabel(relabel) => relabel.run(),
         Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
+        Command::Average(average) => average.run(),
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),

@@ -1,22 +1,18 @@
 //! `sprint pretrain`: trains an agent on a dataset.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use clap::Args;
 
 use super::Ending;
+use super::appraised::{appraised, name};
 use super::bar::Bars;
 use super::stop;
-use crate::agent::LearnedPolicy;
-use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
-use crate::data::whole;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::appraise::appraise;
-use crate::run::card::card;
 use crate::run::presets::Preset;
 use crate::run::pretrain::{Pretraining, Trained};
 use crate::run::trials::Trials;
@@ -106,16 +102,7 @@ impl Pretrain {
             eprintln!("stopped; --resume goes on from here");
             return Ok(Ending::Interrupted);
         }
-        let mut policy = LearnedPolicy::load(&pretraining.out, sentences, device)?;
-        let findings = appraise(&mut policy, &pretraining.preset.appraisal, &mut bars)?;
-        bars.end();
-        let text = card(&name(&pretraining.out), &Config::read(&pretraining.out)?, &findings);
-        whole::write(&pretraining.out.join("README.md"), text.as_bytes())?;
-        eprint!("{text}");
+        appraised(&pretraining.out, &pretraining.preset.appraisal, (sentences, device), bars)?;
         Ok(Ending::Ok)
     }
-}
-
-fn name(folder: &Path) -> String {
-    folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -1,0 +1,122 @@
+//! One policy of several: the mean of their weights (Wortsman et al., 2022, "Model soups"). Policies that were trained on from a
+//! common start lie close enough for that, and their mean often does better than each of them where any of them does well.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use tch::{Device, Kind, Tensor};
+
+use super::checkpoint::Networks;
+use super::config::Config;
+
+/// The mean of checkpoints' policies, each as often as it is named; eyes, critic and configuration are the first one's.
+///
+/// # Errors
+/// When a checkpoint cannot be read, or differs from the first in its policy's size, its eyes or its sentence encoder.
+pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, Networks)> {
+    let (first, others) = folders.split_first().context("no checkpoint was named")?;
+    let (mut config, networks) = load(first, device)?;
+    let mut sums: Vec<(String, Tensor)> =
+        networks.policy_store.variables().into_iter().map(|(name, own)| (name, own.to_kind(Kind::Double))).collect();
+    for folder in others {
+        let (found, given) = load(folder, device)?;
+        same(folder, &found, &config)?;
+        ensure!(
+            given.eyes.frozen()?.digest() == networks.eyes.frozen()?.digest(),
+            "{} sees through other eyes than {}",
+            folder.display(),
+            first.display()
+        );
+        let variables = given.policy_store.variables();
+        for (name, sum) in &mut sums {
+            *sum += variables.get(name).with_context(|| format!("{}: {name} is missing", folder.display()))?;
+        }
+        for (own, other, mark) in [
+            (&mut config.provenance.preset, found.provenance.preset, " + "),
+            (&mut config.provenance.dataset, found.provenance.dataset, "-"),
+        ] {
+            *own = joined(own, &other, mark);
+        }
+    }
+    let mut variables = networks.policy_store.variables();
+    tch::no_grad(|| -> anyhow::Result<()> {
+        for (name, sum) in sums {
+            let variable = variables.get_mut(&name).with_context(|| format!("{name} is missing"))?;
+            variable.f_copy_(&(sum / folders.len() as f64))?;
+        }
+        Ok(())
+    })?;
+    Ok((config, networks))
+}
+
+fn load(folder: &Path, device: Device) -> anyhow::Result<(Config, Networks)> {
+    let config = Config::read(folder)?;
+    let networks = Networks::load(folder, &config, device)?;
+    Ok((config, networks))
+}
+
+/// Both policies take in and put out the same.
+fn same(folder: &Path, found: &Config, first: &Config) -> anyhow::Result<()> {
+    let file = folder.join("config.json");
+    let (own, others) = (&first.policy, &found.policy);
+    ensure!(others.fits(own), "{}: policy is {others:?}, the first one's is {own:?}", file.display());
+    ensure!(found.words == first.words, "{}: words are not the first one's", file.display());
+    let (own, others) = (&first.sentence_encoder, &found.sentence_encoder);
+    ensure!(own == others, "{}: sentence_encoder is {}, the first one's is {}", file.display(), others.name, own.name);
+    Ok(())
+}
+
+/// The parts of both, each once.
+fn joined(one: &str, other: &str, mark: &str) -> String {
+    let mut parts: Vec<&str> = one.split(mark).collect();
+    for part in other.split(mark) {
+        if !parts.contains(&part) {
+            parts.push(part);
+        }
+    }
+    parts.join(mark)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::config::tests::small;
+
+    /// A checkpoint whose policy is one number everywhere, and whose eyes are another.
+    fn checkpoint(policy: f64, eyes: f64, change: impl FnOnce(&mut Config)) -> tempfile::TempDir {
+        let (folder, mut config) = (tempfile::tempdir().unwrap(), small());
+        change(&mut config);
+        let networks = Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu);
+        let fill = |store: &tch::nn::VarStore, number: f64| {
+            tch::no_grad(|| store.variables().into_values().for_each(|mut tensor| drop(tensor.fill_(number))));
+        };
+        fill(&networks.policy_store, policy);
+        fill(networks.eyes.store().unwrap(), eyes);
+        networks.save(folder.path(), &config).unwrap();
+        folder
+    }
+
+    fn of(checkpoints: &[&tempfile::TempDir]) -> anyhow::Result<(Config, Networks)> {
+        average(&checkpoints.iter().map(|folder| folder.path().to_owned()).collect::<Vec<_>>(), Device::Cpu)
+    }
+
+    #[test]
+    fn each_policy_counts_as_often_as_it_is_named_and_the_eyes_are_kept() {
+        let one = checkpoint(1.0, 0.5, |config| config.provenance.dataset = "a-b".into());
+        let four = checkpoint(4.0, 0.5, |config| config.provenance.dataset = "b-c".into());
+        let (config, networks) = of(&[&one, &four, &four]).unwrap();
+        assert!(networks.policy_store.variables().values().all(|tensor| tensor.eq(3.0).all().int64_value(&[]) == 1));
+        assert!(networks.eyes.store().unwrap().variables().values().all(|t| t.eq(0.5).all().int64_value(&[]) == 1));
+        assert_eq!(config.provenance.dataset, "a-b-c");
+    }
+
+    #[test]
+    fn what_does_not_go_with_the_first_is_refused() {
+        let one = checkpoint(1.0, 0.5, |_| ());
+        let error = |other: tempfile::TempDir| format!("{:#}", of(&[&one, &other]).unwrap_err());
+        assert!(error(checkpoint(1.0, 0.6, |_| ())).contains("other eyes"));
+        assert!(error(checkpoint(1.0, 0.5, |config| config.policy.hidden = vec![3])).contains("policy is"));
+        let strange = |config: &mut Config| config.sentence_encoder.digest = "0".into();
+        assert!(error(checkpoint(1.0, 0.5, strange)).contains("sentence_encoder is"));
+    }
+}

@@ -1,0 +1,39 @@
+//! Measures a new checkpoint in generated houses and writes its model card.
+
+use std::path::Path;
+
+use tch::Device;
+
+use super::bar::Bars;
+use crate::agent::LearnedPolicy;
+use crate::agent::config::Config;
+use crate::agent::learned::SharedEmbedder;
+use crate::data::whole;
+use crate::run::appraise::appraise;
+use crate::run::card::card;
+use crate::run::presets::Appraisal;
+
+/// Measures the checkpoint in `folder` and writes its card.
+///
+/// # Errors
+/// When it cannot be loaded, or the card not be written.
+#[allow(clippy::print_stderr)]
+pub fn appraised(
+    folder: &Path,
+    appraisal: &Appraisal,
+    (sentences, device): (SharedEmbedder, Device),
+    mut bars: Bars,
+) -> anyhow::Result<()> {
+    let mut policy = LearnedPolicy::load(folder, sentences, device)?;
+    let findings = appraise(&mut policy, appraisal, &mut bars)?;
+    bars.end();
+    let text = card(&name(folder), &Config::read(folder)?, &findings);
+    whole::write(&folder.join("README.md"), text.as_bytes())?;
+    eprint!("{text}");
+    Ok(())
+}
+
+/// What a folder is called.
+pub fn name(folder: &Path) -> String {
+    folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned())
+}

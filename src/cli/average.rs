@@ -1,0 +1,52 @@
+//! `sprint average`: one agent of several.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use anyhow::ensure;
+use clap::Args;
+
+use super::Ending;
+use super::appraised::appraised;
+use super::bar::Bars;
+use crate::agent::average::average;
+use crate::nets::device::best_device;
+use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
+use crate::run::presets::Preset;
+
+/// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's.
+#[derive(Args)]
+pub struct Average {
+    /// Checkpoints; one that is named twice weighs twice
+    #[arg(required = true, num_args = 2.., value_name = "CHECKPOINT")]
+    checkpoints: Vec<PathBuf>,
+    /// The checkpoint folder to write
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The sentence encoder's folder, for measuring the result [default: all-MiniLM-L6-v2, which `make setup` fetched]
+    #[arg(long, value_name = "DIR")]
+    encoder: Option<PathBuf>,
+}
+
+impl Average {
+    /// Averages, measures the result as a training does, and writes its model card.
+    ///
+    /// # Errors
+    /// When a checkpoint cannot be read or does not go with the first, or `out` holds one already.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        ensure!(
+            !self.out.join("config.json").exists(),
+            "{} holds a checkpoint already: name another folder",
+            self.out.display()
+        );
+        let device = best_device();
+        let (config, networks) = average(&self.checkpoints, device)?;
+        std::fs::create_dir_all(&self.out)?;
+        networks.save(&self.out, &config)?;
+        let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
+        let appraisal = Preset::sized("sprint", None)?.appraisal;
+        appraised(&self.out, &appraisal, (Arc::new(Mutex::new(sentences)), device), Bars::new())?;
+        Ok(Ending::Ok)
+    }
+}
