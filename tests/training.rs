@@ -119,7 +119,7 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     done(&sprint, "relabel C --with rules");
     let from = "--visual-from agent --policy-from agent --critic-from agent";
     done(&sprint, &format!("pretrain D C --preset corrected.toml {from} --out better"));
-    done(&sprint, "average agent better --out both");
+    done(&sprint, "average agent better --out both --appraise 1");
     assert!(sprint.read("both/README.md").contains("one-skill tasks solved"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));

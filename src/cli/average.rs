@@ -13,7 +13,7 @@ use crate::agent::average::average;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::presets::Preset;
+use crate::run::presets::{Appraisal, Preset};
 
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's.
 #[derive(Args)]
@@ -24,6 +24,9 @@ pub struct Average {
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Tasks in generated houses to measure the result on, and half as many pairs of objects to tell apart
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    appraise: u32,
     /// The sentence encoder's folder, for measuring the result [default: all-MiniLM-L6-v2, which `make setup` fetched]
     #[arg(long, value_name = "DIR")]
     encoder: Option<PathBuf>,
@@ -45,7 +48,8 @@ impl Average {
         std::fs::create_dir_all(&self.out)?;
         networks.save(&self.out, &config)?;
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
-        let appraisal = Preset::sized("sprint", None)?.appraisal;
+        let tasks = self.appraise as usize;
+        let appraisal = Appraisal { tasks, swaps: tasks / 2, ..Preset::sized("sprint", None)?.appraisal };
         appraised(&self.out, &appraisal, (Arc::new(Mutex::new(sentences)), device), Bars::new())?;
         Ok(Ending::Ok)
     }
