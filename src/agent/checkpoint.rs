@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_shipped_agents_load() {
-        for (name, judges) in [("first", false), ("sprint", true)] {
+        for (name, judges) in [("alfred", true), ("first", false), ("sprint", true)] {
             let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
             let config = Config::read(&folder).unwrap();
             assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), judges);

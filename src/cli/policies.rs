@@ -179,6 +179,9 @@ pub fn agents(named: Option<&Path>) -> Vec<Agent> {
     folders.into_iter().map(agent).collect()
 }
 
+/// The agent that is at home here: it acts when none is named.
+const OWN: &str = "sprint";
+
 /// The agent that acts when none is named: the first that is found.
 pub fn shipped() -> anyhow::Result<PathBuf> {
     checkpoints().into_iter().next().context(
@@ -186,7 +189,8 @@ pub fn shipped() -> anyhow::Result<PathBuf> {
     )
 }
 
-/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in; by name.
+/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in: [`OWN`]
+/// first, then by name.
 pub fn checkpoints() -> Vec<PathBuf> {
     let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
     let near: Option<PathBuf> = program
@@ -201,7 +205,7 @@ pub fn checkpoints() -> Vec<PathBuf> {
         let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path());
         let whole = |path: &PathBuf| path.join("config.json").is_file() && path.join("model.safetensors").is_file();
         let mut found: Vec<PathBuf> = entries.filter(whole).collect();
-        found.sort();
+        found.sort_by_key(|path| (path.file_name() != Some(OWN.as_ref()), path.clone()));
         found
     };
     folders.iter().flat_map(in_folder).collect()
