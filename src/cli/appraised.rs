@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use tch::Device;
-
 use super::bar::Bars;
 use crate::agent::LearnedPolicy;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
 use crate::data::whole;
+use crate::nets::device::best_device;
 use crate::run::appraise::appraise;
 use crate::run::card::card;
 use crate::run::presets::Appraisal;
@@ -21,10 +20,10 @@ use crate::run::presets::Appraisal;
 pub fn appraised(
     folder: &Path,
     appraisal: &Appraisal,
-    (sentences, device): (SharedEmbedder, Device),
+    sentences: SharedEmbedder,
     mut bars: Bars,
 ) -> anyhow::Result<()> {
-    let mut policy = LearnedPolicy::load(folder, sentences, device)?;
+    let mut policy = LearnedPolicy::load(folder, sentences, best_device())?;
     let findings = appraise(&mut policy, appraisal, &mut bars)?;
     bars.end();
     let text = card(&name(folder), &Config::read(folder)?, &findings);

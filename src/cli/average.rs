@@ -50,7 +50,7 @@ impl Average {
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         let tasks = self.appraise as usize;
         let appraisal = Appraisal { tasks, swaps: tasks / 2, ..Preset::sized("sprint", None)?.appraisal };
-        appraised(&self.out, &appraisal, (Arc::new(Mutex::new(sentences)), device), Bars::new())?;
+        appraised(&self.out, &appraisal, Arc::new(Mutex::new(sentences)), Bars::new())?;
         Ok(Ending::Ok)
     }
 }

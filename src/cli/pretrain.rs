@@ -102,7 +102,7 @@ impl Pretrain {
             eprintln!("stopped; --resume goes on from here");
             return Ok(Ending::Interrupted);
         }
-        appraised(&pretraining.out, &pretraining.preset.appraisal, (sentences, device), bars)?;
+        appraised(&pretraining.out, &pretraining.preset.appraisal, sentences, bars)?;
         Ok(Ending::Ok)
     }
 }

@@ -117,7 +117,7 @@ impl Collection {
         if let (SceneRef::Named(name), Source::Tasks { scenes, .. }) = (reference, &self.source)
             && kept.insert(name.clone())
         {
-            writer.scene(&*scenes.scene(reference)?.0)?;
+            writer.scene(&scenes.scene(reference)?.0)?;
         }
         Ok(())
     }
