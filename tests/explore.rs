@@ -30,6 +30,22 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
 }
 
 #[test]
+fn without_options_the_shipped_agent_with_a_critic_acts() {
+    if super::faults::encoders().is_none() {
+        eprintln!("skipped: the shipped agent needs its sentence encoder");
+        return;
+    }
+    let mut session = Session::start(&[]);
+    session.see("· sprint acts");
+    session.see("running");
+    session.press(" M");
+    session.see("by probability");
+    session.miss("no critic");
+    session.press("q");
+    assert_eq!(session.end(), 0);
+}
+
+#[test]
 fn time_travel_forks_are_kept_opened_and_verified() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");

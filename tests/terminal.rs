@@ -120,11 +120,14 @@ impl Session {
         self.screen.lock().unwrap().screen().alternate_screen()
     }
 
-    /// Waits for the end; returns the exit code.
+    /// Waits for the end; returns the exit code, and prints the last words with one that is not 0.
     pub fn end(&mut self) -> u32 {
         let since = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
+                if !status.success() {
+                    eprintln!("{status}:\n{}", self.text());
+                }
                 return status.exit_code();
             }
             assert!(since.elapsed() < PATIENCE, "it does not end:\n{}", self.text());

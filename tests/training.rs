@@ -121,9 +121,31 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     done(&sprint, &format!("pretrain D C --preset corrected.toml {from} --out better"));
     done(&sprint, "average agent better --out both --appraise 1");
     assert!(sprint.read("both/README.md").contains("one-skill tasks solved"));
+    assert!(sprint.read("both/README.md").contains("the mean of 2 checkpoints'"), "{}", sprint.read("both/README.md"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));
     assert!(sprint.read("better/config.json") != sprint.read("agent/config.json"), "it says what it learned from");
+}
+
+#[test]
+fn a_training_begins_with_the_networks_it_was_given() {
+    let Some(sprint) = demonstrations() else { return };
+    done(&sprint, "pretrain D --preset tiny.toml --out agent");
+    let still = format!("{TINY}\n[training.schedule]\nlearning_rate = 1e-12\n");
+    std::fs::write(sprint.path("still.toml"), still).unwrap();
+    let from = "--visual-from agent --policy-from agent --critic-from agent";
+    done(&sprint, &format!("pretrain D --preset still.toml --steps 1 {from} --out still"));
+    let tensors = |folder: &str| weights::read(&sprint.path(folder).join("model.safetensors")).unwrap();
+    let (begun, ended) = (tensors("agent"), tensors("still"));
+    // Batch norm counts what it saw, even where nothing is learned.
+    for name in begun.keys().filter(|name| !name.contains("running")) {
+        // The slow critic begins where the other is.
+        let given = &begun[&name.replace("target.", "critic.")];
+        assert!((&ended[name] - given).abs().max().double_value(&[]) < 1e-6, "{name} is another");
+    }
+    let clone = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+    let refused = sprint.run(&format!("pretrain D --preset tiny.toml --critic-from {clone} --out none"));
+    assert!(refused.stderr.contains("there is no critic"), "{}", refused.stderr);
 }
 
 #[test]
@@ -132,7 +154,10 @@ fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
     let tiny = TINY.replace("\"sprint\"", "\"am\"").replace("pairs = { pool = 4 }\n", "").replace("swaps = 0\n", "");
     std::fs::write(sprint.path("am.toml"), tiny.replace("[critic]", "goal = [4, 4, 4, 4]\n\n[critic]")).unwrap();
     done(&sprint, "pretrain D --preset am.toml --out agent");
-    assert!(!sprint.read("agent/README.md").contains("two objects in view"));
+    done(&sprint, "average agent agent --out mean --appraise 1");
+    for folder in ["agent", "mean"] {
+        assert!(!sprint.read(&format!("{folder}/README.md")).contains("two objects in view"));
+    }
     sprint.sample("tasks.json", 1, 2);
     done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
     assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);

@@ -16,13 +16,14 @@ use super::config::Config;
 pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, Networks)> {
     let (first, others) = folders.split_first().context("no checkpoint was named")?;
     let (mut config, networks) = load(first, device)?;
+    let eyes = networks.eyes.frozen()?.digest().to_owned();
     let mut sums: Vec<(String, Tensor)> =
         networks.policy_store.variables().into_iter().map(|(name, own)| (name, own.to_kind(Kind::Double))).collect();
     for folder in others {
         let (found, given) = load(folder, device)?;
         same(folder, &found, &config)?;
         ensure!(
-            given.eyes.frozen()?.digest() == networks.eyes.frozen()?.digest(),
+            given.eyes.frozen()?.digest() == eyes,
             "{} sees through other eyes than {}",
             folder.display(),
             first.display()
@@ -38,6 +39,7 @@ pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, N
             *own = joined(own, &other, mark);
         }
     }
+    config.provenance.averaged = Some(folders.len() as u64);
     let mut variables = networks.policy_store.variables();
     tch::no_grad(|| -> anyhow::Result<()> {
         for (name, sum) in sums {
@@ -107,7 +109,7 @@ mod tests {
         let (config, networks) = of(&[&one, &four, &four]).unwrap();
         assert!(networks.policy_store.variables().values().all(|tensor| tensor.eq(3.0).all().int64_value(&[]) == 1));
         assert!(networks.eyes.store().unwrap().variables().values().all(|t| t.eq(0.5).all().int64_value(&[]) == 1));
-        assert_eq!(config.provenance.dataset, "a-b-c");
+        assert_eq!((config.provenance.dataset.as_str(), config.provenance.averaged), ("a-b-c", Some(3)));
     }
 
     #[test]

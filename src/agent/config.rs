@@ -12,6 +12,7 @@ use crate::nets::critic::CriticSpec;
 use crate::nets::eyes::Eyes;
 use crate::nets::policy::PolicySpec;
 use crate::nets::resnet18;
+use crate::nets::sentence::SentenceEncoder;
 use crate::nets::visual::VisualSpec;
 
 /// The classes and actions that a policy's heads stand for.
@@ -62,6 +63,9 @@ pub struct Provenance {
     pub visual_steps: u64,
     /// Steps of the policy's training.
     pub policy_steps: u64,
+    /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub averaged: Option<u64>,
 }
 
 /// A checkpoint's `config.json`.
@@ -157,6 +161,25 @@ impl Config {
             }
             _ => anyhow::bail!("an agent sees through either visual or resnet18, not both or none"),
         }
+    }
+
+    /// An agent understands sentences only through the encoder that it was trained with.
+    ///
+    /// # Errors
+    /// When `encoder` is another; begins with the field that differs.
+    pub fn goes_with(&self, encoder: &SentenceEncoder) -> anyhow::Result<()> {
+        let (wanted, found) = (self.policy.embedding, encoder.width() as i64);
+        anyhow::ensure!(
+            wanted == found || self.policy.attention.is_some(),
+            "policy.embedding is {wanted}, the sentence encoder's width is {found}"
+        );
+        let SentenceSpec { name, digest: wanted } = &self.sentence_encoder;
+        let found = encoder.digest();
+        anyhow::ensure!(
+            wanted == found,
+            "sentence_encoder.digest is {wanted}, the encoder at hand has {found}; use {name}"
+        );
+        Ok(())
     }
 
     /// Features in each of the 7 x 7 places of a map.
@@ -260,6 +283,7 @@ pub(super) mod tests {
                 seed: 1,
                 visual_steps: 0,
                 policy_steps: 0,
+                averaged: None,
             },
         }
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use anyhow::Context;
 use tch::{Device, Tensor};
 
 use super::checkpoint::Networks;
@@ -37,20 +38,7 @@ impl LearnedPolicy {
         let config = Config::read(folder)?;
         {
             let embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-            let encoder = embedder.encoder();
-            let (wanted, found) = (config.policy.embedding, encoder.width() as i64);
-            anyhow::ensure!(
-                wanted == found || config.policy.attention.is_some(),
-                "{}: policy.embedding is {wanted}, the sentence encoder's width is {found}",
-                folder.join("config.json").display()
-            );
-            let (wanted, found) = (&config.sentence_encoder.digest, encoder.digest());
-            anyhow::ensure!(
-                wanted == found,
-                "{}: sentence_encoder.digest is {wanted}, the encoder at hand has {found}; use {}",
-                folder.join("config.json").display(),
-                config.sentence_encoder.name
-            );
+            config.goes_with(embedder.encoder()).with_context(|| folder.join("config.json").display().to_string())?;
         }
         let networks = Networks::load(folder, &config, device)?;
         let name = folder.file_name().map_or_else(|| "agent".to_string(), |name| name.to_string_lossy().into_owned());

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use clap::Args;
 
 use super::Ending;
@@ -24,7 +24,7 @@ pub struct Average {
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Tasks in generated houses to measure the result on, and half as many pairs of objects to tell apart
+    /// Tasks in generated houses to measure the result on, and half as many pairs of objects for agents that read to tell apart
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     appraise: u32,
     /// The sentence encoder's folder, for measuring the result [default: all-MiniLM-L6-v2, which `make setup` fetched]
@@ -36,7 +36,7 @@ impl Average {
     /// Averages, measures the result as a training does, and writes its model card.
     ///
     /// # Errors
-    /// When a checkpoint cannot be read or does not go with the first, or `out` holds one already.
+    /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
     pub fn run(self) -> anyhow::Result<Ending> {
         ensure!(
             !self.out.join("config.json").exists(),
@@ -45,11 +45,13 @@ impl Average {
         );
         let device = best_device();
         let (config, networks) = average(&self.checkpoints, device)?;
+        let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
+        config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
         std::fs::create_dir_all(&self.out)?;
         networks.save(&self.out, &config)?;
-        let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         let tasks = self.appraise as usize;
-        let appraisal = Appraisal { tasks, swaps: tasks / 2, ..Preset::sized("sprint", None)?.appraisal };
+        let swaps = if config.policy.goal.is_some() { 0 } else { tasks / 2 };
+        let appraisal = Appraisal { tasks, swaps, ..Preset::sized("sprint", None)?.appraisal };
         appraised(&self.out, &appraisal, Arc::new(Mutex::new(sentences)), Bars::new())?;
         Ok(Ending::Ok)
     }

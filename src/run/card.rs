@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::appraise::Findings;
-use crate::agent::config::Config;
+use crate::agent::config::{Config, Provenance};
 
 /// The method in words.
 fn method(config: &Config) -> &'static str {
@@ -42,9 +42,28 @@ fn told(config: &Config) -> String {
     }
 }
 
+/// What it learned from, in words.
+fn origin(config: &Config) -> String {
+    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, averaged } = &config.provenance;
+    let method = method(config);
+    let seen = match config.visual {
+        Some(_) => format!("{visual_steps} steps of the visual encoder, "),
+        None => String::new(),
+    };
+    match averaged {
+        None => format!(
+            "Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets `{dataset}`): \
+             {seen}{policy_steps} steps of the policy, seed {seed}."
+        ),
+        Some(count) => format!(
+            "Its policy is the mean of {count} checkpoints' (presets `{preset}`, datasets `{dataset}`); all else is the first \
+             one's, which had ({method}) {seen}{policy_steps} steps of the policy on {trajectories} demonstrations, seed {seed}."
+        ),
+    }
+}
+
 /// The card's text.
 pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
-    let from = &config.provenance;
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write!(
@@ -52,27 +71,17 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
          ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
-         Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets \
-         `{dataset}`): {seen}{policy_steps} steps of the policy, seed {seed}.\n\n\
+         {origin}\n\n\
          ## Measured in generated houses that no training saw\n\n\
-         `sprint pretrain` measures this at its end.\n\n\
+         `sprint {command}` measures this at its end.\n\n\
          | | |\n|---|---|\n\
          | one-skill tasks solved, within twice the expert's steps | {agent} |\n\
          | the same tasks by chance | {random} |\n",
         history = config.policy.history,
         eyes = eyes(config),
         told = told(config),
-        preset = from.preset,
-        method = method(config),
-        trajectories = from.trajectories,
-        dataset = from.dataset,
-        seen = if config.visual.is_some() {
-            format!("{} steps of the visual encoder, ", from.visual_steps)
-        } else {
-            String::new()
-        },
-        policy_steps = from.policy_steps,
-        seed = from.seed,
+        origin = origin(config),
+        command = if config.provenance.averaged.is_some() { "average" } else { "pretrain" },
         agent = findings.agent,
         random = findings.random,
     );

@@ -132,7 +132,8 @@ pub fn sample_generated(wish: &Wish, done: &(dyn Fn() + Sync)) -> anyhow::Result
     Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes: None, tasks })
 }
 
-/// Samples spans of a dataset's demonstrations, no span twice. A task starts where the expert's actions before it led.
+/// Samples spans of a dataset's demonstrations, no span twice, and none that the dataset keeps from training. A task starts
+/// where the expert's actions before it led.
 ///
 /// # Errors
 /// When the dataset cannot be read, or holds too few such spans.
@@ -157,8 +158,10 @@ pub fn sample_dataset(
         let said = |first: &usize| {
             phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty()
         };
+        let held_out = dataset.manifest().held_out.contains(&trajectory.id);
+        let free = |_: &usize| !(held_out && wish.length == trajectory.skills.len());
         let firsts = (0..=trajectory.skills.len()).take_while(|first| first + wish.length <= trajectory.skills.len());
-        spans.extend(firsts.filter(said).map(|first| (number, first)));
+        spans.extend(firsts.filter(free).filter(said).map(|first| (number, first)));
     }
     if spans.len() < wish.count {
         let folder = dataset.folder().display().to_string();
@@ -278,6 +281,11 @@ mod tests {
 
     /// A dataset of one demonstration in the test kitchen: a mug is taken, and put on the table.
     fn dataset(folder: &Path) -> Dataset {
+        dataset_without(folder, &[])
+    }
+
+    /// The same, with wholes that training must not see.
+    fn dataset_without(folder: &Path, held_out: &[&str]) -> Dataset {
         let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
         let roles = vec![role("Mug"), role("DiningTable")];
         let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };
@@ -322,7 +330,7 @@ mod tests {
             source: "test".into(),
             counts: BTreeMap::new(),
             scenes: 1,
-            held_out: Vec::new(),
+            held_out: held_out.iter().map(ToString::to_string).collect(),
             skipped: Vec::new(),
         };
         writer.finish(&manifest).unwrap();
@@ -351,6 +359,17 @@ mod tests {
         }
         let error = sample(1, 3, Phrasing::Own).unwrap_err().to_string();
         assert!(error.contains("2 spans of 1 subtasks"), "{error}");
+    }
+
+    #[test]
+    fn a_whole_that_is_held_out_is_no_task_but_its_parts_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let dataset = dataset_without(folder.path(), &["mug"]);
+        let sample = |length, count| {
+            sample_dataset(&wish(length, count, 5), &dataset, None, Phrasing::Annotators, folder.path())
+        };
+        assert_eq!(sample(1, 2).unwrap().tasks.len(), 2);
+        assert!(sample(2, 1).unwrap_err().to_string().contains("holds 0 spans of 2 subtasks"));
     }
 
     #[test]

@@ -92,9 +92,9 @@ impl Pretraining {
     /// Begins with a checkpoint's critic.
     fn judge_as(&self, folder: &Path, networks: &Networks) -> anyhow::Result<()> {
         let own = self.preset.critic.as_ref().context("the preset's method has no critic to begin with another's")?;
-        let (config, given) = self.told_alike(folder)?;
         let file = folder.join("config.json");
-        let found = config.critic.with_context(|| format!("{}: there is no critic", file.display()))?;
+        let found = Config::read(folder)?.critic.with_context(|| format!("{}: there is no critic", file.display()))?;
+        let given = self.told_alike(folder)?.1;
         anyhow::ensure!(found.fits(own), "{}: critic is {found:?}, the preset's is {own:?}", file.display());
         match (&given.critic, &networks.critic) {
             (Some(given), Some(own)) => copy(&given.online_store, "", &own.online_store),

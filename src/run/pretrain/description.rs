@@ -36,6 +36,7 @@ impl Pretraining {
                     (Sight::House, None) => self.preset.visual_training.optimisation.steps,
                 },
                 policy_steps,
+                averaged: None,
             },
         })
     }

@@ -1,9 +1,11 @@
-//! Collects demonstrations in generated houses or of given tasks: what the demonstrator would do in every state, while chance or
-//! a learner disturbs what is done.
+//! Collects demonstrations in generated houses or of given tasks.
+
+mod demonstration;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -12,19 +14,15 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::Device;
 
+use self::demonstration::{Demonstration, own_words, phrasings};
 use super::progress::{Report, Scalars};
-use super::rollout::Rollout;
 use super::scenes::{Scenes, Setting};
+use crate::agent::Policy;
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
-use crate::agent::seeker::Seeker;
-use crate::agent::{Decision, Policy};
 use crate::data::dataset::{Counts, Manifest, Writer};
 use crate::domain::task::SceneRef;
-use crate::domain::trajectory::Annotation;
-use crate::domain::{Action, ActionType, Room, Scene, Task, Trajectory, World};
-use crate::house::grading::{Grader, Grading};
-use crate::house::{House, generate};
-use crate::language::phrases;
+use crate::domain::{Room, Task, Trajectory};
+use crate::house::generate;
 
 /// What to collect.
 pub struct Collection {
@@ -65,25 +63,28 @@ pub enum Source {
 const PER_HOUSE: usize = 4;
 /// Houses, or given tasks, between two writes, at most.
 const GROUP: usize = 32;
-/// The longest disturbance, in steps.
-const LONGEST: u32 = 4;
-/// More steps than this beyond three times the expert's give an episode up.
-const SLACK: u32 = 40;
+/// Generated houses, at most: where fewer tasks than wished for can be demonstrated it must end some time.
+const HOUSES: u64 = 1_000_000;
 
 impl Collection {
     /// Collects; the same trajectories for any number of threads. Returns how many, or `None` when it was stopped: nothing is
     /// kept then. A task that the demonstrator cannot do gives no trajectory.
     ///
     /// # Errors
-    /// When the folder cannot be written to, the learner not be loaded, or a given task does not fit its scene.
+    /// When a given task does not fit its scene, which is found before anything is written; when the folder cannot be written to,
+    /// or the learner not be loaded.
     pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<usize>> {
+        if let Source::Tasks { tasks, scenes } = &self.source {
+            scenes.check(tasks)?;
+        }
         let mut writer = Writer::new(&self.out)?;
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();
         let mut next = 0u64;
         while let Some(lots) = self.source.lots(next, counts.trajectories as usize) {
             next = lots.end;
-            anyhow::ensure!(next < 1_000_000, "too few of the generated tasks could be demonstrated");
+            let endless = matches!(self.source, Source::Generated { .. }) && next >= HOUSES;
+            anyhow::ensure!(!endless, "too few of the generated tasks could be demonstrated");
             let lot = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
                 let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
                 if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.lot(number, learner.as_mut()) }
@@ -141,8 +142,9 @@ impl Collection {
                 let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
                 let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
                 let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
-                let episode = Episode { collection: self, task, setting, id, annotations };
-                Ok(episode.play(learner, &mut rng)?.into_iter().collect())
+                let noise = self.noise;
+                let demonstration = Demonstration { task, setting, id, annotations, noise };
+                Ok(demonstration.play(learner, &mut rng)?.into_iter().collect())
             }
         }
     }
@@ -157,7 +159,7 @@ impl Collection {
         let room = Room::ALL[(number % 4) as usize];
         let seed = self.seed * 1_000_000 + number;
         let (scene, world) = generate::house(room, seed);
-        let scene = std::sync::Arc::new(scene);
+        let scene = Arc::new(scene);
         let mut made = Vec::new();
         for position in 0..PER_HOUSE {
             let length = lengths.get(rng.random_range(0..lengths.len().max(1))).copied().unwrap_or(1);
@@ -167,8 +169,8 @@ impl Collection {
             let id = format!("{}-{position}", scene.name);
             let annotations = phrasings(&scene, &start, &task, annotations, rng);
             let setting = Setting { scene: scene.clone(), world: start };
-            let episode = Episode { collection: self, task: &task, setting, id, annotations };
-            made.extend(episode.play(learner.as_deref_mut(), rng)?);
+            let demonstration = Demonstration { task: &task, setting, id, annotations, noise: self.noise };
+            made.extend(demonstration.play(learner.as_deref_mut(), rng)?);
         }
         Ok(made)
     }
@@ -218,110 +220,17 @@ fn count(trajectory: &Trajectory, counts: &mut Counts) {
     counts.spans_after_holdout += aligned * (skills * skills.saturating_sub(1) / 2);
 }
 
-/// What a task itself says. Of a single skill, the instruction is its sentence.
-fn own_words(task: &Task) -> Annotation {
-    let alone = task.subtasks.len() == 1 && task.sentences.is_empty();
-    let steps = if alone { vec![task.instruction.clone()] } else { task.sentences.clone() };
-    Annotation { goal: task.instruction.clone(), steps }
-}
-
-/// What the grammar says of a task, several times over.
-fn phrasings(scene: &Scene, start: &World, task: &Task, times: usize, rng: &mut ChaCha8Rng) -> Vec<Annotation> {
-    let Task { roles, subtasks, .. } = task;
-    let origins = phrases::origins(scene, start, roles);
-    let story = phrases::Story { roles, subtasks, origins: &origins };
-    let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
-    (0..times.max(1)).map(annotate).collect()
-}
-
-struct Episode<'a> {
-    collection: &'a Collection,
-    task: &'a Task,
-    setting: Setting,
-    id: String,
-    annotations: Vec<Annotation>,
-}
-
-impl Episode<'_> {
-    /// Plays a task to its end; `None` when the demonstrator sees no way or takes too long.
-    fn play(self, mut learner: Option<&mut LearnedPolicy>, rng: &mut ChaCha8Rng) -> anyhow::Result<Option<Trajectory>> {
-        let Task { roles, subtasks, .. } = self.task;
-        let told = self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
-        let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
-        let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
-        let mut rollout = Rollout::new(house, told, Some(grader), None);
-        let mut seeker = Seeker::new();
-        if let Some(learner) = learner.as_deref_mut() {
-            learner.begin(rng.random());
-        }
-        // Some episodes are left undisturbed.
-        let noise = if rng.random_bool(0.3) { 0.0 } else { self.collection.noise };
-        let (mut actions, mut choices, mut skill_starts) = (Vec::new(), Vec::new(), vec![0]);
-        let mut disturbed = 0;
-        while rollout.end().is_none() {
-            if rollout.steps() > 3 * self.task.expert_steps + SLACK {
-                return Ok(None);
-            }
-            let Ok(choice) = rollout.decide(&mut seeker) else { return Ok(None) };
-            if disturbed == 0 && rng.random_bool(noise) {
-                disturbed = rng.random_range(1..=LONGEST);
-            }
-            let action = match learner.as_deref_mut().filter(|_| rollout.steps() < self.task.horizon) {
-                _ if disturbed > 0 => {
-                    disturbed -= 1;
-                    disturbance(&mut rollout.house, rng)
-                }
-                Some(learner) => rollout.decide(learner)?.action,
-                None => choice.action,
-            };
-            actions.push(action);
-            choices.push(choice.action);
-            let tick = rollout.carry_out(Decision { action, mind: None });
-            if tick.completed_one && rollout.end().is_none() {
-                skill_starts.push(tick.step);
-            }
-        }
-        if choices == actions {
-            choices.clear();
-        }
-        Ok(Some(Trajectory {
-            id: self.id,
-            split: "train".into(),
-            scene: self.task.scene.clone(),
-            start: self.setting.world,
-            actions,
-            roles: roles.clone(),
-            skills: subtasks.clone(),
-            skill_starts,
-            goal: self.task.goal.clone(),
-            annotations: self.annotations,
-            boxes: Vec::new(),
-            choices,
-        }))
-    }
-}
-
-/// Something that could happen by chance: mostly a step or a turn, at times an interaction.
-fn disturbance(house: &mut House, rng: &mut ChaCha8Rng) -> Action {
-    let candidates = house.candidates();
-    if !candidates.is_empty() && rng.random_bool(0.08) {
-        return candidates[rng.random_range(0..candidates.len())].action();
-    }
-    Action::navigate(match rng.random_range(0..10) {
-        0..4 => ActionType::MoveAhead,
-        4..6 => ActionType::RotateLeft,
-        6..8 => ActionType::RotateRight,
-        8 => ActionType::LookUp,
-        _ => ActionType::LookDown,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::agent::Decision;
     use crate::data::dataset::Dataset;
     use crate::data::json;
+    use crate::domain::trajectory::Annotation;
     use crate::domain::{Class, Role};
+    use crate::house::House;
+    use crate::house::grading::{Grader, Grading};
+    use crate::run::rollout::Rollout;
 
     struct Silent;
 
@@ -366,5 +275,22 @@ mod tests {
         let mut rollout = Rollout::new(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
         made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision { action, mind: None })));
         assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
+    }
+
+    #[test]
+    fn a_task_that_does_not_fit_its_scene_is_refused_and_an_earlier_dataset_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut tasks = tasks(folder.path());
+        let collected = |tasks: &[Task]| {
+            let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
+            let source = Source::Tasks { tasks: tasks.to_vec(), scenes };
+            let collection = Collection { out: folder.path().join("D"), source, seed: 1, noise: 0.0, learner: None };
+            collection.run(&mut Silent, &AtomicBool::new(false))
+        };
+        assert_eq!(collected(&tasks).unwrap(), Some(1));
+        tasks[1].start = None;
+        let error = format!("{:#}", collected(&tasks).unwrap_err());
+        assert!(error.starts_with("tasks[1].start: missing"), "{error}");
+        assert_eq!(Dataset::open(&folder.path().join("D")).unwrap().trajectories().unwrap().count(), 1);
     }
 }
