@@ -15,7 +15,7 @@ fi
 data=$1 eyes=$2 out=$3
 shift 3
 methods=("$@")
-[ $# -gt 0 ] || methods=(sprint l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
+[ $# -gt 0 ] || methods=(sprint iql-primitive l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
 sprint=${SPRINT:-target/release/sprint}
 mkdir -p "$out/presets" "$out/runs"
 

@@ -102,6 +102,9 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
     read_keys(tell)?;
     let farewell = converse(Conversation::new(app, display, commands, encoder, screen.history), &messages);
     drop(guard);
+    if !matches!(farewell, Ok(Farewell::WorkerGone)) {
+        let_work_end(&messages, Instant::now() + PATIENCE / 2);
+    }
     match farewell? {
         Farewell::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
         farewell => Ok(farewell),
@@ -115,7 +118,16 @@ fn keep(path: &Path, instruction: Option<&str>) {
     }
 }
 
-/// Says that the worker ended, however it did.
+/// Waits for those who still compute: libtorch must not be taken down under them, as the end of the program does.
+fn let_work_end(messages: &Receiver<Msg>, until: Instant) {
+    while let Ok(msg) = messages.recv_timeout(until.saturating_duration_since(Instant::now())) {
+        if matches!(msg, Msg::WorkerGone) {
+            return;
+        }
+    }
+}
+
+/// Says that the worker and all that it set to work ended, however they did.
 struct Gone(SyncSender<Msg>);
 
 impl Drop for Gone {
@@ -339,4 +351,35 @@ fn watch_signals(tell: SyncSender<Msg>) -> io::Result<()> {
         }
     };
     std::thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    #[test]
+    fn the_end_waits_for_those_who_still_compute_and_hears_them_out() {
+        let (tell, messages) = sync_channel(1);
+        let computed = Arc::new(AtomicBool::new(false));
+        let (done, gone) = (computed.clone(), Gone(tell.clone()));
+        std::thread::spawn(move || {
+            let _gone = gone;
+            // The queue holds one message: unheard, the worker would wait here for ever.
+            for _ in 0..3 {
+                tell.send(Msg::Paste(String::new())).unwrap();
+            }
+            done.store(true, Ordering::Relaxed);
+        });
+        let_work_end(&messages, Instant::now() + Duration::from_secs(60));
+        assert!(computed.load(Ordering::Relaxed));
+    }
+
+    #[test]
+    fn the_end_waits_no_longer_than_it_should() {
+        let (_tell, messages) = sync_channel(1);
+        let_work_end(&messages, Instant::now());
+    }
 }

@@ -54,7 +54,6 @@ pub fn start(
 
 struct Worker<T> {
     engine: Engine,
-    tell: Arc<T>,
     going: Option<Going>,
     pace: Pace,
     due: Instant,
@@ -67,6 +66,8 @@ struct Worker<T> {
     surveys: Surveys,
     spare: Spare,
     background: Background,
+    /// The last to be dropped: then all work has ended.
+    tell: Arc<T>,
 }
 
 impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
