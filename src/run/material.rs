@@ -57,7 +57,7 @@ impl<'a> Maps<'a> {
         match self {
             Maps::Memory(features) => {
                 let (frames, width): (Vec<usize>, _) = (frames.collect(), features.width());
-                // One allocation: growing step by step cost as much as reading.
+                // Reserved at once: a batch is several megabytes.
                 let mut bytes = Vec::with_capacity(frames.len() * width);
                 features.gather_all(frames.into_iter(), &mut bytes)?;
                 let rows = (bytes.len() / width.max(1)) as i64;
