@@ -124,6 +124,13 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     assert!(sprint.read("both/README.md").contains("the mean of 2 checkpoints'"), "{}", sprint.read("both/README.md"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));
+    let config = sprint.read("agent/config.json");
+    let digest = config.split("\"digest\": \"").nth(1).unwrap()[..64].to_string();
+    std::fs::write(sprint.path("agent/config.json"), config.replace(&digest, "strange")).unwrap();
+    let refused = sprint.run("average agent agent --out strange");
+    assert!(refused.stderr.contains("sentence_encoder.digest is strange"), "{}", refused.stderr);
+    assert!(!sprint.path("strange").exists(), "nothing is left of what was refused");
+    std::fs::write(sprint.path("agent/config.json"), config).unwrap();
     assert!(sprint.read("better/config.json") != sprint.read("agent/config.json"), "it says what it learned from");
 }
 

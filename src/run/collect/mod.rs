@@ -142,8 +142,7 @@ impl Collection {
                 let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
                 let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
                 let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
-                let noise = self.noise;
-                let demonstration = Demonstration { task, setting, id, annotations, noise };
+                let demonstration = Demonstration { task, setting, id, annotations, noise: self.noise };
                 Ok(demonstration.play(learner, &mut rng)?.into_iter().collect())
             }
         }
