@@ -5,8 +5,8 @@
 #   assets/experiments.sh DATA EYES OUT [METHOD ...]
 #
 # DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), EYES a checkpoint whose visual encoder
-# all methods share, OUT the folder for checkpoints, runs and the table. STEPS, SEED and JOBS may be set; HOUSES may name
-# further datasets to learn from.
+# all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. STEPS, SEEDS (as "1 2 3") and JOBS
+# may be set; HOUSES may name further datasets to learn from.
 set -euo pipefail
 if [ $# -lt 3 ]; then
     sed -n '2,9s/^# \{0,1\}//p' "$0"
@@ -16,14 +16,15 @@ data=$1 eyes=$2 out=$3
 shift 3
 methods=("$@")
 [ $# -gt 0 ] || methods=(sprint iql-primitive l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
+read -ra seeds <<<"${SEEDS:-1}"
 sprint=${SPRINT:-target/release/sprint}
-mkdir -p "$out/presets" "$out/runs"
 
 train() {
-    local method=$1 checkpoint=$out/$1 resume=()
-    printf 'extends = "%s"\nseed = %s\n' "$method" "${SEED:-1}" >"$out/presets/$method.toml"
+    local method=$1 seed=$2 checkpoint=$out/$2/$1 preset=$out/$2/presets/$1.toml resume=()
+    mkdir -p "$out/$seed/presets"
+    printf 'extends = "%s"\nseed = %s\n' "$method" "$seed" >"$preset"
     [ ! -d "$checkpoint/training" ] || resume=(--resume)
-    [ -f "$checkpoint/README.md" ] || "$sprint" pretrain "$data" ${HOUSES:-} --preset "$out/presets/$method.toml" \
+    [ -f "$checkpoint/README.md" ] || "$sprint" pretrain "$data" ${HOUSES:-} --preset "$preset" \
         --steps "${STEPS:-6000}" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}"
 }
 
@@ -35,28 +36,44 @@ evaluate() {
 
 # Zero-shot, the likeliest action, horizons of twice the recorded actions.
 measure() {
-    local name=$1 set grader
-    shift
+    local runs=$1 name=$2 set grader
+    shift 2
     for set in eval_100 eval_chain; do
         for grader in class strict; do
-            evaluate --tasks "$data/tasks/$set.json" --grader $grader --out "$out/runs/$name-$set-$grader" "$@"
+            evaluate --tasks "$data/tasks/$set.json" --grader $grader --out "$runs/$name-$set-$grader" "$@"
         done
         case $name in
         sprint | l-bc)
-            evaluate --tasks "$data/tasks/$set.json" --step-by-step --out "$out/runs/$name-$set-steps" "$@"
+            evaluate --tasks "$data/tasks/$set.json" --step-by-step --out "$runs/$name-$set-steps" "$@"
             ;;
         esac
     done
 }
 
-for method in "${methods[@]}"; do
-    train "$method"
-    measure "$method" --checkpoint "$out/$method"
-done
-measure random --policy random
-measure expert --policy expert
-for set in eval_100 eval_chain; do
-    for grader in class strict; do
-        "$sprint" compare "$out"/runs/{random,expert}-$set-$grader $(printf "$out/runs/%s-$set-$grader " "${methods[@]}")
+# A method's runs of all seeds as one: with commas between.
+joined() {
+    local runs
+    runs=$(printf "$out/%s/runs/$1," "${seeds[@]}")
+    echo "${runs%,}"
+}
+
+for seed in "${seeds[@]}"; do
+    for method in "${methods[@]}"; do
+        train "$method" "$seed"
+        measure "$out/$seed/runs" "$method" --checkpoint "$out/$seed/$method"
     done
+done
+measure "$out/runs" random --policy random --seeds "${#seeds[@]}"
+measure "$out/runs" expert --policy expert --seeds "${#seeds[@]}"
+for set in eval_100 eval_chain; do
+    for kind in class strict; do
+        runs=()
+        for method in "${methods[@]}"; do runs+=("$(joined "$method-$set-$kind")"); done
+        "$sprint" compare "${runs[@]}" "$out"/runs/{random,expert}-$set-$kind
+    done
+    told=()
+    for method in "${methods[@]}"; do
+        case $method in sprint | l-bc) told+=("$(joined "$method-$set-steps")") ;; esac
+    done
+    [ ${#told[@]} -lt 2 ] || "$sprint" compare "${told[@]}"
 done | tee "$out/tables.md"

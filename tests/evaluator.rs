@@ -93,7 +93,7 @@ fn every_file_satisfies_its_schema() {
         sprint.run("eval --tasks tasks.json --policy expert --out b --language --from-subtask all --seeds 2").code,
         Some(0)
     );
-    assert_eq!(sprint.run("compare a b --out comparison.json").code, Some(0));
+    assert_eq!(sprint.run("compare a b b,b --out comparison.json").code, Some(0));
     assert_eq!(sprint.run("eval --tasks tasks.json --policy expert --out c --shard 1/2").code, Some(0));
     let satisfies = |name: &str, text: &str| {
         let document: Value = serde_json::from_str(text).unwrap();
@@ -142,6 +142,9 @@ fn runs_are_compared_and_gated() {
     assert!(worse.stdout.contains("sprint open b#1") && worse.stdout.contains("McNemar: p = "), "{}", worse.stdout);
     assert_eq!(sprint.run("compare a b --fail-below success=0.9").code, Some(2));
     assert!(sprint.run("compare a b b").stdout.contains("against a"));
+    let joined = sprint.run("compare a,a b,b");
+    assert!(joined.stdout.contains("## b and 1 more against a and 1 more\n\n12 pairs"), "{}", joined.stdout);
+    assert_eq!(sprint.run("compare a,nothing b").code, Some(1));
     assert_eq!(sprint.run("compare a nothing").code, Some(1));
     assert_eq!(sprint.run("report b --frames 3").code, Some(0));
     let page = sprint.read("b/report.html");

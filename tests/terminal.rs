@@ -45,6 +45,8 @@ impl Session {
         let mut line = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
         line.arg(command);
         line.args(arguments);
+        // Where `checkpoints` lies, wherever the program was built.
+        line.cwd(env!("CARGO_MANIFEST_DIR"));
         for name in ["TMUX", "CI", "NO_COLOR", "LC_ALL", "LC_CTYPE", "TERM_PROGRAM", "KITTY_WINDOW_ID", "WT_SESSION"] {
             line.env_remove(name);
         }

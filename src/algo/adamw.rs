@@ -48,18 +48,16 @@ impl AdamW {
 
     /// Takes one step against the gradients of `loss`.
     pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
-        for slot in self.slots.values_mut() {
-            slot.weight.zero_grad();
-        }
-        loss.backward();
+        let weights: Vec<&Tensor> = self.slots.values().map(|slot| &slot.weight).collect();
+        // Not added to what the weights hold: nothing has to be zeroed, and no sum is read and written once more.
+        let gradients = Tensor::run_backward(&[loss], &weights, false, false);
         self.steps += 1;
         let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.config;
         let steps = self.steps as f64;
         let (rest1, root2) = (1.0 - beta1.powf(steps), (1.0 - beta2.powf(steps)).sqrt());
         let rate = learning_rate / rest1 * root2;
         tch::no_grad(|| {
-            for Slot { weight, mean, square } in self.slots.values_mut() {
-                let gradient = weight.grad();
+            for (Slot { weight, mean, square }, gradient) in self.slots.values_mut().zip(gradients) {
                 if !gradient.defined() {
                     continue;
                 }

@@ -1,7 +1,7 @@
 //! `sprint compare`: two or more runs of the same tasks, paired.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -14,7 +14,7 @@ use crate::run::threshold::Threshold;
 /// Compares runs, episode by episode.
 #[derive(Args)]
 pub struct Compare {
-    /// The run folders; the others are compared with the first
+    /// The run folders; the others are compared with the first. RUN,RUN,...: the same method's, trained with several seeds
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
     /// Print the comparison as one JSON object
@@ -38,8 +38,7 @@ impl Compare {
     /// When a folder holds no run, or two have no episode in common.
     #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
-        let runs: Vec<FinishedRun> =
-            self.runs.iter().map(|path| FinishedRun::open(path)).collect::<anyhow::Result<_>>()?;
+        let runs: Vec<FinishedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
         let (comparison, summaries) = Comparison::of(&runs)?;
         if let Some(path) = &self.out {
             json::write_pretty(path, &comparison)?;
@@ -64,5 +63,17 @@ impl Compare {
             }
         }
         Ok(ending)
+    }
+}
+
+/// A run, or several with commas between as one.
+fn open(paths: &Path) -> anyhow::Result<FinishedRun> {
+    match paths.to_str() {
+        // A folder may have a comma in its own name.
+        Some(text) if text.contains(',') && !paths.exists() => {
+            let parts = text.split(',').map(|path| FinishedRun::open(Path::new(path)));
+            FinishedRun::joined(parts.collect::<anyhow::Result<_>>()?)
+        }
+        _ => FinishedRun::open(paths),
     }
 }

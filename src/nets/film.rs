@@ -23,7 +23,10 @@ impl Film {
     /// `features` [n, channels, h, w] by `sentence` [n, width].
     pub fn forward(&self, features: &Tensor, sentence: &Tensor) -> Tensor {
         let spread = |per_channel: Tensor| per_channel.unsqueeze(-1).unsqueeze(-1);
-        features * (spread(self.scale.forward(sentence)) + 1.0) + spread(self.shift.forward(sentence))
+        // In place, as much as the gradient allows: for maps this small memory costs as much as arithmetic.
+        let mut scaled = features * (spread(self.scale.forward(sentence)) + 1.0);
+        scaled += spread(self.shift.forward(sentence));
+        scaled
     }
 }
 

@@ -47,7 +47,7 @@ impl Trunk {
             if let (Some(film), Some(told)) = (film, told) {
                 x = film.forward(&x, told);
             }
-            x = x.relu();
+            x = x.relu_();
         }
         x.flatten(1, -1)
     }
@@ -80,7 +80,7 @@ impl Dense {
 
     /// `x` [n, from] to [n, [`Dense::width`]].
     pub fn forward(&self, x: Tensor, train: bool) -> Tensor {
-        self.layers.iter().fold(x, |x, layer| layer.forward(&x).relu().dropout(self.dropout, train))
+        self.layers.iter().fold(x, |x, layer| layer.forward(&x).relu_().dropout(self.dropout, train))
     }
 }
 

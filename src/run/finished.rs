@@ -14,8 +14,10 @@ use crate::domain::TaskSet;
 
 /// A run as it lies on the disk.
 pub struct FinishedRun {
-    /// Its folder.
+    /// Its folder; of [joined](FinishedRun::joined) runs their folders with commas between.
     pub path: PathBuf,
+    /// The folders that its episodes lie in, with the number of them in each, in the order of the episodes.
+    pub sources: Vec<(PathBuf, usize)>,
     /// What it was made from.
     pub manifest: Manifest,
     /// The tasks that it plays.
@@ -53,7 +55,37 @@ impl FinishedRun {
             anyhow::bail!("{}: the run has no task {:?}", path.join(RunFolder::EPISODES).display(), stranger.task);
         }
         let scenes = Scenes::of(&tasks, &set);
-        Ok(FinishedRun { path: path.to_owned(), manifest, set, scenes, episodes })
+        let sources = vec![(path.to_owned(), episodes.len())];
+        Ok(FinishedRun { path: path.to_owned(), sources, manifest, set, scenes, episodes })
+    }
+
+    /// Takes runs of the same tasks by agents that differ in their training's seed for one: the episodes' seeds of each go on
+    /// after those of the one before.
+    ///
+    /// # Errors
+    /// When there is none, or they differ in more than the checkpoint and its name; says in what.
+    pub fn joined(runs: Vec<FinishedRun>) -> anyhow::Result<FinishedRun> {
+        let mut runs = runs.into_iter();
+        let mut all = runs.next().context("name the runs to join")?;
+        let (seeds, own) = (all.manifest.seeds, all.manifest.clone());
+        for run in runs {
+            let Manifest { policy, checkpoint_hash, .. } = own.clone();
+            let differences = own.differences(&Manifest { policy, checkpoint_hash, ..run.manifest.clone() });
+            let names = format!("{} and {}", all.path.display(), run.path.display());
+            ensure!(differences.is_empty(), "{names} cannot be taken for one: {}", differences.join("; "));
+            ensure!(own.shard.is_none(), "{names} are shares of runs; `sprint merge` makes whole ones of them");
+            if run.manifest.policy != own.policy {
+                all.manifest.policy = format!("{},{}", all.manifest.policy, run.manifest.policy);
+            }
+            let later = |episode: Episode| Episode { seed: episode.seed + all.manifest.seeds, ..episode };
+            all.episodes.extend(run.episodes.into_iter().map(later));
+            all.path = format!("{},{}", all.path.display(), run.path.display()).into();
+            all.sources.extend(run.sources);
+            all.manifest.seeds += seeds;
+            all.manifest.checkpoint_hash = None;
+        }
+        all.manifest.check()?;
+        Ok(all)
     }
 
     /// What it is called in tables: its folder's name.
@@ -75,7 +107,40 @@ impl FinishedRun {
     /// When the run has no such episode.
     pub fn reference(&self, key: &Key) -> anyhow::Result<String> {
         let place = self.episodes.iter().position(|episode| episode.key() == *key);
-        let place = place.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
-        Ok(format!("{}#{}", self.path.display(), place + 1))
+        let mut place = place.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
+        for (folder, episodes) in &self.sources {
+            match place.checked_sub(*episodes) {
+                Some(left) => place = left,
+                None => return Ok(format!("{}#{}", folder.display(), place + 1)),
+            }
+        }
+        anyhow::bail!("{}: its folders hold fewer episodes than were read", self.path.display())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::paired::tests::run;
+
+    #[test]
+    fn joined_runs_are_one_with_more_seeds_and_each_episode_keeps_its_folder() {
+        let [mut a, mut b] = [run("a", &[true, false]), run("b", &[false, true])];
+        (a.manifest.checkpoint_hash, b.manifest.checkpoint_hash) = (Some("aa".into()), Some("bb".into()));
+        let joined = FinishedRun::joined(vec![a, b]).unwrap();
+        assert_eq!((joined.manifest.seeds, &joined.manifest.checkpoint_hash), (4, &None));
+        assert_eq!(joined.path, Path::new("a,b"));
+        assert_eq!(joined.episodes.iter().map(|episode| episode.seed).collect::<Vec<_>>(), [0, 1, 2, 3]);
+        let opened: Vec<String> =
+            joined.episodes.iter().map(|episode| joined.reference(&episode.key()).unwrap()).collect();
+        assert_eq!(opened, ["a#1", "a#2", "b#1", "b#2"]);
+    }
+
+    #[test]
+    fn runs_that_measured_something_else_are_not_joined() {
+        let mut other = run("b", &[true]);
+        other.manifest.step_by_step = true;
+        let error = FinishedRun::joined(vec![run("a", &[true]), other]).err().unwrap().to_string();
+        assert!(error.contains("a and b") && error.contains("step_by_step: false, not true"), "{error}");
     }
 }

@@ -164,6 +164,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
     use crate::run::folder::tests::episode;
+    use crate::run::manifest::Manifest;
     use crate::run::manifest::tests::manifest;
     use crate::run::scenes::Scenes;
 
@@ -178,7 +179,8 @@ pub(crate) mod tests {
         let set = sample_set();
         FinishedRun {
             path: name.into(),
-            manifest: manifest(),
+            sources: vec![(name.into(), outcomes.len())],
+            manifest: Manifest { seeds: outcomes.len() as u64, ..manifest() },
             scenes: Scenes::in_folder(None),
             set,
             episodes: (0..).zip(outcomes).map(outcome).collect(),
