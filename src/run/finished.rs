@@ -106,15 +106,20 @@ impl FinishedRun {
     /// # Errors
     /// When the run has no such episode.
     pub fn reference(&self, key: &Key) -> anyhow::Result<String> {
-        let place = self.episodes.iter().position(|episode| episode.key() == *key);
-        let mut place = place.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
-        for (folder, episodes) in &self.sources {
-            match place.checked_sub(*episodes) {
-                Some(left) => place = left,
-                None => return Ok(format!("{}#{}", folder.display(), place + 1)),
-            }
-        }
-        anyhow::bail!("{}: its folders hold fewer episodes than were read", self.path.display())
+        let place = |episodes: &[Episode]| episodes.iter().position(|episode| episode.key() == *key);
+        let found = self.by_folder().find_map(|(folder, episodes)| Some((folder, place(episodes)?)));
+        let (folder, place) = found.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
+        Ok(format!("{}#{}", folder.display(), place + 1))
+    }
+
+    /// Its folders, each with the episodes that lie in it.
+    pub fn by_folder(&self) -> impl Iterator<Item = (&Path, &[Episode])> {
+        let mut rest = self.episodes.as_slice();
+        self.sources.iter().map(move |(folder, count)| {
+            let (own, others) = rest.split_at(*count);
+            rest = others;
+            (folder.as_path(), own)
+        })
     }
 }
 

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::episode::Episode;
 use super::finished::FinishedRun;
 use super::paired::Paired;
 use super::report::{Mean, Summary};
@@ -100,14 +101,11 @@ fn completed_by_folder(run: &FinishedRun) -> Vec<f64> {
     if run.sources.len() < 2 {
         return Vec::new();
     }
-    let mut rest = run.episodes.as_slice();
-    let mut mean = |episodes: usize| {
-        let (own, others) = rest.split_at(episodes);
-        rest = others;
-        let counted = own.iter().filter(|episode| episode.wording.is_own() && episode.from == 0);
+    let mean = |episodes: &[Episode]| {
+        let counted = episodes.iter().filter(|episode| episode.wording.is_own() && episode.from == 0);
         stats::mean(counted.map(|episode| f64::from(episode.completed)))
     };
-    run.sources.iter().map(|(_, episodes)| mean(*episodes)).collect()
+    run.by_folder().map(|(_, episodes)| mean(episodes)).collect()
 }
 
 #[cfg(test)]
