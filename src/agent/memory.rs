@@ -1,6 +1,7 @@
 //! What a trained agent carries from step to step of an episode.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
+use std::hash::{DefaultHasher, Hasher};
 use std::sync::{Arc, Mutex};
 
 use rand::SeedableRng;
@@ -22,9 +23,9 @@ pub struct Memory {
     /// The maps of the last frames, oldest first, and the step that the last one belongs to.
     seen: VecDeque<Tensor>,
     seen_at: Option<u32>,
-    /// The last image, and the actions that were chosen at it and left it as it was.
     last_image: Vec<u8>,
-    blocked: Vec<ActionType>,
+    /// How each view was left since something was last moved, by the image's digest.
+    left_by: HashMap<u64, Vec<ActionType>>,
     last_choice: Option<ActionType>,
     /// The instruction that was read last, with what the networks take for it.
     read: Option<(String, Tensor)>,
@@ -37,7 +38,7 @@ impl Default for Memory {
             seen: VecDeque::new(),
             seen_at: None,
             last_image: Vec::new(),
-            blocked: Vec::new(),
+            left_by: HashMap::new(),
             last_choice: None,
             read: None,
             rng: ChaCha8Rng::seed_from_u64(0),
@@ -52,7 +53,7 @@ impl Clone for Memory {
             seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
             seen_at: self.seen_at,
             last_image: self.last_image.clone(),
-            blocked: self.blocked.clone(),
+            left_by: self.left_by.clone(),
             last_choice: self.last_choice,
             read: self.read.as_ref().map(|(text, told)| (text.clone(), told.shallow_clone())),
             rng: self.rng.clone(),
@@ -65,7 +66,7 @@ impl Memory {
     pub fn begin(&mut self, seed: u64) {
         self.seen.clear();
         self.last_image.clear();
-        self.blocked.clear();
+        self.left_by.clear();
         self.last_choice = None;
         self.seen_at = None;
         // The next episode's goal may look different, whatever its instruction.
@@ -78,14 +79,19 @@ impl Memory {
         self.seen.back().filter(|_| self.last_image == image).map(Tensor::shallow_clone)
     }
 
-    /// Notices when the last choice changed nothing: a wall, or the camera's limit. Until the view changes it is not tried again.
+    /// Notes how the last view was left. Where nothing was moved since, the same way leads to where the agent has been: a wall
+    /// that it stands before, or a round that it goes.
     pub fn look(&mut self, image: &[u8], step: u32) {
-        let stepped = self.seen_at != Some(step);
-        if self.last_image != image {
-            self.blocked.clear();
+        let (stepped, changed) = (self.seen_at != Some(step), self.last_image != image);
+        if stepped && let Some(choice) = self.last_choice {
+            if !choice.is_interaction() {
+                self.left_by.entry(digest(&self.last_image)).or_default().push(choice);
+            } else if changed {
+                self.left_by.clear();
+            }
+        }
+        if changed {
             image.clone_into(&mut self.last_image);
-        } else if stepped && let Some(choice) = self.last_choice.filter(|choice| !choice.is_interaction()) {
-            self.blocked.push(choice);
         }
     }
 
@@ -116,17 +122,28 @@ impl Memory {
             return Ok(told.shallow_clone());
         }
         let told = hear()?;
+        // Another instruction may lead the same way again.
+        self.left_by.clear();
         self.read = Some((instruction.to_string(), told.shallow_clone()));
         Ok(told)
     }
 
-    /// Decides from the logits of both heads, and remembers the choice.
+    /// Decides from the logits of both heads, and remembers the choice. No view is left twice in the same way while there is
+    /// another.
     pub fn decide(&mut self, actions: &[f32], objects: &[f32], candidates: &[Candidate], samples: bool) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        let decision = select::decide(actions, objects, candidates, &self.blocked, selection);
+        let tried = self.left_by.get(&digest(&self.last_image)).map_or(&[][..], Vec::as_slice);
+        let decision = select::decide(actions, objects, candidates, tried, selection);
         self.last_choice = Some(decision.action.kind);
         decision
     }
+}
+
+/// Tells images apart.
+fn digest(image: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(image);
+    hasher.finish()
 }
 
 #[cfg(test)]
@@ -134,9 +151,48 @@ mod tests {
     use tch::{Device, Kind};
 
     use super::*;
+    use crate::domain::{Class, Instance};
 
     fn map(value: f32) -> Tensor {
         Tensor::full([1, 2, 2, 2], f64::from(value), (Kind::Float, Device::Cpu))
+    }
+
+    /// Decides at views in turn, each a step, by logits that like picking up best, and then the first actions.
+    fn choices(memory: &mut Memory, views: &[u8], candidates: &[Candidate]) -> Vec<ActionType> {
+        let like = |kind: ActionType| if kind == ActionType::Pickup { 20.0 } else { -(kind.index() as f32) };
+        let logits = ActionType::ALL.map(like);
+        let first = memory.seen_at.map_or(0, |step| step + 1);
+        let choose = |(step, view): (u32, &u8)| {
+            memory.look(&[*view], step);
+            let _ = memory.observe(map(0.0), step, 5);
+            memory.decide(&logits, &[0.0; 82], candidates, false).action.kind
+        };
+        (first..).zip(views).map(choose).collect()
+    }
+
+    #[test]
+    fn no_view_is_left_twice_in_the_same_way_until_something_is_moved_or_told() {
+        use ActionType::{LookUp, MoveAhead, Pickup, RotateLeft, RotateRight};
+        let mut memory = Memory::default();
+        let tell = |memory: &mut Memory, text: &str| drop(memory.told(text, || Ok(map(0.0))).unwrap());
+        memory.begin(1);
+        tell(&mut memory, "Go.");
+        assert_eq!(
+            choices(&mut memory, &[7, 7, 8, 7, 8], &[]),
+            [MoveAhead, RotateLeft, MoveAhead, RotateRight, RotateLeft]
+        );
+        tell(&mut memory, "Go.");
+        assert_eq!(choices(&mut memory, &[7], &[]), [LookUp]);
+        tell(&mut memory, "Come.");
+        assert_eq!(choices(&mut memory, &[7, 7], &[]), [MoveAhead, RotateLeft]);
+        let mug = Candidate {
+            kind: Pickup,
+            instance: Instance::Object(0),
+            class: Class::named("Mug").unwrap(),
+            distance: 0.0,
+        };
+        assert_eq!(choices(&mut memory, &[7], &[mug]), [Pickup]);
+        assert_eq!(choices(&mut memory, &[9, 7], &[]), [MoveAhead; 2]);
     }
 
     #[test]
