@@ -5,8 +5,9 @@
 #   assets/experiments.sh DATA EYES OUT [METHOD ...]
 #
 # DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), EYES a checkpoint whose visual encoder
-# all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. STEPS, SEEDS (as "1 2 3") and JOBS
-# may be set; HOUSES may name further datasets to learn from.
+# all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. CLONING (updates of cloning, which
+# methods that learn from the same words share), STEPS (updates after that), SEEDS (as "1 2 3") and JOBS may be set; HOUSES
+# may name further datasets to learn from.
 set -euo pipefail
 if [ $# -lt 3 ]; then
     sed -n '2,9s/^# \{0,1\}//p' "$0"
@@ -19,13 +20,31 @@ methods=("$@")
 read -ra seeds <<<"${SEEDS:-1}"
 sprint=${SPRINT:-target/release/sprint}
 
-train() {
-    local method=$1 seed=$2 checkpoint=$out/$2/$1 preset=$out/$2/presets/$1.toml resume=()
+# pretrain SEED NAME METHOD STEPS [WHAT THE PRESET SAYS OTHERWISE] [OPTION ...]; valid_seen is what is held out.
+pretrain() {
+    local seed=$1 name=$2 checkpoint=$out/$1/$2 preset=$out/$1/presets/$2.toml resume=()
     mkdir -p "$out/$seed/presets"
-    printf 'extends = "%s"\nseed = %s\n' "$method" "$seed" >"$preset"
+    printf 'extends = "%s"\nseed = %s\nhold_out = 0\n%s\n' "$3" "$seed" "$5" >"$preset"
     [ ! -d "$checkpoint/training" ] || resume=(--resume)
     [ -f "$checkpoint/README.md" ] || "$sprint" pretrain "$data" ${HOUSES:-} --preset "$preset" \
-        --steps "${STEPS:-6000}" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}"
+        --steps "$4" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}" "${@:6}"
+}
+
+# A method's policy begins as a clone of what it learns from, where it is of the clones' kind.
+train() {
+    local method=$1 seed=$2 clone base=l-bc data=''
+    case $method in
+    et | am)
+        pretrain "$seed" "$method" "$method" $((${CLONING:-15000} + ${STEPS:-3000})) ''
+        return
+        ;;
+    l-bc | iql-primitive | sprint-no-agg) clone=clone ;;
+    sprint-concat-agg) clone=clone-concat base=l-bc-agg data=$'[data]\ncomposites = "concat"' ;;
+    *) clone=clone-agg base=l-bc-agg ;;
+    esac
+    pretrain "$seed" $clone $base "${CLONING:-15000}" "$data"
+    pretrain "$seed" "$method" "$method" "${STEPS:-3000}" $'[training.schedule]\nlearning_rate = 3e-4' \
+        --policy-from "$out/$seed/$clone"
 }
 
 # An episode that errs counts as no success (the expert has no plan for what `strict` asks of some tasks), so that exit code

@@ -135,6 +135,7 @@ mod tests {
         config.method = Some("iql".into());
         config.critic = Some(CriticSpec {
             channels: [4; 4],
+            halved: false,
             hidden: vec![8],
             dropout: 0.2,
             action_embedding: 4,

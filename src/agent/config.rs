@@ -267,6 +267,7 @@ pub(super) mod tests {
                 history: 5,
                 embedding: 8,
                 channels: [4; 4],
+                halved: false,
                 hidden: vec![8],
                 dropout: 0.2,
                 goal: None,

@@ -167,6 +167,7 @@ mod tests {
             policy: PolicySpec { embedding, goal, ..small.policy },
             critic: Some(CriticSpec {
                 channels: [4; 4],
+                halved: false,
                 hidden: vec![8],
                 dropout: 0.2,
                 action_embedding: 4,

@@ -72,6 +72,11 @@ impl Part {
         all.narrow(0, self.start, self.len)
     }
 
+    /// Where it ends among all items.
+    pub fn end(&self) -> i64 {
+        self.start + self.len
+    }
+
     /// What a number of this part is called.
     pub fn label(&self, name: &str) -> String {
         if self.name == BASE { name.to_string() } else { format!("{}_{name}", self.name) }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tch::{Kind, Tensor, nn};
 
-use super::batch::{Batch, Part, Transitions};
+use super::batch::{Batch, Part};
 use super::bc;
 use super::chain::Chaining;
 use super::critic::CriticLearner;
@@ -53,13 +53,15 @@ impl<'a> Update<'a> {
         let (all, parts) = batch.relabelled(self.chaining.as_ref());
         let mut terms = Terms::default();
         let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
-        let logits = self.policy.forward(&all.observation, &all.told, true);
-        let weights = judged.as_ref().map(|judged| &judged.weights);
         // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
-        let policy_loss = match &self.critic {
-            Some(critic) if critic.is_warming_up() => policy_loss(&logits, &all, &parts[..1], None, &mut terms),
-            _ => policy_loss(&logits, &all, &parts, weights, &mut terms),
+        let (learned, weights) = match &self.critic {
+            Some(critic) if critic.is_warming_up() => (&parts[..1], None),
+            _ => (&parts[..], judged.as_ref().map(|judged| &judged.weights)),
         };
+        let shown = |all: &Tensor| all.narrow(0, 0, learned.iter().map(Part::end).max().unwrap_or(0));
+        let logits = self.policy.forward(&shown(&all.observation), &shown(&all.told), true);
+        let choices = [&all.actions, &all.objects].map(shown);
+        let policy_loss = policy_loss(&logits, &choices, learned, weights, &mut terms);
         let critic_loss = judged.as_ref().map(|judged| judged.loss(&parts, &mut terms));
         let mut numbers = terms.numbers(self.learner.step() + 1)?;
         self.learner.minimise(&policy_loss);
@@ -104,14 +106,14 @@ impl<'a> Update<'a> {
 /// interactions. Without weights, behaviour cloning.
 fn policy_loss(
     logits: &Logits,
-    all: &Transitions,
+    [actions, objects]: &[Tensor; 2],
     parts: &[Part],
     weights: Option<&Tensor>,
     terms: &mut Terms,
 ) -> Tensor {
     let weigh = |surprise: Tensor| weights.map_or_else(|| surprise.shallow_clone(), |weights| &surprise * weights);
-    let bc::Surprise { action, object } = bc::surprise(logits, &all.actions, &all.objects);
-    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(&all.objects));
+    let bc::Surprise { action, object } = bc::surprise(logits, actions, objects);
+    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(objects));
     let part_loss = |part: &Part| {
         let action = part.of(&action).mean(Kind::Float);
         let object = part.of(&object).sum(Kind::Float) / part.of(&interactions).sum(Kind::Float).clamp_min(1.0);
@@ -128,7 +130,7 @@ mod tests {
 
     use super::*;
     use crate::algo::adamw::AdamWConfig;
-    use crate::algo::batch::Pairs;
+    use crate::algo::batch::{Pairs, Transitions};
     use crate::algo::chain::{Cut, Pairs as Source, Worth};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
@@ -154,6 +156,7 @@ mod tests {
             history: 1,
             embedding: TEXTS,
             channels: [6; 4],
+            halved: false,
             hidden: vec![24],
             dropout: 0.0,
             goal: None,
@@ -161,6 +164,7 @@ mod tests {
         };
         let critic = CriticSpec {
             channels: [6; 4],
+            halved: false,
             hidden: vec![24],
             dropout: 0.0,
             action_embedding: 4,

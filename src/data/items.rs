@@ -39,6 +39,30 @@ pub enum Composites {
     Whole,
 }
 
+/// How far back the frames of an observation reach.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Past {
+    /// To what came before the span.
+    #[default]
+    Trajectory,
+    /// To the span's start: there a new episode might begin.
+    Span,
+    /// Of half of the items to what came before, of half to the span's start.
+    Either,
+}
+
+impl Past {
+    /// The first frame that an observation may show.
+    fn first(self, span: &Span, rng: &mut ChaCha8Rng) -> u32 {
+        match self {
+            Past::Trajectory => span.first,
+            Past::Span => span.start,
+            Past::Either => [span.first, span.start][usize::from(rng.random_bool(0.5))],
+        }
+    }
+}
+
 /// Which spans are learned from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,12 +75,15 @@ pub struct Selection {
     /// Whether the policy learns too what would have been right where chance or a learner did something else.
     #[serde(default)]
     pub corrections: bool,
+    /// How far back observations reach.
+    #[serde(default)]
+    pub past: Past,
 }
 
 impl Selection {
     /// A selection of composites; with labels, of the only source there is.
     pub fn of(composites: Composites) -> Selection {
-        Selection { composites, labels_of: None, corrections: false }
+        Selection { composites, labels_of: None, corrections: false, past: Past::Trajectory }
     }
 }
 
@@ -107,12 +134,14 @@ pub struct Items {
     pub held_out: Vec<Span>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     pub firsts: Vec<u32>,
+    /// How far back observations reach.
+    pub past: Past,
 }
 
 /// A drawn item: the transition from `frame` to the frame after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// The trajectory's first frame: history does not reach behind it.
+    /// The first frame that it may show: history does not reach behind it.
     pub first: u32,
     /// The present frame.
     pub frame: u32,
@@ -137,7 +166,7 @@ impl Items {
     ) -> anyhow::Result<Items> {
         let learned = |label: &Label| label.taken || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
-        let mut items = Items { labels, firsts: vec![0], ..Items::default() };
+        let mut items = Items { labels, firsts: vec![0], past: selection.past, ..Items::default() };
         let mut numbers = HashMap::new();
         let mut first = 0;
         for (position, trajectory) in source.trajectories.iter().enumerate() {
@@ -186,7 +215,7 @@ impl Items {
         loop {
             let frame = rng.random_range(span.start..span.end);
             if self.is_labelled(frame as usize) {
-                return Item { first: span.first, frame, end: span.end, text: span.text };
+                return Item { first: self.past.first(span, rng), frame, end: span.end, text: span.text };
             }
         }
     }
@@ -197,8 +226,9 @@ impl Items {
 
     /// All frames of the trajectory that an item lies in.
     pub fn trajectory_of(&self, item: &Item) -> Range<u32> {
-        let next = self.firsts.partition_point(|&first| first <= item.first);
-        item.first..self.firsts.get(next).copied().unwrap_or(item.end + 1)
+        let next = self.firsts.partition_point(|&first| first <= item.frame);
+        let first = self.firsts[..next].last().copied().unwrap_or(item.first);
+        first..self.firsts.get(next).copied().unwrap_or(item.end + 1)
     }
 }
 
@@ -387,6 +417,22 @@ mod tests {
         assert_eq!(item(11).stack(5).collect::<Vec<_>>(), [10, 10, 10, 10, 11]);
         assert_eq!(item(11).next_stack(5).collect::<Vec<_>>(), [10, 10, 10, 11, 12]);
         assert_eq!(item(16).stack(5).collect::<Vec<_>>(), [12, 13, 14, 15, 16]);
+    }
+
+    #[test]
+    fn observations_reach_back_as_far_as_the_selection_says() {
+        let two = [trajectory(vec![0, 2], 5)];
+        let firsts = |past| {
+            let summaries = Summaries::default();
+            let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+            let selection = Selection { past, ..Selection::of(Composites::None) };
+            let items = Items::of(&source, labels(&two), &selection, 0).unwrap();
+            let drawn = items.draw(&items.training, 1, 0, 50);
+            let late = drawn.iter().filter(|item| item.frame >= 2);
+            assert!(drawn.iter().all(|item| items.trajectory_of(item) == (0..6)));
+            Vec::from_iter::<std::collections::BTreeSet<u32>>(late.map(|item| item.first).collect())
+        };
+        assert_eq!([Past::Trajectory, Past::Span, Past::Either].map(firsts), [vec![0], vec![2], vec![0, 2]]);
     }
 
     #[test]

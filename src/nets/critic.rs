@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use tch::Tensor;
 use tch::nn::{self, Module};
 
-use super::trunk::{Dense, Telling, Trunk};
+use super::trunk::{Convolutions, Dense, Telling, Trunk};
 use super::value::ValueHead;
 use crate::domain::{ActionType, Class};
 
@@ -14,6 +14,9 @@ use crate::domain::{ActionType, Class};
 pub struct CriticSpec {
     /// Channels of a trunk's four convolutions.
     pub channels: [i64; 4],
+    /// Whether the second convolution reads every other place.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub halved: bool,
     /// Width of the fully connected layers of each head.
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
@@ -97,11 +100,12 @@ impl Critic {
     /// A critic with fresh weights under `path`.
     pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, senses: Senses) -> Critic {
         let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
-        let trunk = |name: &&str| Trunk::new(&(path / *name), senses.channels, &spec.channels, Some(senses.told));
+        let over = |channels| Convolutions { channels, halved: spec.halved };
+        let trunk = |name: &&str| Trunk::new(&(path / *name), senses.channels, over(&spec.channels), Some(senses.told));
         let trunks: Vec<Trunk> = names.iter().map(trunk).collect();
         let from = trunks[0].width() + senses.told;
         Critic {
-            telling: Telling::new(path, senses.told, senses.goal.as_ref(), senses.channels),
+            telling: Telling::new(path, senses.told, senses.goal.as_ref().map(over), senses.channels),
             trunks,
             q: ["q1", "q2"].map(|name| QHead::new(&(path / name), from, spec)),
             value: ValueHead::new(&(path / "value"), from, &spec.hidden, spec.dropout),
@@ -182,6 +186,7 @@ mod tests {
     fn critic(store: &nn::VarStore, shared_trunk: bool) -> Critic {
         let spec = CriticSpec {
             channels: [4; 4],
+            halved: false,
             hidden: vec![8],
             dropout: 0.2,
             action_embedding: 6,

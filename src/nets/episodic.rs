@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tch::nn::{self, Module};
 use tch::{Kind, Tensor};
 
-use super::trunk::Trunk;
+use super::trunk::{Convolutions, Trunk};
 use super::visual::SIDE;
 
 /// The size of the attention layers; the tokens' width is the policy's `embedding`.
@@ -98,12 +98,12 @@ impl Episodic {
         path: &nn::Path<'_>,
         spec: &AttentionSpec,
         (history, features): (i64, i64),
-        (width, channels, dropout): (i64, &[i64; 4], f64),
+        (width, convolutions, dropout): (i64, Convolutions<'_>, f64),
     ) -> Episodic {
         let layers = |name: &str| -> Vec<Layer> {
             (1..=spec.layers).map(|i| Layer::new(&(path / format!("{name}{i}")), width, spec, dropout)).collect()
         };
-        let trunk = Trunk::new(&(path / "frame"), features, channels, None);
+        let trunk = Trunk::new(&(path / "frame"), features, convolutions, None);
         Episodic {
             words: nn::embedding(path / "words", spec.words, width, Default::default()),
             frame: nn::linear(path / "frame" / "out", trunk.width(), width, Default::default()),

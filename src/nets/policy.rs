@@ -5,7 +5,7 @@ use tch::Tensor;
 use tch::nn::{self, Module};
 
 use super::episodic::{AttentionSpec, Episodic};
-use super::trunk::{Dense, Telling, Trunk};
+use super::trunk::{Convolutions, Dense, Telling, Trunk};
 use crate::domain::{ActionType, Class};
 
 /// The size of a policy network.
@@ -18,6 +18,9 @@ pub struct PolicySpec {
     pub embedding: i64,
     /// Channels of the four convolutions; the first is 1 x 1, the others 3 x 3.
     pub channels: [i64; 4],
+    /// Whether the second convolution reads every other place.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub halved: bool,
     /// Width of the fully connected layers.
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
@@ -67,14 +70,16 @@ impl PolicyNet {
     /// A network with fresh weights under `path`, over maps of `features` channels a frame.
     pub fn new(path: &nn::Path<'_>, spec: &PolicySpec, features: i64) -> PolicyNet {
         let from = spec.history * features;
+        let over = |channels| Convolutions { channels, halved: spec.halved };
         let (body, width) = match &spec.attention {
             Some(attention) => {
-                let (frames, tokens) = ((spec.history, features), (spec.embedding, &spec.channels, spec.dropout));
+                let (frames, tokens) = ((spec.history, features), (spec.embedding, over(&spec.channels), spec.dropout));
                 (Body::Episodic(Box::new(Episodic::new(path, attention, frames, tokens))), spec.embedding)
             }
             None => {
-                let trunk = Trunk::new(path, from, &spec.channels, Some(spec.embedding));
-                let (telling, width) = (Telling::new(path, spec.embedding, spec.goal.as_ref(), from), trunk.width());
+                let trunk = Trunk::new(path, from, over(&spec.channels), Some(spec.embedding));
+                let telling = Telling::new(path, spec.embedding, spec.goal.as_ref().map(over), from);
+                let width = trunk.width();
                 (Body::Trunk { telling, trunk }, width + spec.embedding)
             }
         };
@@ -116,7 +121,16 @@ mod tests {
     use crate::nets::visual::SIDE;
 
     fn spec(goal: Option<[i64; 4]>) -> PolicySpec {
-        PolicySpec { history: 5, embedding: 6, channels: [8; 4], hidden: vec![16], dropout: 0.2, goal, attention: None }
+        PolicySpec {
+            history: 5,
+            embedding: 6,
+            channels: [8; 4],
+            halved: false,
+            hidden: vec![16],
+            dropout: 0.2,
+            goal,
+            attention: None,
+        }
     }
 
     #[test]

@@ -7,6 +7,27 @@ use tch::nn::{self, Module, ModuleT};
 use super::film::Film;
 use super::visual::SIDE;
 
+/// The convolutions of a trunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Convolutions<'a> {
+    /// Their channels.
+    pub channels: &'a [i64; 4],
+    /// Whether the second one reads every other place, so that those after it see 4 x 4 places instead of 7 x 7.
+    pub halved: bool,
+}
+
+impl Convolutions<'_> {
+    /// How far apart the places are that the convolution at a position reads.
+    fn stride(self, position: usize) -> i64 {
+        if self.halved && position == 1 { 2 } else { 1 }
+    }
+
+    /// The side of the map that comes out.
+    fn side(self) -> i64 {
+        if self.halved { (SIDE + 1) / 2 } else { SIDE }
+    }
+}
+
 /// Four convolutions, the first 1 x 1, the others 3 x 3, each with batch norm, FiLM and ReLU.
 #[derive(Debug)]
 pub struct Trunk {
@@ -17,13 +38,13 @@ pub struct Trunk {
 impl Trunk {
     /// A trunk over `from` channels with fresh weights under `path`; `told` is the width of the vector that modulates it, if
     /// there is one.
-    pub fn new(path: &nn::Path<'_>, from: i64, channels: &[i64; 4], told: Option<i64>) -> Trunk {
+    pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, told: Option<i64>) -> Trunk {
         let mut from = from;
         let mut convs = Vec::new();
-        for (i, &to) in channels.iter().enumerate() {
+        for (i, &to) in convolutions.channels.iter().enumerate() {
             let here = path / format!("conv{}", i + 1);
             let (kernel, padding) = if i == 0 { (1, 0) } else { (3, 1) };
-            let config = nn::ConvConfig { padding, bias: false, ..Default::default() };
+            let config = nn::ConvConfig { padding, stride: convolutions.stride(i), bias: false, ..Default::default() };
             convs.push((
                 nn::conv2d(&here / "conv", from, to, kernel, config),
                 nn::batch_norm2d(&here / "norm", to, Default::default()),
@@ -31,7 +52,7 @@ impl Trunk {
             ));
             from = to;
         }
-        Trunk { convs, width: from * SIDE * SIDE }
+        Trunk { convs, width: from * convolutions.side().pow(2) }
     }
 
     /// How many numbers come out.
@@ -102,11 +123,11 @@ pub enum Telling {
 }
 
 impl Telling {
-    /// For sentences of `width` numbers, or with `goal`, the channels of its convolutions, for stacks of `from` channels.
-    pub fn new(path: &nn::Path<'_>, width: i64, goal: Option<&[i64; 4]>, from: i64) -> Telling {
-        let Some(channels) = goal else { return Telling::Sentence { width } };
+    /// For sentences of `width` numbers, or with `goal`, its convolutions, for stacks of `from` channels.
+    pub fn new(path: &nn::Path<'_>, width: i64, goal: Option<Convolutions<'_>>, from: i64) -> Telling {
+        let Some(convolutions) = goal else { return Telling::Sentence { width } };
         let path = path / "goal";
-        let trunk = Trunk::new(&path, from, channels, None);
+        let trunk = Trunk::new(&path, from, convolutions, None);
         let out = nn::linear(&path / "out", trunk.width(), width, Default::default());
         Telling::Goal { trunk, out }
     }

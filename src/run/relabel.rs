@@ -235,8 +235,7 @@ mod tests {
         let trajectories: Vec<Trajectory> = dataset.trajectories().unwrap().map(Result::unwrap).collect();
         let texts = |source| {
             let summaries = Summaries::read(&[folder.path()], Some(source)).unwrap();
-            let selection =
-                Selection { composites: Composites::Labels, labels_of: Some(source.into()), corrections: false };
+            let selection = Selection { labels_of: Some(source.into()), ..Selection::of(Composites::Labels) };
             let source =
                 Source { trajectories: &trajectories, held_out: &dataset.manifest().held_out, summaries: &summaries };
             let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();

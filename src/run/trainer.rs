@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::algo::chain::Pairs;
     use crate::data::features::{Features, Header, Writer};
-    use crate::data::items::{Items, Label};
+    use crate::data::items::{Items, Label, Past};
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::eyes::Eyes;
@@ -231,8 +231,17 @@ mod tests {
         let small = |_| AttentionSpec { words: 10, layers: 1, heads: 1, inner: 4 };
         let attention = preset.policy.attention.map(small);
         let embedding = if attention.is_some() { 4 } else { 3 };
-        preset.policy =
-            PolicySpec { history: 2, embedding, channels: [4; 4], hidden: vec![32], dropout: 0.1, goal, attention };
+        let channels = [4; 4];
+        preset.policy = PolicySpec {
+            history: 2,
+            embedding,
+            channels,
+            halved: false,
+            hidden: vec![32],
+            dropout: 0.1,
+            goal,
+            attention,
+        };
         preset.critic = preset.critic.map(|critic| CriticSpec { channels: [4; 4], hidden: vec![16], ..critic });
         if let Some(chaining) = &mut preset.chaining {
             chaining.batch = 8;
@@ -275,6 +284,7 @@ mod tests {
             training: (0..8).map(|i| span(i % 2, i / 2 * 6)).collect(),
             held_out: vec![span(0, 0), span(1, 0)],
             firsts: vec![0, 6, 12, 18, FRAMES as u32],
+            past: Past::Trajectory,
         }
     }
 

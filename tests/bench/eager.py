@@ -32,15 +32,17 @@ class Film(nn.Module):
 
 
 class Trunk(nn.Module):
-    def __init__(self, width, channels, told):
+    def __init__(self, width, channels, halved, told):
         super().__init__()
         self.convs, self.norms, self.films = nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         for i, to in enumerate(channels):
             kernel = 1 if i == 0 else 3
-            self.convs.append(nn.Conv2d(width, to, kernel, padding=kernel // 2, bias=False))
+            stride = 2 if halved and i == 1 else 1
+            self.convs.append(nn.Conv2d(width, to, kernel, stride, padding=kernel // 2, bias=False))
             self.norms.append(nn.BatchNorm2d(to))
             self.films.append(Film(told, to))
             width = to
+        self.width = width * (SIDE + 1 >> 1 if halved else SIDE) ** 2
 
     def forward(self, x, told):
         for conv, norm, film in zip(self.convs, self.norms, self.films):
@@ -60,8 +62,8 @@ class Policy(nn.Module):
     def __init__(self, features):
         super().__init__()
         spec = PRESET["policy"]
-        self.trunk = Trunk(features, spec["channels"], spec["embedding"])
-        width = spec["channels"][-1] * SIDE * SIDE + spec["embedding"]
+        self.trunk = Trunk(features, spec["channels"], spec["halved"], spec["embedding"])
+        width = self.trunk.width + spec["embedding"]
         self.heads = dense(width, spec["hidden"], spec["dropout"], ACTIONS + CLASSES)
 
     def forward(self, seen, told):
@@ -72,8 +74,8 @@ class Critic(nn.Module):
     def __init__(self, features):
         super().__init__()
         spec, told = PRESET["critic"], PRESET["policy"]["embedding"]
-        self.trunk = Trunk(features, spec["channels"], told)
-        width = spec["channels"][-1] * SIDE * SIDE + told
+        self.trunk = Trunk(features, spec["channels"], spec["halved"], told)
+        width = self.trunk.width + told
         chosen = spec["action_embedding"] + spec["object_embedding"]
         self.actions = nn.ModuleList(nn.Embedding(ACTIONS, spec["action_embedding"]) for _ in range(2))
         self.objects = nn.ModuleList(nn.Embedding(CLASSES, spec["object_embedding"]) for _ in range(2))
