@@ -18,18 +18,18 @@ pub enum Selection<'a> {
 }
 
 /// Decides from the logits of one situation: `actions` has 12 entries, `objects` 82. Of the navigation actions those in
-/// `blocked` are masked, unless that would leave none.
+/// `tried` are masked, unless that would leave none.
 pub fn decide(
     actions: &[f32],
     objects: &[f32],
     candidates: &[Candidate],
-    blocked: &[ActionType],
+    tried: &[ActionType],
     selection: Selection<'_>,
 ) -> Decision {
-    let all_blocked = ActionType::ALL.iter().all(|kind| kind.is_interaction() || blocked.contains(kind));
+    let all_tried = ActionType::ALL.iter().all(|kind| kind.is_interaction() || tried.contains(kind));
     let possible = |kind: ActionType| match kind.is_interaction() {
         true => candidates.iter().any(|c| c.kind == kind),
-        false => all_blocked || !blocked.contains(&kind),
+        false => all_tried || !tried.contains(&kind),
     };
     let open: Vec<usize> = ActionType::ALL.into_iter().filter(|&kind| possible(kind)).map(ActionType::index).collect();
     let shares = weigh(&softmax_over(actions, &open), &open, objects, candidates);
@@ -221,8 +221,8 @@ mod tests {
 
     #[test]
     fn what_led_nowhere_is_not_tried_again() {
-        let choose = |blocked: &[ActionType]| {
-            decide(&actions(ActionType::MoveAhead), &objects("Mug"), &[], blocked, Selection::Greedy).action.kind
+        let choose = |tried: &[ActionType]| {
+            decide(&actions(ActionType::MoveAhead), &objects("Mug"), &[], tried, Selection::Greedy).action.kind
         };
         assert_eq!(choose(&[]), ActionType::MoveAhead);
         assert_eq!(choose(&[ActionType::MoveAhead]), ActionType::RotateLeft);

@@ -72,14 +72,28 @@ impl Part {
         all.narrow(0, self.start, self.len)
     }
 
+    /// How many items it has.
+    pub fn len(&self) -> i64 {
+        self.len
+    }
+
     /// Where it ends among all items.
-    pub fn end(&self) -> i64 {
+    fn end(&self) -> i64 {
         self.start + self.len
     }
 
     /// What a number of this part is called.
     pub fn label(&self, name: &str) -> String {
         if self.name == BASE { name.to_string() } else { format!("{}_{name}", self.name) }
+    }
+}
+
+/// The items of several parts, one after the other.
+pub(super) fn of_all(parts: &[&Part], all: &Tensor) -> Tensor {
+    let adjacent = parts.windows(2).all(|pair| pair[0].end() == pair[1].start);
+    match parts.first() {
+        Some(first) if adjacent => all.narrow(0, first.start, parts.iter().map(|part| part.len).sum()),
+        _ => Tensor::cat(&parts.iter().map(|part| part.of(all)).collect::<Vec<_>>(), 0),
     }
 }
 

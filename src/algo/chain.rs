@@ -18,12 +18,37 @@ pub struct Chaining {
     pub worth: Worth,
     /// Whether the worth is clipped to 0..1, where every return lies.
     pub clip: bool,
+    /// What the policy learns from; the critic learns from both equations.
+    pub extracted: Extracted,
+    /// Whose statistics normalise chained items while the policy learns from them.
+    pub normalised: Normalised,
     /// The weight of both equations together; that of the base loss is 1.
     pub weight: f64,
     /// The weight of equation 4 within chaining.
     pub chain: f64,
     /// The weight of equation 5 within chaining; 0 where there are no sentences to join.
     pub aggregate: f64,
+}
+
+/// Which equations the policy learns from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extracted {
+    /// Both, as in the paper.
+    Both,
+    /// Equation 5 alone. Where neither of two skills serves the other, no action is better than another for equation 4, so that
+    /// it weighs as much as a demonstration and clones A while the policy is told of B.
+    Joint,
+}
+
+/// Whose statistics the policy's batch norms use for chained items.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Normalised {
+    /// Those of the whole batch: what an agent sees later is normalised by a mixture that it never meets.
+    Together,
+    /// The running ones of demonstrated items, which alone keep them up.
+    ByDemonstrations,
 }
 
 /// Where pairs of skills come from.

@@ -5,6 +5,7 @@ pub mod batch;
 pub mod bc;
 pub mod chain;
 pub mod critic;
+pub mod extraction;
 pub mod iql;
 pub mod learner;
 pub mod schedule;

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tch::{Kind, Tensor, nn};
+use tch::{Tensor, nn};
 
-use super::batch::{Batch, Part};
+use super::batch::Batch;
 use super::bc;
 use super::chain::Chaining;
 use super::critic::CriticLearner;
+use super::extraction::{self, Pass};
 use super::learner::{Learner, Optimisation};
 use super::terms::{NotFinite, Terms};
 use crate::nets::policy::{Logits, PolicyNet};
@@ -54,21 +55,24 @@ impl<'a> Update<'a> {
         let mut terms = Terms::default();
         let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
         // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
-        let (learned, weights) = match &self.critic {
-            Some(critic) if critic.is_warming_up() => (&parts[..1], None),
-            _ => (&parts[..], judged.as_ref().map(|judged| &judged.weights)),
+        let (passes, weights) = match &self.critic {
+            Some(critic) if critic.is_warming_up() => (Pass::all(&parts, None), None),
+            _ => (Pass::all(&parts, self.chaining.as_ref()), judged.as_ref().map(|judged| &judged.weights)),
         };
-        let shown = |all: &Tensor| all.narrow(0, 0, learned.iter().map(Part::end).max().unwrap_or(0));
-        let logits = self.policy.forward(&shown(&all.observation), &shown(&all.told), true);
-        let choices = [&all.actions, &all.objects].map(shown);
-        let policy_loss = policy_loss(&logits, &choices, learned, weights, &mut terms);
+        let mut policy_loss = Tensor::from(0.0f32).to_device(all.told.device());
+        let mut seen = None;
+        for pass in &passes {
+            let logits = self.policy.forward(&pass.of(&all.observation), &pass.of(&all.told), pass.train);
+            policy_loss += extraction::loss(&logits, &all, pass, weights, &mut terms);
+            seen.get_or_insert(logits);
+        }
         let critic_loss = judged.as_ref().map(|judged| judged.loss(&parts, &mut terms));
         let mut numbers = terms.numbers(self.learner.step() + 1)?;
         self.learner.minimise(&policy_loss);
         if let (Some(critic), Some(loss)) = (&mut self.critic, critic_loss) {
             critic.minimise(&loss);
         }
-        if report {
+        if report && let Some(logits) = seen {
             let base = |all: &Tensor| all.narrow(0, 0, batch.base.actions.size()[0]);
             let shown = Logits { actions: base(&logits.actions), objects: base(&logits.objects) };
             let (actions, objects) = bc::accuracy(&shown, &batch.base.actions, &batch.base.objects);
@@ -102,36 +106,14 @@ impl<'a> Update<'a> {
     }
 }
 
-/// Weighted policy extraction over both heads: the action's surprise is averaged over a part's items, the object's over its
-/// interactions. Without weights, behaviour cloning.
-fn policy_loss(
-    logits: &Logits,
-    [actions, objects]: &[Tensor; 2],
-    parts: &[Part],
-    weights: Option<&Tensor>,
-    terms: &mut Terms,
-) -> Tensor {
-    let weigh = |surprise: Tensor| weights.map_or_else(|| surprise.shallow_clone(), |weights| &surprise * weights);
-    let bc::Surprise { action, object } = bc::surprise(logits, actions, objects);
-    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(objects));
-    let part_loss = |part: &Part| {
-        let action = part.of(&action).mean(Kind::Float);
-        let object = part.of(&object).sum(Kind::Float) / part.of(&interactions).sum(Kind::Float).clamp_min(1.0);
-        terms.add(part.label("action_loss"), &action);
-        terms.add(part.label("object_loss"), &object);
-        (action + object) * part.weight
-    };
-    parts.iter().map(part_loss).sum()
-}
-
 #[cfg(test)]
 mod tests {
-    use tch::Device;
+    use tch::{Device, Kind};
 
     use super::*;
     use crate::algo::adamw::AdamWConfig;
     use crate::algo::batch::{Pairs, Transitions};
-    use crate::algo::chain::{Cut, Pairs as Source, Worth};
+    use crate::algo::chain::{Cut, Extracted, Normalised, Pairs as Source, Worth};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{Critic, CriticSpec, Senses};
@@ -195,6 +177,8 @@ mod tests {
         cut: Cut::Uniform,
         worth: Worth::NextValue,
         clip: true,
+        extracted: Extracted::Both,
+        normalised: Normalised::Together,
         weight: 1.0,
         chain: 0.5,
         aggregate: 0.5,
@@ -346,6 +330,33 @@ mod tests {
         let mut update = update(&nets, 8, warming(), Some(CHAINING));
         let mut clones = || update.update(&chained_skills(), false).unwrap().contains_key("chain_action_loss");
         assert_eq!([0; 8].map(|_| clones()), [false, false, false, false, false, true, true, true]);
+    }
+
+    #[test]
+    fn of_equation_4_only_the_critic_learns_where_the_policy_extracts_the_joint_skills_alone() {
+        let _chance = crate::nets::testing::chance();
+        let losses = |chaining: Chaining| {
+            let nets = nets();
+            update(&nets, 1, IQL, Some(chaining)).update(&chained_skills(), false).unwrap()
+        };
+        let (both, joint) = (losses(CHAINING), losses(Chaining { extracted: Extracted::Joint, ..CHAINING }));
+        assert!(both.contains_key("chain_action_loss") && !joint.contains_key("chain_action_loss"), "{joint:?}");
+        for name in ["chain_q_loss", "chain_value_loss", "lead_action_loss", "follow_action_loss"] {
+            assert!(joint.contains_key(name), "{name} is not among {joint:?}");
+        }
+    }
+
+    #[test]
+    fn chained_items_leave_the_statistics_of_demonstrated_ones_alone_where_the_preset_says_so() {
+        let _chance = crate::nets::testing::chance();
+        let means = |chaining: Option<Chaining>| {
+            let nets = nets();
+            update(&nets, 1, IQL, chaining).update(&chained_skills(), false).unwrap();
+            nets.store.variables().into_iter().filter(|(name, _)| name.ends_with("running_mean")).collect::<Tensors>()
+        };
+        let apart = Chaining { normalised: Normalised::ByDemonstrations, ..CHAINING };
+        assert_eq!(means(Some(apart)), means(None));
+        assert!(means(Some(CHAINING)) != means(None));
     }
 
     #[test]

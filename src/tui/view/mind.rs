@@ -126,7 +126,7 @@ fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
             ("masked: no knife in the hand", "no knife")
         }
         ActionType::Slice => ("masked: nothing to slice in reach", "none near"),
-        _ => ("masked: it just failed here", "just failed"),
+        _ => ("masked: tried at this view", "tried here"),
     };
     if long.width() <= room { long } else { short }
 }
