@@ -139,8 +139,7 @@ class Update:
         if self.critic:
             loss, weights = self.judge(seen)
             losses.append((self.optimisers[1], loss))
-        terms = cross_entropy(self.policy(seen, batch["told"]), batch, weights)
-        losses.append((self.optimisers[0], averaged(batch["parts"], *terms)))
+        losses.append((self.optimisers[0], self.extract(seen, weights)))
         for optimiser, loss in losses:
             optimiser.zero_grad()
             loss.backward()
@@ -152,6 +151,24 @@ class Update:
                 for own, online in zip(self.target.buffers(), self.critic.buffers()):
                     own.copy_(online)
         return losses[0][1].item()
+
+    def extract(self, seen, weights):
+        """Demonstrated items, and by their running statistics those of equation 5."""
+        batch, parts = self.batch, self.batch["parts"]
+        base = slice(*parts[0][:2])
+        logits = self.policy(seen[base], batch["told"][base])
+        if not self.critic:
+            return averaged(parts, *cross_entropy(logits, batch, weights))
+        joint = slice(parts[2][0], parts[3][1])
+        self.policy.eval()
+        chained = self.policy(seen[joint], batch["told"][joint])
+        self.policy.train()
+        kept = lambda values: torch.cat([values[base], values[joint]])
+        logits = [torch.cat(pair) for pair in zip(logits, chained)]
+        terms = cross_entropy(logits, {name: kept(batch[name]) for name in ("actions", "objects")}, kept(weights))
+        size, each = parts[0][1], parts[2][1] - parts[2][0]
+        again = [parts[0], (size, size + each, parts[2][2]), (size + each, size + 2 * each, parts[3][2])]
+        return averaged(again, *terms)
 
     def judge(self, seen):
         batch, iql, critic = self.batch, PRESET["iql"], self.critic

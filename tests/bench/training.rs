@@ -1,4 +1,4 @@
-//! How long an update takes with each preset in its own size, and how long its batch takes to gather. Maps and texts are
+//! How long an update takes with each preset in its own size once its critic is warm, and how long its batch takes to gather. Maps and texts are
 //! random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`.
 
 #![allow(clippy::print_stdout)]
@@ -10,7 +10,7 @@ use std::time::Instant;
 use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::algo::chain::Pairs;
 use sprint_explorer::data::features::{Features, Header, Writer};
-use sprint_explorer::data::items::{Items, Label, Span};
+use sprint_explorer::data::items::{Items, Label, Past, Span};
 use sprint_explorer::nets::device::best_device;
 use sprint_explorer::nets::eyes::Eyes;
 use sprint_explorer::run::batches::Batches;
@@ -33,10 +33,18 @@ fn main() -> anyhow::Result<()> {
     println!("{:<18} {:>6} {:>7} {:>8} {:>8} {:>9}", "preset", "batch", "pairs", "update", "least", "gathering");
     for name in Preset::names() {
         if asked.is_empty() || asked.iter().any(|wanted| wanted == name) {
-            measure(&Preset::named(name)?, device)?;
+            measure(&warm(Preset::named(name)?), device)?;
         }
     }
     Ok(())
+}
+
+/// Past the warm-up, in which the policy has less to compute.
+fn warm(mut preset: Preset) -> Preset {
+    if let Some(iql) = &mut preset.iql {
+        iql.warmup_share = 0.0;
+    }
+    preset
 }
 
 fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
@@ -124,5 +132,6 @@ fn items() -> Items {
         training: (0..FRAMES / SPAN - 1).map(span).collect(),
         held_out: Vec::new(),
         firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
+        past: Past::Trajectory,
     }
 }
