@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Trains the methods and measures them on ALFRED's task sets: every row of the README's tables of results.
+# Trains the methods and measures them on ALFRED's task sets, as for the README's tables of results.
 # Stopped or killed at any time, the same command goes on where it was.
 #
 #   assets/experiments.sh DATA EYES OUT [METHOD ...]
@@ -10,7 +10,7 @@
 # may name further datasets to learn from.
 set -euo pipefail
 if [ $# -lt 3 ]; then
-    sed -n '2,9s/^# \{0,1\}//p' "$0"
+    sed -n '2,10s/^# \{0,1\}//p' "$0"
     exit 1
 fi
 data=$1 eyes=$2 out=$3
@@ -32,17 +32,17 @@ pretrain() {
 
 # A method's policy begins as a clone of what it learns from, where it is of the clones' kind.
 train() {
-    local method=$1 seed=$2 clone base=l-bc data=''
+    local method=$1 seed=$2 clone base=l-bc otherwise=''
     case $method in
     et | am)
         pretrain "$seed" "$method" "$method" $((${CLONING:-15000} + ${STEPS:-3000})) ''
         return
         ;;
     l-bc | iql-primitive | sprint-no-agg) clone=clone ;;
-    sprint-concat-agg) clone=clone-concat base=l-bc-agg data=$'[data]\ncomposites = "concat"' ;;
+    sprint-concat-agg) clone=clone-concat base=l-bc-agg otherwise=$'[data]\ncomposites = "concat"' ;;
     *) clone=clone-agg base=l-bc-agg ;;
     esac
-    pretrain "$seed" $clone $base "${CLONING:-15000}" "$data"
+    pretrain "$seed" $clone $base "${CLONING:-15000}" "$otherwise"
     pretrain "$seed" "$method" "$method" "${STEPS:-3000}" $'[training.schedule]\nlearning_rate = 3e-4' \
         --policy-from "$out/$seed/$clone"
 }

@@ -141,3 +141,27 @@ impl Telling {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+
+    #[test]
+    fn a_halved_trunk_gives_four_by_four_places_and_still_sees_all_of_the_map() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(6);
+        let widths = [false, true].map(|halved| {
+            let store = nn::VarStore::new(Device::Cpu);
+            let trunk = Trunk::new(&store.root(), 2, Convolutions { channels: &[16; 4], halved }, None);
+            let corner = Tensor::zeros([1, 2, SIDE, SIDE], (Kind::Float, Device::Cpu));
+            let dark = trunk.forward(&corner, None, false);
+            let _ = corner.select(2, SIDE - 1).select(2, SIDE - 1).fill_(9.0);
+            assert_eq!(dark.size(), [1, trunk.width()]);
+            assert!(trunk.forward(&corner, None, false) != dark, "the last place matters");
+            trunk.width()
+        });
+        assert_eq!(widths, [16 * 7 * 7, 16 * 4 * 4]);
+    }
+}

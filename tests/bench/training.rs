@@ -1,5 +1,5 @@
-//! How long an update takes with each preset in its own size once its critic is warm, and how long its batch takes to gather. Maps and texts are
-//! random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`.
+//! How long an update takes with each preset in its own size once its critic is warm, and how long its batch takes to
+//! gather. Maps and texts are random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`.
 
 #![allow(clippy::print_stdout)]
 
