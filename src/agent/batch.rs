@@ -95,7 +95,8 @@ impl Team for LearnedTeam {
             let width = tensor.size()[1] as usize;
             Ok((width, Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu))?))
         };
-        let ((kinds, actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        let ((kinds, mut actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        actions.chunks_exact_mut(kinds).for_each(|row| self.config.balance(row));
         let rows = actions.chunks_exact(kinds).zip(objects.chunks_exact(classes));
         let decided = rows.zip(&mut self.seats).zip(situations).map(|(((actions, objects), memory), situation)| {
             let here = situation.as_mut()?;
@@ -111,8 +112,9 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
+    use crate::agent::balance::Balance;
     use crate::agent::{Mind, Policy};
-    use crate::domain::Heading;
+    use crate::domain::{ActionType, Heading};
     use crate::house::House;
     use crate::house::testing::kitchen_house;
     use crate::nets::device;
@@ -181,20 +183,29 @@ mod tests {
 
     #[test]
     fn several_at_once_think_what_one_alone_thinks() {
-        let (Some(mut one), Some(agent)) = (shipped(), shipped()) else {
-            eprintln!("skipped: the shipped agent needs its sentence encoder");
-            return;
-        };
-        let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
-        let together = minds(&mut team, 3, &[0, 1, 2]).remove(0);
-        let mut house = turned(Heading::West);
-        one.begin(3);
-        let mut here =
-            Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
-        let alone = one.decide(&mut here).unwrap().mind.unwrap();
-        // Another shape of the pass may round otherwise, no more.
-        for (a, b) in together.actions.iter().zip(alone.actions) {
-            assert!((a.unwrap_or(-1.0) - b.unwrap_or(-1.0)).abs() < 1e-4, "{together:?} {alone:?}");
+        let mut ahead = Vec::new();
+        let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
+        for balance in [None, Some(Balance { strength: 0.5, shares })] {
+            let (Some(mut one), Some(mut agent)) = (shipped(), shipped()) else {
+                eprintln!("skipped: the shipped agent needs its sentence encoder");
+                return;
+            };
+            (one.config.balance, agent.config.balance) = (balance.clone(), balance);
+            let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
+            let together = minds(&mut team, 3, &[0, 1, 2]).remove(0);
+            let mut house = turned(Heading::West);
+            one.begin(3);
+            let mut here =
+                Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
+            let alone = one.decide(&mut here).unwrap().mind.unwrap();
+            // Another shape of the pass may round otherwise, no more.
+            for (a, b) in together.actions.iter().zip(alone.actions) {
+                assert!((a.unwrap_or(-1.0) - b.unwrap_or(-1.0)).abs() < 1e-4, "{together:?} {alone:?}");
+            }
+            let odds = |action: usize| alone.actions[action].unwrap();
+            ahead.push(odds(0) / odds(1));
         }
+        // Nine times the share, at half strength: a third of the odds.
+        assert!((ahead[0] / ahead[1] - 3.0).abs() < 1e-3, "{ahead:?}");
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tch::Device;
 
+use super::balance::Balance;
 use crate::domain::{ActionType, Class};
 use crate::nets::critic::CriticSpec;
 use crate::nets::eyes::Eyes;
@@ -93,6 +94,9 @@ pub struct Config {
     /// The words that the agent knows, where it reads words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<Vec<String>>,
+    /// What of the actions' frequency does not count when it decides; absent where all does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub balance: Option<Balance>,
     /// The sentence encoder.
     pub sentence_encoder: SentenceSpec,
     /// Where it comes from.
@@ -182,6 +186,13 @@ impl Config {
         Ok(())
     }
 
+    /// Balances the logits of the action head, where the agent's are.
+    pub fn balance(&self, logits: &mut [f32]) {
+        if let Some(balance) = &self.balance {
+            balance.apply(logits);
+        }
+    }
+
     /// Features in each of the 7 x 7 places of a map.
     pub fn features(&self) -> i64 {
         self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
@@ -239,6 +250,9 @@ impl Config {
         if let Some(attention) = &self.policy.attention {
             attention.check(self.policy.embedding).with_context(|| format!("{}: policy", path.display()))?;
         }
+        if let Some(balance) = &self.balance {
+            balance.check().map_err(|wrong| anyhow::anyhow!("{}: {wrong}", path.display()))?;
+        }
         let critic = self.critic.as_ref().map(|critic| ("critic.dropout", critic.dropout));
         for (field, share) in std::iter::once(("policy.dropout", self.policy.dropout)).chain(critic) {
             anyhow::ensure!(
@@ -276,6 +290,7 @@ pub(super) mod tests {
             method: None,
             critic: None,
             words: None,
+            balance: None,
             sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
             provenance: Provenance {
                 preset: "test".into(),

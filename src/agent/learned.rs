@@ -90,7 +90,8 @@ impl Policy for LearnedPolicy {
         let (observation, told) = self.perceive(situation)?;
         let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &told, false));
         let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
-        let (actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        let (mut actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        self.config.balance(&mut actions);
         Ok(self.memory.decide(&actions, &objects, &situation.house.candidates(), self.samples))
     }
 

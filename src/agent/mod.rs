@@ -1,6 +1,7 @@
 //! Agents: what decides the next action.
 
 pub mod average;
+pub mod balance;
 pub mod batch;
 pub mod checkpoint;
 pub mod config;

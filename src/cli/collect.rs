@@ -13,7 +13,7 @@ use crate::data::taskset;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::collect::{Collection, Source};
+use crate::run::collect::{Collection, Demonstrator, Manner, Source};
 use crate::run::scenes::Scenes;
 
 /// Collects demonstrations.
@@ -36,6 +36,9 @@ pub struct Collect {
     /// Task lengths, drawn uniformly; a length may be listed more than once
     #[arg(long, value_delimiter = ',', default_values_t = [1, 1, 1, 2])]
     lengths: Vec<usize>,
+    /// Who demonstrates, or says what a learner should have done
+    #[arg(long, value_enum, default_value = "seeker")]
+    demonstrator: Who,
     /// The share of steps at which chance takes over for up to four steps
     #[arg(long, default_value_t = 0.08)]
     noise: f64,
@@ -51,6 +54,14 @@ pub struct Collect {
 enum Where {
     /// Generated houses
     Generated,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Who {
+    /// Turns around until it has seen what it goes for
+    Seeker,
+    /// Goes straight for things, seen or not, as ALFRED's planner did
+    Expert,
 }
 
 impl Collect {
@@ -78,16 +89,25 @@ impl Collect {
             }
             None => Source::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations },
         };
-        let collection = Collection { out: self.out, source, seed: self.seed, noise: self.noise, learner };
+        let demonstrator = match self.demonstrator {
+            Who::Seeker => Demonstrator::Seeker,
+            Who::Expert => Demonstrator::Expert,
+        };
+        let manner = Manner { demonstrator, noise: self.noise };
+        let collection = Collection { out: self.out, source, seed: self.seed, manner, learner };
         let stop = stop::on_signals()?;
         let mut bars = Bars::new();
         let collected = collection.run(&mut bars, &stop)?;
         bars.end();
-        let Some(count) = collected else {
-            eprintln!("stopped; nothing was kept");
+        let at = collection.out.display();
+        eprintln!(
+            "{}{} demonstrations in {at}",
+            if collected.stopped { "stopped; the first " } else { "" },
+            collected.trajectories
+        );
+        if collected.stopped {
             return Ok(Ending::Interrupted);
-        };
-        eprintln!("{count} demonstrations in {}", collection.out.display());
+        }
         Ok(Ending::Ok)
     }
 }

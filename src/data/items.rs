@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::summaries::Summaries;
-use crate::domain::Trajectory;
 use crate::domain::trajectory::Annotation;
+use crate::domain::{ActionType, Trajectory};
 use crate::language::instruction::normalise;
 use crate::language::passage::{Passage, concatenated};
 
@@ -218,6 +218,20 @@ impl Items {
                 return Item { first: self.past.first(span, rng), frame, end: span.end, text: span.text };
             }
         }
+    }
+
+    /// Each action's share of what is drawn to learn from, in the order of the action head. One that never is counts as if
+    /// one in a million were.
+    pub fn action_shares(&self) -> Vec<f32> {
+        let mut shares = vec![0.0; ActionType::COUNT];
+        for span in &self.training {
+            let labels = self.labels.get(span.start as usize..span.end as usize).unwrap_or_default();
+            let actions = || labels.iter().flatten().map(|label| usize::from(label.action));
+            let each = 1.0 / actions().count().max(1) as f64;
+            actions().for_each(|action| shares[action] += each);
+        }
+        let spans = self.training.len().max(1) as f64;
+        shares.into_iter().map(|share| (share / spans).max(1e-6) as f32).collect()
     }
 
     fn is_labelled(&self, frame: usize) -> bool {
@@ -433,6 +447,22 @@ mod tests {
             Vec::from_iter::<std::collections::BTreeSet<u32>>(late.map(|item| item.first).collect())
         };
         assert_eq!([Past::Trajectory, Past::Span, Past::Either].map(firsts), [vec![0], vec![2], vec![0, 2]]);
+    }
+
+    #[test]
+    fn an_action_has_the_share_of_the_draws_in_which_it_is_the_label() {
+        let two = [trajectory(vec![0, 2], 6)];
+        let summaries = Summaries::default();
+        let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+        let mut labels = labels(&two);
+        labels[1] = Some(Label { action: 5, object: 1, taken: true });
+        labels[2] = None;
+        let items = Items::of(&source, labels, &Selection::of(Composites::None), 0).unwrap();
+        let shares = items.action_shares();
+        assert_eq!((shares[0], shares[5], shares[3]), (0.75, 0.25, 1e-6), "half of the first of two skills");
+        let drawn = items.draw(&items.training, 1, 0, 4000);
+        let fifth = drawn.iter().filter(|item| item.frame == 1).count();
+        assert!((900..1100).contains(&fifth), "{fifth}");
     }
 
     #[test]

@@ -51,6 +51,9 @@ pub struct Preset {
     pub chaining: Option<Chaining>,
     /// The training of policy and critic.
     pub training: Optimisation,
+    /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.
+    #[serde(default)]
+    pub balance: f32,
     /// How the result is measured.
     pub appraisal: Appraisal,
 }
@@ -164,6 +167,8 @@ impl Preset {
         ] {
             anyhow::ensure!((2..=65_536).contains(&batch), "{field} is {batch}, which is not between 2 and 65536");
         }
+        let balance = preset.balance;
+        anyhow::ensure!((0.0..=1.0).contains(&balance), "balance is {balance}, which is not a share");
         preset.check_method()?;
         Ok(preset)
     }

@@ -18,7 +18,7 @@ use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
 use sprint_explorer::nets::embedding_cache::EmbeddingCache;
 use sprint_explorer::nets::weights;
-use sprint_explorer::run::collect::{Collection, Source};
+use sprint_explorer::run::collect::{Collection, Demonstrator, Manner, Source};
 use sprint_explorer::run::comparison::Comparison;
 use sprint_explorer::run::evaluate::Evaluation;
 use sprint_explorer::run::finished::FinishedRun;
@@ -190,7 +190,7 @@ fn collected(at: &Path, file: &str) -> Vec<Vec<u8>> {
         out: at.to_owned(),
         source: Source::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
         seed: 3,
-        noise: 0.0,
+        manner: Manner { demonstrator: Demonstrator::Seeker, noise: 0.0 },
         learner: None,
     };
     collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();

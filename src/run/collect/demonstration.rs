@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::agent::learned::LearnedPolicy;
 use crate::agent::seeker::Seeker;
-use crate::agent::{Decision, Policy};
+use crate::agent::{Decision, ExpertPolicy, Policy};
 use crate::domain::trajectory::Annotation;
 use crate::domain::{Action, ActionType, Scene, Task, Trajectory, World};
 use crate::house::House;
@@ -18,6 +18,34 @@ use crate::run::scenes::Setting;
 const LONGEST: u32 = 4;
 /// More steps than this beyond three times the expert's give an episode up.
 const SLACK: u32 = 40;
+
+/// Who demonstrates, or corrects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demonstrator {
+    /// Turns around until it has seen what it goes for, as someone must who only sees.
+    #[default]
+    Seeker,
+    /// Goes straight for things, seen or not, as ALFRED's planner did.
+    Expert,
+}
+
+impl Demonstrator {
+    fn policy(self) -> Box<dyn Policy> {
+        match self {
+            Demonstrator::Seeker => Box::new(Seeker::new()),
+            Demonstrator::Expert => Box::new(ExpertPolicy::new()),
+        }
+    }
+}
+
+/// How tasks are demonstrated.
+#[derive(Clone, Copy, Debug)]
+pub struct Manner {
+    /// Who says what is right in every state.
+    pub demonstrator: Demonstrator,
+    /// The share of steps at which chance takes over for a few steps.
+    pub noise: f64,
+}
 
 /// What a task itself says. Of a single skill, the instruction is its sentence.
 pub(super) fn own_words(task: &Task) -> Annotation {
@@ -51,8 +79,8 @@ pub(super) struct Demonstration<'a> {
     pub id: String,
     /// What is said of it.
     pub annotations: Vec<Annotation>,
-    /// The share of steps at which chance takes over for a few steps.
-    pub noise: f64,
+    /// How.
+    pub manner: Manner,
 }
 
 impl Demonstration<'_> {
@@ -67,19 +95,19 @@ impl Demonstration<'_> {
         let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
         let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
         let mut rollout = Rollout::new(house, told, Some(grader), None);
-        let mut seeker = Seeker::new();
+        let mut demonstrator = self.manner.demonstrator.policy();
         if let Some(learner) = learner.as_deref_mut() {
             learner.begin(rng.random());
         }
         // Some episodes are left undisturbed.
-        let noise = if rng.random_bool(0.3) { 0.0 } else { self.noise };
+        let noise = if rng.random_bool(0.3) { 0.0 } else { self.manner.noise };
         let (mut actions, mut choices, mut skill_starts) = (Vec::new(), Vec::new(), vec![0]);
         let mut disturbed = 0;
         while rollout.end().is_none() {
             if rollout.steps() > 3 * self.task.expert_steps + SLACK {
                 return Ok(None);
             }
-            let Ok(choice) = rollout.decide(&mut seeker) else { return Ok(None) };
+            let Ok(choice) = rollout.decide(demonstrator.as_mut()) else { return Ok(None) };
             if disturbed == 0 && rng.random_bool(noise) {
                 disturbed = rng.random_range(1..=LONGEST);
             }

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use tch::Device;
 
 use self::demonstration::{Demonstration, own_words, phrasings};
+pub use self::demonstration::{Demonstrator, Manner};
 use super::progress::{Report, Scalars};
 use super::scenes::{Scenes, Setting};
 use crate::agent::Policy;
@@ -32,8 +33,8 @@ pub struct Collection {
     pub source: Source,
     /// Drives houses, tasks, words and chance.
     pub seed: u64,
-    /// The share of steps at which chance takes over for a few steps.
-    pub noise: f64,
+    /// How.
+    pub manner: Manner,
     /// A checkpoint that acts instead of the demonstrator, with its sentence encoder: the demonstrator then only says what it
     /// would do, and finishes what is left at the horizon.
     pub learner: Option<(PathBuf, SharedEmbedder)>,
@@ -59,6 +60,15 @@ pub enum Source {
     },
 }
 
+/// What a collection came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Collected {
+    /// How many demonstrations were kept.
+    pub trajectories: usize,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
 /// Episodes in one house.
 const PER_HOUSE: usize = 4;
 /// Houses, or given tasks, between two writes, at most.
@@ -67,20 +77,20 @@ const GROUP: usize = 32;
 const HOUSES: u64 = 1_000_000;
 
 impl Collection {
-    /// Collects; the same trajectories for any number of threads. Returns how many, or `None` when it was stopped: nothing is
-    /// kept then. A task that the demonstrator cannot do gives no trajectory.
+    /// Collects; the same trajectories for any number of threads. Stopped, it keeps the first of them. A task that the
+    /// demonstrator cannot do gives no trajectory.
     ///
     /// # Errors
     /// When a given task does not fit its scene, which is found before anything is written; when the folder cannot be written to,
     /// or the learner not be loaded.
-    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Option<usize>> {
+    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Collected> {
         if let Source::Tasks { tasks, scenes } = &self.source {
             scenes.check(tasks)?;
         }
         let mut writer = Writer::new(&self.out)?;
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();
-        let mut next = 0u64;
+        let (mut next, mut stopped) = (0u64, false);
         while let Some(lots) = self.source.lots(next, counts.trajectories as usize) {
             next = lots.end;
             let endless = matches!(self.source, Source::Generated { .. }) && next >= HOUSES;
@@ -92,7 +102,9 @@ impl Collection {
             let made: Vec<Vec<Trajectory>> =
                 lots.into_par_iter().map_init(|| self.load(), lot).collect::<anyhow::Result<_>>()?;
             if stop.load(Ordering::Relaxed) {
-                return Ok(None);
+                // Of this group some lots may be missing.
+                stopped = true;
+                break;
             }
             let missing = self.source.most() - counts.trajectories as usize;
             for trajectory in made.into_iter().flatten().take(missing) {
@@ -110,7 +122,7 @@ impl Collection {
             held_out: Vec::new(),
             skipped: Vec::new(),
         })?;
-        Ok(Some(counts.trajectories as usize))
+        Ok(Collected { trajectories: counts.trajectories as usize, stopped })
     }
 
     /// Writes a scene that comes from a file beside the trajectories, once.
@@ -142,7 +154,7 @@ impl Collection {
                 let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
                 let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
                 let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
-                let demonstration = Demonstration { task, setting, id, annotations, noise: self.noise };
+                let demonstration = Demonstration { task, setting, id, annotations, manner: self.manner };
                 Ok(demonstration.play(learner, &mut rng)?.into_iter().collect())
             }
         }
@@ -168,7 +180,7 @@ impl Collection {
             let id = format!("{}-{position}", scene.name);
             let annotations = phrasings(&scene, &start, &task, annotations, rng);
             let setting = Setting { scene: scene.clone(), world: start };
-            let demonstration = Demonstration { task: &task, setting, id, annotations, noise: self.noise };
+            let demonstration = Demonstration { task: &task, setting, id, annotations, manner: self.manner };
             made.extend(demonstration.play(learner.as_deref_mut(), rng)?);
         }
         Ok(made)
@@ -231,6 +243,8 @@ mod tests {
     use crate::house::grading::{Grader, Grading};
     use crate::run::rollout::Rollout;
 
+    const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, noise: 0.0 };
+
     struct Silent;
 
     impl Report for Silent {
@@ -261,10 +275,13 @@ mod tests {
             out: folder.path().join("D"),
             source: Source::Tasks { tasks: tasks.clone(), scenes },
             seed: 1,
-            noise: 0.0,
+            manner: UNDISTURBED,
             learner: None,
         };
-        assert_eq!(collection.run(&mut Silent, &AtomicBool::new(false)).unwrap(), Some(1));
+        assert_eq!(
+            collection.run(&mut Silent, &AtomicBool::new(false)).unwrap(),
+            Collected { trajectories: 1, stopped: false }
+        );
         let dataset = Dataset::open(&collection.out).unwrap();
         let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
         let told = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
@@ -277,16 +294,76 @@ mod tests {
     }
 
     #[test]
+    fn the_seeker_looks_around_for_what_the_expert_goes_for_unseen() {
+        let folder = tempfile::tempdir().unwrap();
+        let choices = |demonstrator| {
+            let collection = Collection {
+                out: folder.path().join(format!("{demonstrator:?}")),
+                source: Source::Generated { episodes: 12, lengths: vec![1], annotations: 1 },
+                seed: 2,
+                manner: Manner { demonstrator, ..UNDISTURBED },
+                learner: None,
+            };
+            collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+            let dataset = Dataset::open(&collection.out).unwrap();
+            let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
+            made.into_iter().map(|trajectory| (trajectory.id, trajectory.actions)).collect::<Vec<_>>()
+        };
+        let (seeker, expert) = (choices(Demonstrator::Seeker), choices(Demonstrator::Expert));
+        let pairs: Vec<_> = seeker
+            .iter()
+            .zip(&expert)
+            .map(|((id, looks), (same, goes))| {
+                assert_eq!(id, same, "the same tasks");
+                (looks.len(), goes.len())
+            })
+            .collect();
+        let longer = pairs.iter().filter(|(looks, goes)| looks > goes).count();
+        assert!(longer > pairs.len() / 2, "{pairs:?}");
+    }
+
+    #[test]
+    fn a_stopped_collection_keeps_what_came_first() {
+        /// Stops at the first word of progress.
+        struct Stopping<'a>(&'a AtomicBool);
+        impl Report for Stopping<'_> {
+            fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+                self.0.store(true, Ordering::Relaxed);
+                Ok(())
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let collection = |name: &str| Collection {
+            out: folder.path().join(name),
+            source: Source::Generated { episodes: 150, lengths: vec![1], annotations: 1 },
+            seed: 4,
+            manner: UNDISTURBED,
+            learner: None,
+        };
+        let made = |collection: &Collection| -> Vec<Trajectory> {
+            Dataset::open(&collection.out).unwrap().trajectories().unwrap().collect::<Result<_, _>>().unwrap()
+        };
+        let (whole, part, stop) = (collection("whole"), collection("part"), AtomicBool::new(false));
+        whole.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+        let collected = part.run(&mut Stopping(&stop), &stop).unwrap();
+        let kept = made(&part);
+        assert_eq!(collected, Collected { trajectories: kept.len(), stopped: true });
+        assert!(!kept.is_empty() && kept.len() < 150, "{}", kept.len());
+        assert_eq!(kept, made(&whole)[..kept.len()]);
+    }
+
+    #[test]
     fn a_task_that_does_not_fit_its_scene_is_refused_and_an_earlier_dataset_kept() {
         let folder = tempfile::tempdir().unwrap();
         let mut tasks = tasks(folder.path());
         let collected = |tasks: &[Task]| {
             let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
             let source = Source::Tasks { tasks: tasks.to_vec(), scenes };
-            let collection = Collection { out: folder.path().join("D"), source, seed: 1, noise: 0.0, learner: None };
+            let collection =
+                Collection { out: folder.path().join("D"), source, seed: 1, manner: UNDISTURBED, learner: None };
             collection.run(&mut Silent, &AtomicBool::new(false))
         };
-        assert_eq!(collected(&tasks).unwrap(), Some(1));
+        assert_eq!(collected(&tasks).unwrap(), Collected { trajectories: 1, stopped: false });
         tasks[1].start = None;
         let error = format!("{:#}", collected(&tasks).unwrap_err());
         assert!(error.starts_with("tasks[1].start: missing"), "{error}");

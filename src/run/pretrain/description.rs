@@ -21,6 +21,7 @@ impl Pretraining {
             policy: self.preset.policy.clone(),
             critic: self.preset.critic.clone(),
             words: None,
+            balance: None,
             sentence_encoder: SentenceSpec {
                 name: self.sentence_encoder.clone(),
                 digest: embedder.encoder().digest().to_string(),

@@ -20,6 +20,7 @@ use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
 use super::trainer::Trainer;
 use super::trials::{self, Trials};
+use crate::agent::balance::Balance;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
 use crate::algo::chain::Pairs;
@@ -116,10 +117,12 @@ impl Pretraining {
         };
         let resnet18 = networks.eyes.store().is_none().then(|| encoder.digest().to_owned());
         let learned_from: BTreeSet<u32> = items.training.iter().map(|span| span.trajectory).collect();
+        let strength = self.preset.balance;
+        let balance = (strength > 0.0).then(|| Balance { strength, shares: items.action_shares() });
         let config = |steps: u64| -> anyhow::Result<Config> {
             let config = self.config(&digest, learned_from.len() as u64, steps)?;
             let words = words.as_ref().map(|words| words.words().to_vec());
-            Ok(Config { words, resnet18: resnet18.clone(), ..config })
+            Ok(Config { words, resnet18: resnet18.clone(), balance: balance.clone(), ..config })
         };
         let trainer = Trainer {
             networks: &networks,

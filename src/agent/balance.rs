@@ -1,0 +1,95 @@
+//! Logit adjustment (Menon et al. 2021, eq. 9): a clone walks ahead for half of what it was shown and is never sure when to
+//! turn, so that the likeliest action is to walk on past the turn. Taking part of what is merely frequent off the logits
+//! lets rarer actions win where the view speaks for them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::ActionType;
+
+/// How often each action was shown, and how much of that is taken off when an agent decides.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Balance {
+    /// The share of the log shares that is taken off: 0 none, 1 all, as if every action had been shown alike.
+    pub strength: f32,
+    /// Each action's share of the labels, in the order of the action head; above 0.
+    pub shares: Vec<f32>,
+}
+
+impl Balance {
+    /// Takes what is frequent off the logits of the action head; those of the most frequent action stay as they are, since
+    /// only differences count.
+    pub fn apply(&self, logits: &mut [f32]) {
+        let most = self.shares.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        for (logit, share) in logits.iter_mut().zip(&self.shares) {
+            *logit -= self.strength * (share / most).ln();
+        }
+    }
+
+    /// What is wrong with it, if something is.
+    ///
+    /// # Errors
+    /// When the strength is no share, or the shares are not one above 0 for each action.
+    pub fn check(&self) -> Result<(), String> {
+        if !(0.0..=1.0).contains(&self.strength) {
+            return Err(format!("balance.strength is {}, which is not a share", self.strength));
+        }
+        let (found, wanted) = (self.shares.len(), ActionType::COUNT);
+        if found != wanted {
+            return Err(format!("balance.shares has {found} numbers, not {wanted}"));
+        }
+        match self.shares.iter().find(|&&share| !(share > 0.0 && share <= 1.0)) {
+            Some(share) => Err(format!("balance.shares has {share}, which is not above 0 and at most 1")),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn balance(strength: f32) -> Balance {
+        let mut shares = vec![0.05; ActionType::COUNT];
+        shares[0] = 0.45;
+        Balance { strength, shares }
+    }
+
+    /// Logits of an agent that knows nothing but how often actions were shown.
+    fn knowing_only_shares() -> Vec<f32> {
+        balance(0.0).shares.iter().map(|share| share.ln()).collect()
+    }
+
+    #[test]
+    fn at_full_strength_what_is_merely_frequent_counts_for_nothing() {
+        let mut logits = knowing_only_shares();
+        balance(1.0).apply(&mut logits);
+        assert!(logits.iter().all(|logit| (logit - logits[0]).abs() < 1e-6), "{logits:?}");
+    }
+
+    #[test]
+    fn at_part_of_it_a_rare_action_wins_with_less_evidence_and_at_none_nothing_changes() {
+        // One action is e^1 times as likely as its share alone makes it; e^2.2 would be needed.
+        let with_evidence = |strength| {
+            let mut logits = knowing_only_shares();
+            logits[1] += 1.0;
+            balance(strength).apply(&mut logits);
+            logits
+        };
+        assert!(with_evidence(0.0)[1] < with_evidence(0.0)[0]);
+        assert!(with_evidence(0.6)[1] > with_evidence(0.6)[0]);
+        let mut untouched = knowing_only_shares();
+        balance(0.0).apply(&mut untouched);
+        assert_eq!(untouched, knowing_only_shares());
+    }
+
+    #[test]
+    fn what_no_training_could_have_seen_is_refused_in_words() {
+        balance(0.4).check().unwrap();
+        let refused = |strength, shares: &[f32]| Balance { strength, shares: shares.to_vec() }.check().unwrap_err();
+        assert_eq!(refused(1.5, &[0.1; 12]), "balance.strength is 1.5, which is not a share");
+        assert_eq!(refused(f32::NAN, &[0.1; 12]), "balance.strength is NaN, which is not a share");
+        assert_eq!(refused(0.5, &[0.1; 11]), "balance.shares has 11 numbers, not 12");
+        assert_eq!(refused(0.5, &[0.0; 12]), "balance.shares has 0, which is not above 0 and at most 1");
+    }
+}
