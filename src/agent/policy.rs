@@ -34,7 +34,7 @@ pub struct Decision {
 /// A policy's distribution over what it could do now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mind {
-    /// Probability of each action in the order of [`ActionType::ALL`], after masking; `None` where masked.
+    /// Probability of each action in the order of [`ActionType::ALL`], balanced and masked; `None` where masked.
     pub actions: [Option<f32>; ActionType::COUNT],
     /// Object classes by falling probability (before restriction to candidates), with whether one of that class is a
     /// candidate of the chosen or likeliest interaction.
