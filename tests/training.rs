@@ -101,6 +101,10 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
         assert!(lines().any(|line| line.contains(scalar)), "{scalar} is not in {progress}");
     }
     assert!(sprint.read("agent/README.md").contains("implicit Q-learning with skills chained"));
+    let config: serde_json::Value = serde_json::from_str(&sprint.read("agent/config.json")).unwrap();
+    assert_eq!(config["balance"]["strength"], 0.5, "as the preset has it");
+    let shares: f64 = config["balance"]["shares"].as_array().unwrap().iter().filter_map(|share| share.as_f64()).sum();
+    assert!((shares - 1.0).abs() < 1e-3, "{config}");
     done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
     assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
 }
@@ -111,6 +115,9 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     let corrected = TINY.replace("[visual]", "[data]\ncorrections = true\n\n[visual]");
     std::fs::write(sprint.path("corrected.toml"), corrected).unwrap();
     done(&sprint, "pretrain D --preset tiny.toml --out agent");
+    done(&sprint, "collect E --episodes 6 --seed 5 --lengths 2 --annotations 1 --demonstrator expert");
+    let steps = |dataset: &str| std::fs::read(sprint.path(dataset).join("trajectories.jsonl.zst")).unwrap();
+    assert!(steps("E") != steps("D"), "who knows where things are demonstrates otherwise");
     sprint.sample("tasks.json", 1, 2);
     let both = sprint.run("collect C --tasks tasks.json --episodes 3");
     assert!(both.stderr.contains("'--tasks <TASKS>' cannot be used with '--episodes <EPISODES>'"), "{}", both.stderr);

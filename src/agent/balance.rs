@@ -1,4 +1,4 @@
-//! Logit adjustment (Menon et al. 2021, eq. 9): a clone walks ahead for half of what it was shown and is never sure when to
+//! Logit adjustment after training (Menon et al. 2021): a clone walks ahead for half of what it was shown and is never sure when to
 //! turn, so that the likeliest action is to walk on past the turn. Taking part of what is merely frequent off the logits
 //! lets rarer actions win where the view speaks for them.
 

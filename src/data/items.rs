@@ -6,8 +6,8 @@ use std::ops::Range;
 use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
+use super::selection::{Composites, Past, Selection};
 use super::summaries::Summaries;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{ActionType, Trajectory};
@@ -23,68 +23,6 @@ pub struct Label {
     pub object: u8,
     /// Whether it was done and led to the next frame; otherwise it is what would have been right.
     pub taken: bool,
-}
-
-/// Which runs of two or more skills are learned from, and under which text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Composites {
-    /// None: single skills alone.
-    None,
-    /// All, under the summaries in the dataset's `labels.jsonl`.
-    Labels,
-    /// All, under the annotator's sentences one after the other.
-    Concat,
-    /// Whole trajectories alone, under what the annotator wrote of the whole.
-    Whole,
-}
-
-/// How far back the frames of an observation reach.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Past {
-    /// To what came before the span.
-    #[default]
-    Trajectory,
-    /// To the span's start: there a new episode might begin.
-    Span,
-    /// Of half of the items to what came before, of half to the span's start.
-    Either,
-}
-
-impl Past {
-    /// The first frame that an observation may show.
-    fn first(self, span: &Span, rng: &mut ChaCha8Rng) -> u32 {
-        match self {
-            Past::Trajectory => span.first,
-            Past::Span => span.start,
-            Past::Either => [span.first, span.start][usize::from(rng.random_bool(0.5))],
-        }
-    }
-}
-
-/// Which spans are learned from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Selection {
-    /// Spans of two or more skills.
-    pub composites: Composites,
-    /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub labels_of: Option<String>,
-    /// Whether the policy learns too what would have been right where chance or a learner did something else.
-    #[serde(default)]
-    pub corrections: bool,
-    /// How far back observations reach.
-    #[serde(default)]
-    pub past: Past,
-}
-
-impl Selection {
-    /// A selection of composites; with labels, of the only source there is.
-    pub fn of(composites: Composites) -> Selection {
-        Selection { composites, labels_of: None, corrections: false, past: Past::Trajectory }
-    }
 }
 
 /// What items are made of.
@@ -215,7 +153,12 @@ impl Items {
         loop {
             let frame = rng.random_range(span.start..span.end);
             if self.is_labelled(frame as usize) {
-                return Item { first: self.past.first(span, rng), frame, end: span.end, text: span.text };
+                return Item {
+                    first: self.past.first(span.first, span.start, rng),
+                    frame,
+                    end: span.end,
+                    text: span.text,
+                };
             }
         }
     }
@@ -463,12 +406,5 @@ mod tests {
         let drawn = items.draw(&items.training, 1, 0, 4000);
         let fifth = drawn.iter().filter(|item| item.frame == 1).count();
         assert!((900..1100).contains(&fifth), "{fifth}");
-    }
-
-    #[test]
-    fn a_selection_is_written_in_kebab_case() {
-        let read: Selection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
-        assert_eq!(read, Selection { labels_of: Some("rules".into()), ..Selection::of(Composites::Labels) });
-        assert!(toml::from_str::<Selection>("composites = \"some\"").is_err());
     }
 }

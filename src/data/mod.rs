@@ -7,6 +7,7 @@ pub mod items;
 pub mod json;
 pub mod lines;
 pub mod schema;
+pub mod selection;
 pub mod summaries;
 pub mod taskset;
 pub mod whole;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::algo::chain::{Chaining, Pairs};
 use crate::algo::iql::Iql;
 use crate::algo::learner::Optimisation;
-use crate::data::items::Selection;
+use crate::data::selection::Selection;
 use crate::nets::critic::CriticSpec;
 use crate::nets::policy::PolicySpec;
 use crate::nets::visual::VisualSpec;
@@ -258,7 +258,7 @@ fn resize(table: &mut toml::Table, size: toml::Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::items::Composites;
+    use crate::data::selection::Composites;
 
     #[test]
     fn every_shipped_preset_parses_in_every_size_and_is_what_its_name_says() {

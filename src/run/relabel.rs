@@ -127,7 +127,8 @@ mod tests {
 
     use super::*;
     use crate::data::dataset::{Manifest, Writer};
-    use crate::data::items::{Composites, Items, Label, Selection, Source};
+    use crate::data::items::{Items, Label, Source};
+    use crate::data::selection::{Composites, Selection};
     use crate::data::summaries::Summaries;
     use crate::domain::task::SceneRef;
     use crate::domain::trajectory::Annotation;

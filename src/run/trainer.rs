@@ -216,7 +216,8 @@ mod tests {
     use super::*;
     use crate::algo::chain::Pairs;
     use crate::data::features::{Features, Header, Writer};
-    use crate::data::items::{Items, Label, Past};
+    use crate::data::items::{Items, Label};
+    use crate::data::selection::Past;
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::eyes::Eyes;

@@ -26,7 +26,8 @@ use crate::agent::learned::SharedEmbedder;
 use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
-use crate::data::items::{Composites, Items, Source};
+use crate::data::items::{Items, Source};
+use crate::data::selection::Composites;
 use crate::data::summaries::Summaries;
 use crate::language::vocabulary::Vocabulary;
 
