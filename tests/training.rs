@@ -118,6 +118,8 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     done(&sprint, "collect E --episodes 6 --seed 5 --lengths 2 --annotations 1 --demonstrator expert");
     let steps = |dataset: &str| std::fs::read(sprint.path(dataset).join("trajectories.jsonl.zst")).unwrap();
     assert!(steps("E") != steps("D"), "who knows where things are demonstrates otherwise");
+    done(&sprint, "collect F --episodes 6 --seed 5 --lengths 2 --annotations 1 --demonstrator expert --prompt");
+    assert!(steps("F") != steps("E"), "who turns and acts as soon as it may does, too");
     sprint.sample("tasks.json", 1, 2);
     let both = sprint.run("collect C --tasks tasks.json --episodes 3");
     assert!(both.stderr.contains("'--tasks <TASKS>' cannot be used with '--episodes <EPISODES>'"), "{}", both.stderr);

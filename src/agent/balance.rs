@@ -12,24 +12,26 @@ use crate::domain::ActionType;
 pub struct Balance {
     /// The share of the log shares that is taken off: 0 none, 1 all, as if every action had been shown alike.
     pub strength: f32,
-    /// Each action's share of the labels, in the order of the action head; above 0.
+    /// Each action's share of the labels, in the order of the action head; 0 where it never was.
     pub shares: Vec<f32>,
 }
 
 impl Balance {
     /// Takes what is frequent off the logits of the action head; those of the most frequent action stay as they are, since
-    /// only differences count.
+    /// only differences count, and so does one that was never shown, of which nothing is known.
     pub fn apply(&self, logits: &mut [f32]) {
         let most = self.shares.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         for (logit, share) in logits.iter_mut().zip(&self.shares) {
-            *logit -= self.strength * (share / most).ln();
+            if *share > 0.0 {
+                *logit -= self.strength * (share / most).ln();
+            }
         }
     }
 
     /// What is wrong with it, if something is.
     ///
     /// # Errors
-    /// When the strength is no share, or the shares are not one above 0 for each action.
+    /// When the strength is no share, or there is not one share for each action.
     pub fn check(&self) -> Result<(), String> {
         if !(0.0..=1.0).contains(&self.strength) {
             return Err(format!("balance.strength is {}, which is not a share", self.strength));
@@ -38,8 +40,8 @@ impl Balance {
         if found != wanted {
             return Err(format!("balance.shares has {found} numbers, not {wanted}"));
         }
-        match self.shares.iter().find(|&&share| !(share > 0.0 && share <= 1.0)) {
-            Some(share) => Err(format!("balance.shares has {share}, which is not above 0 and at most 1")),
+        match self.shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            Some(share) => Err(format!("balance.shares has {share}, which is not a share")),
             None => Ok(()),
         }
     }
@@ -84,12 +86,23 @@ mod tests {
     }
 
     #[test]
+    fn an_action_that_was_never_shown_gains_nothing() {
+        let mut unseen = balance(1.0);
+        unseen.shares[3] = 0.0;
+        let mut logits = vec![0.0; ActionType::COUNT];
+        unseen.apply(&mut logits);
+        assert_eq!((logits[0], logits[3]), (0.0, 0.0));
+        assert!(logits[2] > 0.0);
+        unseen.check().unwrap();
+    }
+
+    #[test]
     fn what_no_training_could_have_seen_is_refused_in_words() {
         balance(0.4).check().unwrap();
         let refused = |strength, shares: &[f32]| Balance { strength, shares: shares.to_vec() }.check().unwrap_err();
         assert_eq!(refused(1.5, &[0.1; 12]), "balance.strength is 1.5, which is not a share");
         assert_eq!(refused(f32::NAN, &[0.1; 12]), "balance.strength is NaN, which is not a share");
         assert_eq!(refused(0.5, &[0.1; 11]), "balance.shares has 11 numbers, not 12");
-        assert_eq!(refused(0.5, &[0.0; 12]), "balance.shares has 0, which is not above 0 and at most 1");
+        assert_eq!(refused(0.5, &[-0.5; 12]), "balance.shares has -0.5, which is not a share");
     }
 }

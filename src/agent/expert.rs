@@ -3,7 +3,7 @@
 use anyhow::Context;
 
 use super::policy::{Carried, Decision, Policy, Situation};
-use crate::house::expert::Expert;
+use crate::house::expert::{Expert, Pace};
 
 /// Acts as the expert would.
 #[derive(Default)]
@@ -12,9 +12,14 @@ pub struct ExpertPolicy {
 }
 
 impl ExpertPolicy {
-    /// An expert policy.
+    /// A steady expert.
     pub fn new() -> ExpertPolicy {
         ExpertPolicy::default()
+    }
+
+    /// An expert that goes about things so.
+    pub fn of(pace: Pace) -> ExpertPolicy {
+        ExpertPolicy { expert: Expert::of(pace) }
     }
 }
 

@@ -10,12 +10,15 @@ use tch::Tensor;
 
 use super::policy::Decision;
 use super::select::{self, Selection};
-use crate::domain::ActionType;
+use crate::domain::{ActionType, Class};
 use crate::house::view::Candidate;
 use crate::nets::embedding_cache::Embedder;
 
 /// A sentence encoder with its cache, which several policies may share.
 pub type SharedEmbedder = Arc<Mutex<Embedder>>;
+
+/// How a view can be left: what is done, and to which class of things.
+type Way = (ActionType, Option<Class>);
 
 /// The last frames, what did not work, what was told, and chance.
 #[derive(Debug)]
@@ -24,9 +27,9 @@ pub struct Memory {
     seen: VecDeque<Tensor>,
     seen_at: Option<u32>,
     last_image: Vec<u8>,
-    /// How each view was left since something was last moved, by the image's digest.
-    left_by: HashMap<u64, Vec<ActionType>>,
-    last_choice: Option<ActionType>,
+    /// How each view was left since something was last taken, put or cut, by the image's digest.
+    left_by: HashMap<u64, Vec<Way>>,
+    last_choice: Option<Way>,
     /// The instruction that was read last, with what the networks take for it.
     read: Option<(String, Tensor)>,
     rng: ChaCha8Rng,
@@ -79,15 +82,15 @@ impl Memory {
         self.seen.back().filter(|_| self.last_image == image).map(Tensor::shallow_clone)
     }
 
-    /// Notes how the last view was left. Where nothing was moved since, the same way leads to where the agent has been: a wall
-    /// that it stands before, or a round that it goes.
+    /// Notes how the last view was left. Until something is taken, put or cut, the same way leads to where the agent has been:
+    /// a wall that it stands before, a round that it goes, a door that it opens and shuts.
     pub fn look(&mut self, image: &[u8], step: u32) {
         let (stepped, changed) = (self.seen_at != Some(step), self.last_image != image);
-        if stepped && let Some(choice) = self.last_choice {
-            if !choice.is_interaction() {
-                self.left_by.entry(digest(&self.last_image)).or_default().push(choice);
-            } else if changed {
+        if stepped && let Some(way) = self.last_choice {
+            if changed && matches!(way.0, ActionType::Pickup | ActionType::Put | ActionType::Slice) {
                 self.left_by.clear();
+            } else {
+                self.left_by.entry(digest(&self.last_image)).or_default().push(way);
             }
         }
         if changed {
@@ -133,8 +136,12 @@ impl Memory {
     pub fn decide(&mut self, actions: &[f32], objects: &[f32], candidates: &[Candidate], samples: bool) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
         let tried = self.left_by.get(&digest(&self.last_image)).map_or(&[][..], Vec::as_slice);
-        let decision = select::decide(actions, objects, candidates, tried, selection);
-        self.last_choice = Some(decision.action.kind);
+        let is_new = |candidate: &&Candidate| !tried.contains(&(candidate.kind, Some(candidate.class)));
+        let candidates: Vec<Candidate> = candidates.iter().filter(is_new).copied().collect();
+        let tried: Vec<ActionType> = tried.iter().filter(|way| way.1.is_none()).map(|way| way.0).collect();
+        let decision = select::decide(actions, objects, &candidates, &tried, selection);
+        let named = candidates.iter().find(|candidate| candidate.action() == decision.action);
+        self.last_choice = Some((decision.action.kind, named.map(|candidate| candidate.class)));
         decision
     }
 }
@@ -151,7 +158,7 @@ mod tests {
     use tch::{Device, Kind};
 
     use super::*;
-    use crate::domain::{Class, Instance};
+    use crate::domain::Instance;
 
     fn map(value: f32) -> Tensor {
         Tensor::full([1, 2, 2, 2], f64::from(value), (Kind::Float, Device::Cpu))
@@ -168,6 +175,30 @@ mod tests {
             memory.decide(&logits, &[0.0; 82], candidates, false).action.kind
         };
         (first..).zip(views).map(choose).collect()
+    }
+
+    #[test]
+    fn no_door_is_opened_and_shut_in_rounds() {
+        use ActionType::{Close, MoveAhead, Open, Pickup, RotateLeft};
+        let at_cabinet = |kind| Candidate {
+            kind,
+            instance: Instance::Fixture(0),
+            class: Class::named("Cabinet").unwrap(),
+            distance: 0.0,
+        };
+        let mut memory = Memory::default();
+        memory.begin(1);
+        let mut leave = |view: u8, kind: ActionType, step: u32| {
+            memory.look(&[view], step);
+            let _ = memory.observe(map(0.0), step, 5);
+            let logits = ActionType::ALL.map(|it| if it.is_interaction() { 9.0 } else { -(it.index() as f32) });
+            memory.decide(&logits, &[0.0; 82], &[at_cabinet(kind)], false).action.kind
+        };
+        let (shut, open) = (7, 8);
+        assert_eq!([leave(shut, Open, 0), leave(open, Close, 1)], [Open, Close]);
+        assert_eq!([leave(shut, Open, 2), leave(shut, Open, 3)], [MoveAhead, RotateLeft]);
+        assert_eq!(leave(9, Pickup, 4), Pickup);
+        assert_eq!([leave(shut, Open, 5), leave(open, Close, 6)], [Open, Close]);
     }
 
     #[test]

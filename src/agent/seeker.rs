@@ -7,13 +7,14 @@ use anyhow::Context;
 
 use super::policy::{Decision, Policy, Situation};
 use crate::domain::{Action, ActionType, Cell, Instance};
-use crate::house::expert::Expert;
+use crate::house::expert::{Expert, Pace};
 
 /// Turns to the right while it looks for something: with the first view, a full circle.
 const TURNS: u32 = 3;
 
 /// The expert, who first turns around until it has seen what it is going for.
 pub struct Seeker {
+    pace: Pace,
     expert: Expert,
     /// Everything that came into view in this episode.
     seen: BTreeSet<Instance>,
@@ -21,16 +22,10 @@ pub struct Seeker {
     search: Option<(Instance, Cell, u32)>,
 }
 
-impl Default for Seeker {
-    fn default() -> Seeker {
-        Seeker::new()
-    }
-}
-
 impl Seeker {
     /// A demonstrator at the start of an episode.
-    pub fn new() -> Seeker {
-        Seeker { expert: Expert::new(), seen: BTreeSet::new(), search: None }
+    pub fn new(pace: Pace) -> Seeker {
+        Seeker { pace, expert: Expert::of(pace), seen: BTreeSet::new(), search: None }
     }
 
     /// Whether to turn on the spot before going for `aim`.
@@ -60,7 +55,7 @@ impl Policy for Seeker {
     }
 
     fn begin(&mut self, _seed: u64) {
-        *self = Seeker::new();
+        *self = Seeker::new(self.pace);
     }
 
     fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {

@@ -10,6 +10,7 @@ use super::Ending;
 use super::bar::Bars;
 use super::stop;
 use crate::data::taskset;
+use crate::house::expert::Pace;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -39,6 +40,9 @@ pub struct Collect {
     /// Who demonstrates, or says what a learner should have done
     #[arg(long, value_enum, default_value = "seeker")]
     demonstrator: Who,
+    /// Turns and acts as soon as it may, not as late, so that a learner need not hit the last moment
+    #[arg(long)]
+    prompt: bool,
     /// The share of steps at which chance takes over for up to four steps
     #[arg(long, default_value_t = 0.08)]
     noise: f64,
@@ -93,7 +97,8 @@ impl Collect {
             Who::Seeker => Demonstrator::Seeker,
             Who::Expert => Demonstrator::Expert,
         };
-        let manner = Manner { demonstrator, noise: self.noise };
+        let pace = if self.prompt { Pace::Prompt } else { Pace::Steady };
+        let manner = Manner { demonstrator, pace, noise: self.noise };
         let collection = Collection { out: self.out, source, seed: self.seed, manner, learner };
         let stop = stop::on_signals()?;
         let mut bars = Bars::new();

@@ -163,8 +163,7 @@ impl Items {
         }
     }
 
-    /// Each action's share of what is drawn to learn from, in the order of the action head. One that never is counts as if
-    /// one in a million were.
+    /// Each action's share of what is drawn to learn from, in the order of the action head.
     pub fn action_shares(&self) -> Vec<f32> {
         let mut shares = vec![0.0; ActionType::COUNT];
         for span in &self.training {
@@ -174,7 +173,7 @@ impl Items {
             actions().for_each(|action| shares[action] += each);
         }
         let spans = self.training.len().max(1) as f64;
-        shares.into_iter().map(|share| (share / spans).max(1e-6) as f32).collect()
+        shares.into_iter().map(|share| (share / spans) as f32).collect()
     }
 
     fn is_labelled(&self, frame: usize) -> bool {
@@ -402,7 +401,7 @@ mod tests {
         labels[2] = None;
         let items = Items::of(&source, labels, &Selection::of(Composites::None), 0).unwrap();
         let shares = items.action_shares();
-        assert_eq!((shares[0], shares[5], shares[3]), (0.75, 0.25, 1e-6), "half of the first of two skills");
+        assert_eq!((shares[0], shares[5], shares[3]), (0.75, 0.25, 0.0), "half of the first of two skills");
         let drawn = items.draw(&items.training, 1, 0, 4000);
         let fifth = drawn.iter().filter(|item| item.frame == 1).count();
         assert!((900..1100).contains(&fifth), "{fifth}");

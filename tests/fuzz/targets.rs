@@ -14,6 +14,7 @@ use sprint_explorer::data::summaries::{Ledger, Summaries, Summary};
 use sprint_explorer::data::{Dataset, alfred::layout::Layout, dataset, json, taskset};
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Room, TaskSet};
+use sprint_explorer::house::expert::Pace;
 use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
 use sprint_explorer::nets::embedding_cache::EmbeddingCache;
@@ -190,7 +191,7 @@ fn collected(at: &Path, file: &str) -> Vec<Vec<u8>> {
         out: at.to_owned(),
         source: Source::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
         seed: 3,
-        manner: Manner { demonstrator: Demonstrator::Seeker, noise: 0.0 },
+        manner: Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 },
         learner: None,
     };
     collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();

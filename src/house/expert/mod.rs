@@ -10,10 +10,11 @@ use std::sync::Arc;
 use super::grading::{Grader, describe};
 use super::rules;
 use super::session::House;
+use super::view;
 use crate::domain::{Action, ActionType, Pose, Scene, World};
-use paths::{Floor, Paths};
+use paths::{Floor, Paths, Turning};
 use plan::Intent;
-use stands::{Scout, Stand};
+use stands::{Scout, Stand, WELL_SEEN};
 
 /// How far the expert goes out of its way to shut what stands open, in steps.
 const TIDY_STEPS: u32 = 3;
@@ -41,8 +42,20 @@ pub enum NoWay {
     },
 }
 
+/// How an expert goes about what can be done in several equally good ways.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// Turns as late as it may and acts where its target is seen best.
+    #[default]
+    Steady,
+    /// Turns as soon as it may and acts as soon as its target is at hand. Who learns from it and does not know exactly where
+    /// it stands need not hit the last moment for either.
+    Prompt,
+}
+
 /// Plans from the present state, keeps to the plan while the world goes as expected, and plans anew when it does not.
 pub struct Expert {
+    pace: Pace,
     scout: Scout,
     scene: Option<(Arc<Scene>, Floor)>,
     plan: VecDeque<Action>,
@@ -67,9 +80,14 @@ impl Default for Expert {
 }
 
 impl Expert {
-    /// An expert without a plan.
+    /// A steady expert without a plan.
     pub fn new() -> Expert {
-        Expert { scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
+        Expert::of(Pace::Steady)
+    }
+
+    /// An expert without a plan.
+    pub fn of(pace: Pace) -> Expert {
+        Expert { pace, scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
     }
 
     /// Drops the plan: a new episode starts.
@@ -102,6 +120,13 @@ impl Expert {
             self.scout.visit(world, same_scene);
             self.plan = self.plan_from(&scene, world, grader)?.into();
         }
+        if self.pace == Pace::Prompt
+            && let Some(&aim) = self.plan.back()
+            && is_at_hand(house, aim)
+        {
+            self.plan = [aim].into();
+        }
+        let world = house.world();
         let action = self.plan.pop_front().ok_or(NoWay::Finished)?;
         let mut after = world.clone();
         rules::apply(&scene, &mut after, action);
@@ -129,7 +154,8 @@ impl Expert {
     fn plan_from(&mut self, scene: &Scene, world: &World, grader: &Grader) -> Result<Vec<Action>, NoWay> {
         let intent = plan::intent(scene, world, grader)?;
         let Some((_, floor)) = &self.scene else { return Err(NoWay::Finished) };
-        let paths = Paths::from(floor, world.agent);
+        let turning = if self.pace == Pace::Prompt { Turning::Early } else { Turning::Late };
+        let paths = Paths::from(floor, world.agent, turning);
         let left = plan::left_open(scene, world, &intent);
         if !left.is_empty()
             && let Some(stand) = self.scout.find(scene, floor, &paths, &left, Some(TIDY_STEPS))
@@ -146,6 +172,15 @@ impl Expert {
         };
         Ok(actions(&paths, &aims, stand))
     }
+}
+
+/// Whether an interaction would be carried out now, chosen by its class as agents choose it, with its target well in view.
+fn is_at_hand(house: &mut House, aim: Action) -> bool {
+    let Some(target) = aim.target else { return false };
+    let Some(class) = house.world().class_of(house.scene(), target) else { return false };
+    let seen = house.view().sighting(target).is_some_and(|sighting| sighting.pixels >= WELL_SEEN);
+    let candidates = house.candidates();
+    seen && view::nearest(&candidates, aim.kind, class).is_some_and(|chosen| chosen.instance == target)
 }
 
 /// A step that is always possible.
@@ -302,7 +337,7 @@ mod tests {
     fn a_path_is_as_long_as_the_walk_around_the_table() {
         let (scene, world) = kitchen();
         let floor = Floor::of(&scene);
-        let paths = Paths::from(&floor, world.agent);
+        let paths = Paths::from(&floor, world.agent, Turning::Late);
         let steps_to = |x, z| {
             let cell = floor.cells().binary_search(&crate::domain::Cell::new(x, z)).unwrap();
             crate::domain::Heading::ALL.iter().filter_map(|&heading| paths.steps(cell, heading)).min()
@@ -310,6 +345,19 @@ mod tests {
         assert_eq!(steps_to(6, 2), Some(0));
         assert_eq!(steps_to(6, 8), Some(6));
         assert_eq!(steps_to(7, 8), Some(8), "six ahead, a turn, one ahead");
+    }
+
+    #[test]
+    fn a_prompt_expert_turns_at_the_first_of_equally_short_ways() {
+        let (scene, world) = kitchen();
+        let floor = Floor::of(&scene);
+        let end = Pose { cell: crate::domain::Cell::new(7, 8), ..world.agent };
+        let cell = floor.cells().binary_search(&end.cell).unwrap();
+        let ways =
+            [Turning::Late, Turning::Early].map(|turning| Paths::from(&floor, world.agent, turning).to(cell, end));
+        assert_eq!(ways[0].len(), ways[1].len());
+        let ahead = ways.map(|way| way.iter().take_while(|&&kind| kind == ActionType::MoveAhead).count());
+        assert!(ahead[0] > ahead[1], "{ahead:?}");
     }
 
     #[test]

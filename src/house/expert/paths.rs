@@ -28,6 +28,16 @@ impl Floor {
     }
 }
 
+/// Which of several equally short ways is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Turning {
+    /// The one that walks ahead for longest before it turns.
+    #[default]
+    Late,
+    /// The one that turns soonest.
+    Early,
+}
+
 /// The shortest ways from one pose to every other.
 #[derive(Clone, Debug)]
 pub struct Paths {
@@ -39,8 +49,9 @@ pub struct Paths {
 }
 
 impl Paths {
-    /// Every shortest way from `start`; none when it is not on the floor.
-    pub fn from(floor: &Floor, start: Pose) -> Paths {
+    /// A shortest way from `start` to every state; none when it is not on the floor. What is explored first comes first on
+    /// the way.
+    pub fn from(floor: &Floor, start: Pose, turning: Turning) -> Paths {
         let states = 4 * floor.cells.len();
         let mut paths = Paths { start, steps: vec![NONE; states], from: vec![(NONE, ActionType::MoveAhead); states] };
         let Ok(cell) = floor.cells.binary_search(&start.cell) else { return paths };
@@ -51,11 +62,15 @@ impl Paths {
             let (cell, quarters) = (state / 4, state % 4);
             let ahead = floor.ahead[cell as usize][quarters as usize];
             let moved = if ahead == NONE { NONE } else { 4 * ahead + quarters };
-            for (next, kind) in [
+            let mut ways = [
                 (moved, ActionType::MoveAhead),
                 (4 * cell + (quarters + 3) % 4, ActionType::RotateLeft),
                 (4 * cell + (quarters + 1) % 4, ActionType::RotateRight),
-            ] {
+            ];
+            if turning == Turning::Early {
+                ways.rotate_left(1);
+            }
+            for (next, kind) in ways {
                 if next != NONE && paths.steps[next as usize] == NONE {
                     paths.steps[next as usize] = paths.steps[state as usize] + 1;
                     paths.from[next as usize] = (state, kind);

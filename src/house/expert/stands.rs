@@ -16,7 +16,7 @@ use crate::domain::world::Instance;
 use crate::domain::{Action, Cell, Heading, Pose, Scene, World};
 
 /// With fewer pixels than this of its target in view, a better pose is looked for.
-const WELL_SEEN: u32 = 60;
+pub(super) const WELL_SEEN: u32 = 60;
 /// How many more poses are drawn in search of a better one.
 const PATIENCE: u32 = 8;
 /// What one pose must show of its target's place to be worth drawing, in pixels from the image's edge.

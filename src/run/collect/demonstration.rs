@@ -9,6 +9,7 @@ use crate::agent::{Decision, ExpertPolicy, Policy};
 use crate::domain::trajectory::Annotation;
 use crate::domain::{Action, ActionType, Scene, Task, Trajectory, World};
 use crate::house::House;
+use crate::house::expert::Pace;
 use crate::house::grading::{Grader, Grading};
 use crate::language::phrases;
 use crate::run::rollout::Rollout;
@@ -30,10 +31,10 @@ pub enum Demonstrator {
 }
 
 impl Demonstrator {
-    fn policy(self) -> Box<dyn Policy> {
+    fn policy(self, pace: Pace) -> Box<dyn Policy> {
         match self {
-            Demonstrator::Seeker => Box::new(Seeker::new()),
-            Demonstrator::Expert => Box::new(ExpertPolicy::new()),
+            Demonstrator::Seeker => Box::new(Seeker::new(pace)),
+            Demonstrator::Expert => Box::new(ExpertPolicy::of(pace)),
         }
     }
 }
@@ -43,6 +44,8 @@ impl Demonstrator {
 pub struct Manner {
     /// Who says what is right in every state.
     pub demonstrator: Demonstrator,
+    /// Which of several ways is right.
+    pub pace: Pace,
     /// The share of steps at which chance takes over for a few steps.
     pub noise: f64,
 }
@@ -95,9 +98,11 @@ impl Demonstration<'_> {
         let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
         let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
         let mut rollout = Rollout::new(house, told, Some(grader), None);
-        let mut demonstrator = self.manner.demonstrator.policy();
+        let mut demonstrator = self.manner.demonstrator.policy(self.manner.pace);
         if let Some(learner) = learner.as_deref_mut() {
             learner.begin(rng.random());
+            // Half of the episodes it acts as when it is measured.
+            learner.set_sampling(rng.random());
         }
         // Some episodes are left undisturbed.
         let noise = if rng.random_bool(0.3) { 0.0 } else { self.manner.noise };

@@ -18,7 +18,6 @@ use self::demonstration::{Demonstration, own_words, phrasings};
 pub use self::demonstration::{Demonstrator, Manner};
 use super::progress::{Report, Scalars};
 use super::scenes::{Scenes, Setting};
-use crate::agent::Policy;
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
 use crate::data::dataset::{Counts, Manifest, Writer};
 use crate::domain::task::SceneRef;
@@ -137,9 +136,7 @@ impl Collection {
 
     fn load(&self) -> anyhow::Result<Option<LearnedPolicy>> {
         let Some((folder, sentences)) = &self.learner else { return Ok(None) };
-        let mut policy = LearnedPolicy::load(folder, sentences.clone(), Device::Cpu)?;
-        policy.set_sampling(true);
-        Ok(Some(policy))
+        LearnedPolicy::load(folder, sentences.clone(), Device::Cpu).map(Some)
     }
 
     /// The trajectories of one house, or of one given task.
@@ -240,10 +237,11 @@ mod tests {
     use crate::domain::trajectory::Annotation;
     use crate::domain::{Class, Role};
     use crate::house::House;
+    use crate::house::expert::Pace;
     use crate::house::grading::{Grader, Grading};
     use crate::run::rollout::Rollout;
 
-    const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, noise: 0.0 };
+    const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 };
 
     struct Silent;
 
@@ -293,31 +291,41 @@ mod tests {
         assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
     }
 
-    #[test]
-    fn the_seeker_looks_around_for_what_the_expert_goes_for_unseen() {
+    /// How many steps the same tasks take, demonstrated in each of two manners.
+    fn steps(manners: [Manner; 2]) -> Vec<(usize, usize)> {
         let folder = tempfile::tempdir().unwrap();
-        let choices = |demonstrator| {
+        let [one, other] = manners.map(|manner| {
             let collection = Collection {
-                out: folder.path().join(format!("{demonstrator:?}")),
+                out: folder.path().join(format!("{manner:?}")),
                 source: Source::Generated { episodes: 12, lengths: vec![1], annotations: 1 },
                 seed: 2,
-                manner: Manner { demonstrator, ..UNDISTURBED },
+                manner,
                 learner: None,
             };
             collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
             let dataset = Dataset::open(&collection.out).unwrap();
             let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
-            made.into_iter().map(|trajectory| (trajectory.id, trajectory.actions)).collect::<Vec<_>>()
+            made.into_iter().map(|trajectory| (trajectory.id, trajectory.actions.len())).collect::<Vec<_>>()
+        });
+        let same = |((id, steps), (same, others)): (&(String, usize), &(String, usize))| {
+            assert_eq!(id, same, "the same tasks");
+            (*steps, *others)
         };
-        let (seeker, expert) = (choices(Demonstrator::Seeker), choices(Demonstrator::Expert));
-        let pairs: Vec<_> = seeker
-            .iter()
-            .zip(&expert)
-            .map(|((id, looks), (same, goes))| {
-                assert_eq!(id, same, "the same tasks");
-                (looks.len(), goes.len())
-            })
-            .collect();
+        one.iter().zip(&other).map(same).collect()
+    }
+
+    #[test]
+    fn who_is_prompt_is_done_sooner() {
+        let expert = Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED };
+        let pairs = steps([expert, Manner { pace: Pace::Prompt, ..expert }]);
+        let saved: Vec<_> = pairs.iter().filter(|(steady, prompt)| prompt < steady).collect();
+        let (steady, prompt) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+        assert!(prompt < steady && !saved.is_empty(), "{pairs:?}");
+    }
+
+    #[test]
+    fn the_seeker_looks_around_for_what_the_expert_goes_for_unseen() {
+        let pairs = steps([UNDISTURBED, Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED }]);
         let longer = pairs.iter().filter(|(looks, goes)| looks > goes).count();
         assert!(longer > pairs.len() / 2, "{pairs:?}");
     }
