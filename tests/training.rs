@@ -133,6 +133,14 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     assert!(sprint.read("both/README.md").contains("the mean of 2 checkpoints'"), "{}", sprint.read("both/README.md"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));
+    done(&sprint, "average agent --balance 0.2 --out lighter --appraise 1");
+    assert!(sprint.read("lighter/config.json").contains("\"strength\": 0.2"), "{}", sprint.read("lighter/config.json"));
+    assert!(sprint.read("lighter/README.md").contains("20 % of what is merely frequent"));
+    let refused = sprint.run("average agent --balance 2 --out none").stderr;
+    assert!(refused.contains("agent/config.json: balance.strength is 2, which is not a share"), "{refused}");
+    let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+    let refused = sprint.run(&format!("average {first} --balance 0.2 --out none")).stderr;
+    assert!(refused.contains("how often each action was shown was not noted"), "{refused}");
     let config = sprint.read("agent/config.json");
     let digest = config.split("\"digest\": \"").nth(1).unwrap()[..64].to_string();
     std::fs::write(sprint.path("agent/config.json"), config.replace(&digest, "strange")).unwrap();

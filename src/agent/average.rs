@@ -39,7 +39,7 @@ pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, N
             *own = joined(own, &other, mark);
         }
     }
-    config.provenance.averaged = Some(folders.len() as u64);
+    config.provenance.averaged = (!others.is_empty()).then_some(folders.len() as u64).or(config.provenance.averaged);
     let mut variables = networks.policy_store.variables();
     tch::no_grad(|| -> anyhow::Result<()> {
         for (name, sum) in sums {

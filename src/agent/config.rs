@@ -193,6 +193,18 @@ impl Config {
         }
     }
 
+    /// Takes so much of what is frequent off the logits from now on: 0 none, 1 all.
+    ///
+    /// # Errors
+    /// When the strength is no share, or it is not known how frequent each action is.
+    pub fn set_balance(&mut self, strength: f32) -> anyhow::Result<()> {
+        let balance = self.balance.as_mut();
+        let balance =
+            balance.context("balance is missing: how often each action was shown was not noted, so train anew")?;
+        balance.strength = strength;
+        balance.check().map_err(anyhow::Error::msg)
+    }
+
     /// Features in each of the 7 x 7 places of a map.
     pub fn features(&self) -> i64 {
         self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)

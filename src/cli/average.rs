@@ -15,12 +15,16 @@ use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
 use crate::run::presets::{Appraisal, Preset};
 
-/// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's.
+/// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
+/// checkpoint it makes another that is balanced otherwise.
 #[derive(Args)]
 pub struct Average {
     /// Checkpoints; one that is named twice weighs twice
-    #[arg(required = true, num_args = 2.., value_name = "CHECKPOINT")]
+    #[arg(required = true, num_args = 1.., value_name = "CHECKPOINT")]
     checkpoints: Vec<PathBuf>,
+    /// How much of what is merely frequent it takes off its actions' logits when it decides, 0 to 1 [default: as the first]
+    #[arg(long, value_name = "STRENGTH")]
+    balance: Option<f32>,
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -44,7 +48,12 @@ impl Average {
             self.out.display()
         );
         let device = best_device();
-        let (config, networks) = average(&self.checkpoints, device)?;
+        let (mut config, networks) = average(&self.checkpoints, device)?;
+        if let Some(strength) = self.balance {
+            config
+                .set_balance(strength)
+                .with_context(|| self.checkpoints[0].join("config.json").display().to_string())?;
+        }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
         std::fs::create_dir_all(&self.out)?;

@@ -42,6 +42,17 @@ fn told(config: &Config) -> String {
     }
 }
 
+/// How it decides, in words, where not by the logits alone.
+fn balanced(config: &Config) -> String {
+    match config.balance.as_ref().map(|balance| balance.strength).filter(|&strength| strength > 0.0) {
+        Some(strength) => format!(
+            " When it decides, {:.0} % of what is merely frequent is taken off the actions' logits (`balance`).",
+            100.0 * strength
+        ),
+        None => String::new(),
+    }
+}
+
 /// What it learned from, in words.
 fn origin(config: &Config) -> String {
     let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, averaged } = &config.provenance;
@@ -70,7 +81,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         text,
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
-         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.\n\n\
+         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.{balanced}\n\n\
          {origin}\n\n\
          ## Measured in generated houses that no training saw\n\n\
          `sprint {command}` measures this at its end.\n\n\
@@ -80,6 +91,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         history = config.policy.history,
         eyes = eyes(config),
         told = told(config),
+        balanced = balanced(config),
         origin = origin(config),
         command = if config.provenance.averaged.is_some() { "average" } else { "pretrain" },
         agent = findings.agent,

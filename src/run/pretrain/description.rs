@@ -1,12 +1,27 @@
 //! What a training says of itself: in its checkpoint, its state and its folder.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use super::Pretraining;
 use crate::agent::config::{Config, Ontology, Provenance, SentenceSpec};
 use crate::data::whole;
 use crate::nets::visual::VisualSpec;
 use crate::run::presets::Sight;
+
+/// The datasets and how many of their trajectories are learned from, each once however often it is named. `parts` are the
+/// datasets' trajectories.
+pub(super) fn each_once(digests: &[String], parts: &[Range<usize>], learned_from: &BTreeSet<u32>) -> (String, u64) {
+    let (mut named, mut distinct) = (Vec::new(), BTreeSet::new());
+    for (digest, part) in digests.iter().zip(parts) {
+        if !named.contains(&digest.as_str()) {
+            named.push(digest);
+        }
+        let within = learned_from.range(part.start as u32..part.end as u32);
+        distinct.extend(within.map(|&trajectory| (digest, trajectory as usize - part.start)));
+    }
+    (named.join("-"), distinct.len() as u64)
+}
 
 impl Pretraining {
     /// The checkpoint's config after so many steps of the policy.
@@ -71,5 +86,17 @@ impl Pretraining {
             Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
             Err(_) => whole::write(&path, text.as_bytes()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dataset_that_is_named_twice_is_told_of_once() {
+        let digests = ["a", "b", "a"].map(String::from);
+        let learned_from = BTreeSet::from([0, 2, 3, 5, 7]);
+        assert_eq!(each_once(&digests, &[0..3, 3..5, 5..8], &learned_from), ("a-b".into(), 3));
     }
 }

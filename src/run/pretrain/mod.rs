@@ -118,12 +118,12 @@ impl Pretraining {
         };
         let resnet18 = networks.eyes.store().is_none().then(|| encoder.digest().to_owned());
         let learned_from: BTreeSet<u32> = items.training.iter().map(|span| span.trajectory).collect();
-        let strength = self.preset.balance;
-        let balance = (strength > 0.0).then(|| Balance { strength, shares: items.action_shares() });
+        let (dataset, trajectories) = description::each_once(&digests, &footage.parts, &learned_from);
+        let balance = Balance { strength: self.preset.balance, shares: items.action_shares() };
         let config = |steps: u64| -> anyhow::Result<Config> {
-            let config = self.config(&digest, learned_from.len() as u64, steps)?;
+            let config = self.config(&dataset, trajectories, steps)?;
             let words = words.as_ref().map(|words| words.words().to_vec());
-            Ok(Config { words, resnet18: resnet18.clone(), balance: balance.clone(), ..config })
+            Ok(Config { words, resnet18: resnet18.clone(), balance: Some(balance.clone()), ..config })
         };
         let trainer = Trainer {
             networks: &networks,
