@@ -1,6 +1,6 @@
-//! Logit adjustment after training (Menon et al. 2021): a clone walks ahead for half of what it was shown and is never sure when to
-//! turn, so that the likeliest action is to walk on past the turn. Taking part of what is merely frequent off the logits
-//! lets rarer actions win where the view speaks for them.
+//! Logit adjustment after training (Menon et al. 2021): a clone walks ahead for half of what it was shown and is never sure
+//! when to turn, so that the likeliest action is to walk on past the turn. Taking part of what is merely frequent off the
+//! logits lets rarer actions win where the view speaks for them.
 
 use serde::{Deserialize, Serialize};
 

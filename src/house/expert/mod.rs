@@ -43,10 +43,9 @@ pub enum NoWay {
 }
 
 /// How an expert goes about what can be done in several equally good ways.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// Turns as late as it may and acts where its target is seen best.
-    #[default]
     Steady,
     /// Turns as soon as it may and acts as soon as its target is at hand. Who learns from it and does not know exactly where
     /// it stands need not hit the last moment for either.
@@ -358,6 +357,30 @@ mod tests {
         assert_eq!(ways[0].len(), ways[1].len());
         let ahead = ways.map(|way| way.iter().take_while(|&&kind| kind == ActionType::MoveAhead).count());
         assert!(ahead[0] > ahead[1], "{ahead:?}");
+    }
+
+    #[test]
+    fn a_prompt_expert_walks_less_far_before_its_first_turn() {
+        use crate::domain::{Room, task::SceneRef};
+        use crate::house::generate;
+        use rand::SeedableRng;
+        let walked = |pace: Pace| {
+            let ahead = |seed: u64| {
+                let (scene, world) = generate::house(Room::LivingRoom, seed);
+                let (scene, reference) = (Arc::new(scene), SceneRef::Generated { room: Room::LivingRoom, seed });
+                let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+                let task = generate::task(&scene, &world, reference, 1, &mut rng).unwrap();
+                let mut house = House::new(scene, task.start.clone().unwrap_or(world));
+                let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+                let mut expert = Expert::of(pace);
+                let first = expert.next(&mut house, &grader).unwrap();
+                let way = std::iter::once(first).chain(expert.plan().steps);
+                way.take_while(|action| action.kind == ActionType::MoveAhead).count()
+            };
+            (0..8).map(ahead).sum::<usize>()
+        };
+        let (prompt, steady) = (walked(Pace::Prompt), walked(Pace::Steady));
+        assert!(prompt < steady, "{prompt} steps, {steady} of the steady one");
     }
 
     #[test]

@@ -29,10 +29,9 @@ impl Floor {
 }
 
 /// Which of several equally short ways is taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turning {
     /// The one that walks ahead for longest before it turns.
-    #[default]
     Late,
     /// The one that turns soonest.
     Early,

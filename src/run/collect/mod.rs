@@ -239,6 +239,8 @@ mod tests {
     use crate::house::House;
     use crate::house::expert::Pace;
     use crate::house::grading::{Grader, Grading};
+    use crate::nets::embedding_cache::Embedder;
+    use crate::nets::sentence::default_folder;
     use crate::run::rollout::Rollout;
 
     const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 };
@@ -321,6 +323,34 @@ mod tests {
         let saved: Vec<_> = pairs.iter().filter(|(steady, prompt)| prompt < steady).collect();
         let (steady, prompt) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
         assert!(prompt < steady && !saved.is_empty(), "{pairs:?}");
+    }
+
+    #[test]
+    fn a_learner_acts_greedily_in_some_episodes_and_draws_in_others() {
+        let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
+            eprintln!("skipped: needs the sentence encoder (`make setup`)");
+            return;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let task = tasks(folder.path()).remove(1);
+        let again = |number: usize| Task { id: format!("again-{number}"), ..task.clone() };
+        let first = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+        let collection = Collection {
+            out: folder.path().join("D"),
+            source: Source::Tasks {
+                tasks: (0..8).map(again).collect(),
+                scenes: Scenes::in_folder(Some(folder.path().to_owned())),
+            },
+            seed: 1,
+            manner: UNDISTURBED,
+            learner: Some((first, Arc::new(std::sync::Mutex::new(sentences)))),
+        };
+        collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+        let dataset = Dataset::open(&collection.out).unwrap();
+        let done: Vec<_> = dataset.trajectories().unwrap().map(|trajectory| trajectory.unwrap().actions).collect();
+        let twins = |actions: &&Vec<crate::domain::Action>| done.iter().filter(|other| other == actions).count() > 1;
+        let alike = done.iter().filter(twins).count();
+        assert!((2..done.len()).contains(&alike), "{alike} of {} did what another one did", done.len());
     }
 
     #[test]
