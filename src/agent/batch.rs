@@ -10,6 +10,7 @@ use super::config::Config;
 use super::learned::LearnedPolicy;
 use super::memory::{Memory, SharedEmbedder};
 use super::policy::Situation;
+use super::select::Heads;
 use super::team::{Decisions, Team};
 use super::told;
 use crate::nets::frozen::FrameEncoder;
@@ -97,12 +98,24 @@ impl Team for LearnedTeam {
         };
         let ((kinds, mut actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
         actions.chunks_exact_mut(kinds).for_each(|row| self.config.balance(row));
-        let rows = actions.chunks_exact(kinds).zip(objects.chunks_exact(classes));
-        let decided = rows.zip(&mut self.seats).zip(situations).map(|(((actions, objects), memory), situation)| {
-            let here = situation.as_mut()?;
-            Some(Ok(memory.decide(actions, objects, &here.house.candidates(), self.samples)))
-        });
-        Ok(decided.collect())
+        let mut decided = Vec::with_capacity(situations.len());
+        for (seat, situation) in situations.iter_mut().enumerate() {
+            let Some(here) = situation else {
+                decided.push(None);
+                continue;
+            };
+            let candidates = here.house.candidates();
+            // A pass for each seat alone, so that what is in it depends on no other.
+            let of_seat = |all: &Tensor| all.narrow(0, seat as i64, 1);
+            let values = self.networks.advice(&self.config, &of_seat(&observations), &of_seat(&told), &candidates)?;
+            let heads = Heads {
+                actions: &actions[seat * kinds..][..kinds],
+                objects: &objects[seat * classes..][..classes],
+                weighing: self.config.weighing(values.as_ref()),
+            };
+            decided.push(Some(Ok(self.seats[seat].decide(&heads, &candidates, self.samples))));
+        }
+        Ok(decided)
     }
 }
 
@@ -121,10 +134,10 @@ mod tests {
     use crate::nets::embedding_cache::Embedder;
     use crate::nets::sentence::default_folder;
 
-    fn shipped() -> Option<LearnedPolicy> {
+    fn shipped(name: &str) -> Option<LearnedPolicy> {
         device::set_threads(1);
         let sentences = Embedder::open(&default_folder(), Device::Cpu).ok()?;
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints").join(name);
         LearnedPolicy::load(&folder, Arc::new(Mutex::new(sentences)), Device::Cpu).ok()
     }
 
@@ -168,16 +181,20 @@ mod tests {
 
     #[test]
     fn a_decision_depends_on_its_own_seat_alone_bit_for_bit() {
-        let Some(agent) = shipped() else {
-            eprintln!("skipped: the shipped agent needs its sentence encoder");
-            return;
-        };
-        let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
-        for seat in [0, 5] {
-            let alone = minds(&mut team, seat, &[]);
-            assert_eq!(alone.len(), 10);
-            assert_eq!(minds(&mut team, seat, &[1, 2]), alone);
-            assert_eq!(minds(&mut team, seat, &[0, 1, 2, 3, 4, 5, 6, 7]), alone);
+        // The second weighs its policy by its critic.
+        for name in ["first", "sprint"] {
+            let Some(mut agent) = shipped(name) else {
+                eprintln!("skipped: the shipped agents need their sentence encoder");
+                return;
+            };
+            agent.config.weighing = agent.networks.critic.is_some().then_some(10.0);
+            let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
+            for seat in [0, 5] {
+                let alone = minds(&mut team, seat, &[]);
+                assert_eq!(alone.len(), 10);
+                assert_eq!(minds(&mut team, seat, &[1, 2]), alone);
+                assert_eq!(minds(&mut team, seat, &[0, 1, 2, 3, 4, 5, 6, 7]), alone);
+            }
         }
     }
 
@@ -186,7 +203,7 @@ mod tests {
         let mut ahead = Vec::new();
         let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
         for balance in [None, Some(Balance { strength: 0.5, shares })] {
-            let (Some(mut one), Some(mut agent)) = (shipped(), shipped()) else {
+            let (Some(mut one), Some(mut agent)) = (shipped("first"), shipped("first")) else {
                 eprintln!("skipped: the shipped agent needs its sentence encoder");
                 return;
             };

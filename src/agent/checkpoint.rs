@@ -6,7 +6,9 @@ use std::path::Path;
 use tch::{Device, Tensor, nn};
 
 use super::config::Config;
+use super::values::Values;
 use crate::data::json;
+use crate::house::view::Candidate;
 use crate::nets::critic::{Critic, CriticSpec, Senses};
 use crate::nets::eyes::Eyes;
 use crate::nets::policy::{PolicyNet, PolicySpec};
@@ -57,6 +59,23 @@ impl Networks {
                     target_store,
                 }
             }),
+        }
+    }
+
+    /// What the critic makes of an observation under what is told, where the agent weighs its policy by that.
+    ///
+    /// # Errors
+    /// When the critic's answer cannot be read.
+    pub fn advice(
+        &self,
+        config: &Config,
+        observation: &Tensor,
+        told: &Tensor,
+        candidates: &[Candidate],
+    ) -> anyhow::Result<Option<Values>> {
+        match (&self.critic, config.weighing) {
+            (Some(critic), Some(_)) => Values::of(&critic.online, observation, told, candidates).map(Some),
+            _ => Ok(None),
         }
     }
 

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use tch::Device;
 
 use super::balance::Balance;
+use super::values::{Values, Weighing};
 use crate::domain::{ActionType, Class};
 use crate::nets::critic::CriticSpec;
 use crate::nets::eyes::Eyes;
@@ -97,6 +98,9 @@ pub struct Config {
     /// What of the actions' frequency does not count when it decides; absent where all does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub balance: Option<Balance>,
+    /// How much the critic's advantages count when it decides, see [`Weighing`]; absent where the policy decides alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weighing: Option<f32>,
     /// The sentence encoder.
     pub sentence_encoder: SentenceSpec,
     /// Where it comes from.
@@ -205,6 +209,27 @@ impl Config {
         balance.check().map_err(anyhow::Error::msg)
     }
 
+    /// Lets the critic's advantages count so much from now on; 0: the policy decides alone.
+    ///
+    /// # Errors
+    /// When that is no weight, or there is no critic.
+    pub fn set_weighing(&mut self, weight: f32) -> anyhow::Result<()> {
+        self.weighing = (weight != 0.0).then_some(weight);
+        self.check_weighing()
+    }
+
+    fn check_weighing(&self) -> anyhow::Result<()> {
+        let Some(weight) = self.weighing else { return Ok(()) };
+        anyhow::ensure!(weight.is_finite() && weight > 0.0, "weighing is {weight}, which is no weight");
+        anyhow::ensure!(self.critic.is_some(), "weighing needs a critic, and there is none");
+        Ok(())
+    }
+
+    /// How values weigh the policy.
+    pub fn weighing<'a>(&self, values: Option<&'a Values>) -> Option<Weighing<'a>> {
+        values.zip(self.weighing).map(|(values, weight)| Weighing { values, weight })
+    }
+
     /// Features in each of the 7 x 7 places of a map.
     pub fn features(&self) -> i64 {
         self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
@@ -256,8 +281,7 @@ impl Config {
             path.display()
         );
         if let Some(visual) = &self.visual {
-            let side = 16 * crate::nets::visual::SIDE;
-            anyhow::ensure!(visual.input == side, "{}: visual.input is {}, not {side}", path.display(), visual.input);
+            visual.check().with_context(|| path.display().to_string())?;
         }
         if let Some(attention) = &self.policy.attention {
             attention.check(self.policy.embedding).with_context(|| format!("{}: policy", path.display()))?;
@@ -265,6 +289,7 @@ impl Config {
         if let Some(balance) = &self.balance {
             balance.check().map_err(|wrong| anyhow::anyhow!("{}: {wrong}", path.display()))?;
         }
+        self.check_weighing().with_context(|| path.display().to_string())?;
         let critic = self.critic.as_ref().map(|critic| ("critic.dropout", critic.dropout));
         for (field, share) in std::iter::once(("policy.dropout", self.policy.dropout)).chain(critic) {
             anyhow::ensure!(
@@ -287,7 +312,7 @@ pub(super) mod tests {
         Config {
             format_version: Config::FORMAT,
             ontology: Ontology::current(),
-            visual: Some(VisualSpec { input: 112, channels: [4, 4, 4, 4] }),
+            visual: Some(VisualSpec { input: 112, channels: vec![4; 4] }),
             resnet18: None,
             policy: PolicySpec {
                 history: 5,
@@ -303,6 +328,7 @@ pub(super) mod tests {
             critic: None,
             words: None,
             balance: None,
+            weighing: None,
             sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
             provenance: Provenance {
                 preset: "test".into(),

@@ -10,9 +10,9 @@ use super::config::Config;
 use super::memory::Memory;
 pub use super::memory::SharedEmbedder;
 use super::policy::{Carried, Decision, Policy, Reading, Situation};
+use super::select::Heads;
 use super::told;
-use super::values::{ChoiceValue, Values};
-use crate::domain::{ActionType, Class};
+use super::values::Values;
 use crate::language::instruction::normalise;
 use crate::nets::frozen::FrameEncoder;
 
@@ -92,7 +92,10 @@ impl Policy for LearnedPolicy {
         let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
         let (mut actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
         self.config.balance(&mut actions);
-        Ok(self.memory.decide(&actions, &objects, &situation.house.candidates(), self.samples))
+        let candidates = situation.house.candidates();
+        let values = self.networks.advice(&self.config, &observation, &told, &candidates)?;
+        let heads = Heads { actions: &actions, objects: &objects, weighing: self.config.weighing(values.as_ref()) };
+        Ok(self.memory.decide(&heads, &candidates, self.samples))
     }
 
     fn carried(&self) -> Carried {
@@ -121,22 +124,7 @@ impl Policy for LearnedPolicy {
         }
         let (observation, told) = self.perceive(situation)?;
         let Some(critic) = &self.networks.critic else { return Ok(None) };
-        let mut possible: Vec<(ActionType, Option<Class>)> =
-            ActionType::ALL.into_iter().filter(|kind| !kind.is_interaction()).map(|kind| (kind, None)).collect();
-        for candidate in situation.house.candidates() {
-            let pair = (candidate.kind, Some(candidate.class));
-            if candidate.class.in_vocabulary() && !possible.contains(&pair) {
-                possible.push(pair);
-            }
-        }
-        let index = |&(kind, class): &(ActionType, Option<Class>)| {
-            (kind.index() as i64, class.map_or(0, |class| class.index() as i64))
-        };
-        let pairs: Vec<(i64, i64)> = possible.iter().map(index).collect();
-        let (value, q) = critic.online.appraise(&observation, &told, &pairs);
-        let q = Vec::<f32>::try_from(q.to_device(Device::Cpu))?;
-        let choices = possible.into_iter().zip(q).map(|((kind, class), q)| ChoiceValue { kind, class, q }).collect();
-        Ok(Some(Values { state: value.double_value(&[0]) as f32, choices }))
+        Values::of(&critic.online, &observation, &told, &situation.house.candidates()).map(Some)
     }
 }
 
@@ -146,7 +134,7 @@ mod tests {
 
     use super::*;
     use crate::agent::config::tests::small;
-    use crate::domain::SkillKind;
+    use crate::domain::{ActionType, SkillKind};
     use crate::house::grading::{Grader, Grading};
     use crate::house::testing::{kitchen_house, role, subtask};
     use crate::nets::critic::CriticSpec;

@@ -9,6 +9,7 @@ pub mod expert;
 pub mod goal;
 pub mod learned;
 pub mod memory;
+mod rounds;
 pub mod policy;
 pub mod random;
 pub mod seeker;

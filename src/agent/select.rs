@@ -1,11 +1,13 @@
 //! From the two heads to an action. The heads are two factors: an interaction is as likely as its action times its class.
 //! Pairs that are impossible now are masked and the rest renormalised, so an action whose only candidates are things that
-//! nobody asked for is as unlikely as they are. The instance is the nearest of its class.
+//! nobody asked for is as unlikely as they are. What the critic thinks better than usual is made likelier, where the agent
+//! weighs so. The instance is the nearest of its class.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::policy::{Decision, Mind};
+use super::values::Weighing;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
 
@@ -17,29 +19,45 @@ pub enum Selection<'a> {
     Sample(&'a mut ChaCha8Rng),
 }
 
-/// Decides from the logits of one situation: `actions` has 12 entries, `objects` 82. Of the navigation actions those in
-/// `tried` are masked, unless that would leave none.
-pub fn decide(
-    actions: &[f32],
-    objects: &[f32],
-    candidates: &[Candidate],
-    tried: &[ActionType],
-    selection: Selection<'_>,
-) -> Decision {
+/// What the networks say of one situation.
+#[derive(Clone, Copy, Debug)]
+pub struct Heads<'a> {
+    /// Logits of the 12 actions.
+    pub actions: &'a [f32],
+    /// Logits of the 82 classes.
+    pub objects: &'a [f32],
+    /// What the critic has to say; absent where the policy decides alone.
+    pub weighing: Option<Weighing<'a>>,
+}
+
+impl<'a> Heads<'a> {
+    /// A policy's logits alone.
+    pub fn of(actions: &'a [f32], objects: &'a [f32]) -> Heads<'a> {
+        Heads { actions, objects, weighing: None }
+    }
+
+    fn factor(&self, kind: ActionType, class: Option<usize>) -> f32 {
+        let class = class.and_then(Class::from_index);
+        self.weighing.map_or(1.0, |weighing| weighing.factor(kind, class))
+    }
+}
+
+/// Decides in one situation. Of the navigation actions those in `tried` are masked, unless that would leave none.
+pub fn decide(heads: &Heads<'_>, candidates: &[Candidate], tried: &[ActionType], selection: Selection<'_>) -> Decision {
     let all_tried = ActionType::ALL.iter().all(|kind| kind.is_interaction() || tried.contains(kind));
     let possible = |kind: ActionType| match kind.is_interaction() {
         true => candidates.iter().any(|c| c.kind == kind),
         false => all_tried || !tried.contains(&kind),
     };
     let open: Vec<usize> = ActionType::ALL.into_iter().filter(|&kind| possible(kind)).map(ActionType::index).collect();
-    let shares = weigh(&softmax_over(actions, &open), &open, objects, candidates);
+    let shares = weigh(heads, &open, candidates);
     let likeliest = open[argmax(&shares)];
-    let greedy = complete(likeliest, objects, candidates, &mut Selection::Greedy);
+    let greedy = complete(likeliest, heads, candidates, &mut Selection::Greedy);
     let (action, shown) = match selection {
         Selection::Greedy => (greedy, likeliest),
         Selection::Sample(rng) => {
             let drawn = open[draw(&shares, rng)];
-            (complete(drawn, objects, candidates, &mut Selection::Sample(rng)), drawn)
+            (complete(drawn, heads, candidates, &mut Selection::Sample(rng)), drawn)
         }
     };
     let mut probabilities = [None; ActionType::COUNT];
@@ -47,28 +65,35 @@ pub fn decide(
         probabilities[index] = Some(share);
     }
     let entropy = -shares.iter().filter(|&&p| p > 0.0).map(|p| p * p.ln()).sum::<f32>();
-    let mind =
-        Mind { actions: probabilities, objects: ranking(objects, candidates, shown, &open, &shares), entropy, greedy };
+    let mind = Mind {
+        actions: probabilities,
+        objects: ranking(heads.objects, candidates, shown, &open, &shares),
+        entropy,
+        greedy,
+    };
     Decision { action, mind: Some(mind) }
 }
 
-/// Each possible action's share times that of its candidates among all classes, renormalised.
-fn weigh(shares: &[f32], open: &[usize], objects: &[f32], candidates: &[Candidate]) -> Vec<f32> {
-    let all: Vec<usize> = (1..objects.len().min(Class::VOCABULARY)).collect();
-    let classes = softmax_over(objects, &all);
-    let mass = |index: usize| {
-        let mut named = classes_of(ActionType::ALL[index], candidates);
+/// Each possible action's share times that of its candidates among all classes, each choice weighed by its advantage,
+/// renormalised.
+fn weigh(heads: &Heads<'_>, open: &[usize], candidates: &[Candidate]) -> Vec<f32> {
+    let shares = softmax_over(heads.actions, open);
+    let all: Vec<usize> = (1..heads.objects.len().min(Class::VOCABULARY)).collect();
+    let classes = softmax_over(heads.objects, &all);
+    let mass = |kind: ActionType| {
+        let mut named = classes_of(kind, candidates);
         named.retain(|class| (1..=classes.len()).contains(class));
-        named.into_iter().map(|class| classes[class - 1]).sum::<f32>()
+        named.into_iter().map(|class| classes[class - 1] * heads.factor(kind, Some(class))).sum::<f32>()
     };
     let weight = |(&index, share): (&usize, &f32)| {
-        if ActionType::ALL[index].is_interaction() { share * mass(index) } else { *share }
+        let kind = ActionType::ALL[index];
+        share * if kind.is_interaction() { mass(kind) } else { heads.factor(kind, None) }
     };
-    let weights: Vec<f32> = open.iter().zip(shares).map(weight).collect();
+    let weights: Vec<f32> = open.iter().zip(&shares).map(weight).collect();
     let sum: f32 = weights.iter().sum();
     match sum.is_finite() && sum > 0.0 {
         true => weights.into_iter().map(|weight| weight / sum).collect(),
-        false => shares.to_vec(),
+        false => shares,
     }
 }
 
@@ -112,14 +137,15 @@ fn ranking(
 }
 
 /// Adds the target to a kind of action.
-fn complete(index: usize, objects: &[f32], candidates: &[Candidate], selection: &mut Selection<'_>) -> Action {
+fn complete(index: usize, heads: &Heads<'_>, candidates: &[Candidate], selection: &mut Selection<'_>) -> Action {
     let kind = ActionType::ALL[index];
     let mut classes = classes_of(kind, candidates);
-    classes.retain(|&class| class < objects.len());
+    classes.retain(|&class| class < heads.objects.len());
     if !kind.is_interaction() || classes.is_empty() {
         return Action::navigate(kind);
     }
-    let shares = softmax_over(objects, &classes);
+    let mut shares = softmax_over(heads.objects, &classes);
+    shares.iter_mut().zip(&classes).for_each(|(share, &class)| *share *= heads.factor(kind, Some(class)));
     let chosen = match selection {
         Selection::Greedy => argmax(&shares),
         Selection::Sample(rng) => draw(&shares, rng),
@@ -145,7 +171,7 @@ fn argmax(shares: &[f32]) -> usize {
 }
 
 fn draw(shares: &[f32], rng: &mut ChaCha8Rng) -> usize {
-    let mut left: f32 = rng.random();
+    let mut left = rng.random::<f32>() * shares.iter().sum::<f32>();
     for (i, share) in shares.iter().enumerate() {
         left -= share;
         if left < 0.0 {
@@ -160,6 +186,7 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
+    use crate::agent::values::{ChoiceValue, Values};
     use crate::domain::Instance;
 
     fn candidate(kind: ActionType, class: &str, index: u16, distance: f32) -> Candidate {
@@ -184,8 +211,12 @@ mod tests {
         let candidates = [candidate(ActionType::Pickup, "Mug", 0, 500.0)];
         for favourite in ActionType::ALL {
             for _ in 0..40 {
-                let decision =
-                    decide(&actions(favourite), &objects("Mug"), &candidates, &[], Selection::Sample(&mut rng));
+                let decision = decide(
+                    &Heads::of(&actions(favourite), &objects("Mug")),
+                    &candidates,
+                    &[],
+                    Selection::Sample(&mut rng),
+                );
                 let kind = decision.action.kind;
                 assert!(!kind.is_interaction() || kind == ActionType::Pickup);
                 let mind = decision.mind.unwrap();
@@ -203,7 +234,8 @@ mod tests {
             candidate(ActionType::Pickup, "Mug", 7, 900.0),
             candidate(ActionType::Slice, "Apple", 1, 300.0),
         ];
-        let decision = decide(&actions(ActionType::Pickup), &objects("Apple"), &candidates, &[], Selection::Greedy);
+        let decision =
+            decide(&Heads::of(&actions(ActionType::Pickup), &objects("Apple")), &candidates, &[], Selection::Greedy);
         assert_eq!(decision.action, Action::interact(ActionType::Pickup, Instance::Object(3)));
         let (likeliest, _, possible) = decision.mind.unwrap().objects[0];
         assert_eq!((likeliest.name(), possible), ("Apple", false));
@@ -214,15 +246,62 @@ mod tests {
         let candidates = [candidate(ActionType::Pickup, "Mug", 3, 400.0)];
         let mut logits = vec![0.0; ActionType::COUNT];
         logits[ActionType::Pickup.index()] = 2.0;
-        let choose = |wanted: &str| decide(&logits, &objects(wanted), &candidates, &[], Selection::Greedy).action.kind;
+        let choose = |wanted: &str| {
+            decide(&Heads::of(&logits, &objects(wanted)), &candidates, &[], Selection::Greedy).action.kind
+        };
         assert_eq!(choose("Mug"), ActionType::Pickup);
         assert_eq!(choose("Apple"), ActionType::MoveAhead);
     }
 
     #[test]
+    fn a_choice_is_as_many_times_as_likely_as_its_advantage_says() {
+        let class = |name| Class::named(name).unwrap();
+        let candidates =
+            [candidate(ActionType::Pickup, "Mug", 3, 400.0), candidate(ActionType::Pickup, "Apple", 4, 400.0)];
+        let value = |kind, class, q| ChoiceValue { kind, class, q };
+        let values = Values {
+            state: 0.5,
+            choices: vec![
+                value(ActionType::MoveAhead, None, 0.5 + 2f32.ln()),
+                value(ActionType::Pickup, Some(class("Apple")), 0.5 + 3f32.ln()),
+                value(ActionType::Pickup, Some(class("Mug")), 0.5),
+            ],
+        };
+        let (logits, classes) = ([0.0; ActionType::COUNT], [0.0; Class::VOCABULARY]);
+        let alone = Heads::of(&logits, &classes);
+        let weighed = Heads { weighing: Some(Weighing { values: &values, weight: 1.0 }), ..alone };
+        let [before, after] = [alone, weighed].map(|heads| decide(&heads, &candidates, &[], Selection::Greedy).mind);
+        let (before, after) = (before.unwrap(), after.unwrap());
+        let times = |kind: ActionType| {
+            let odds = |mind: &Mind| mind.actions[kind.index()].unwrap() / mind.actions[1].unwrap();
+            odds(&after) / odds(&before)
+        };
+        assert!(
+            (times(ActionType::MoveAhead) - 2.0).abs() < 1e-4,
+            "twice as likely against a turn of no known advantage"
+        );
+        assert!(
+            (times(ActionType::Pickup) - 2.0).abs() < 1e-4,
+            "three times the apple and once the mug, as likely before"
+        );
+        let pick = |heads: &Heads<'_>| complete(ActionType::Pickup.index(), heads, &candidates, &mut Selection::Greedy);
+        let taken = |index| Action::interact(ActionType::Pickup, Instance::Object(index));
+        assert_eq!((pick(&alone), pick(&weighed)), (taken(4), taken(4)));
+        let mug = objects("Mug");
+        let weight = |weight| Heads { objects: &mug, weighing: Some(Weighing { values: &values, weight }), ..alone };
+        assert_eq!(
+            [1.0, 9.0].map(|times| pick(&weight(times))),
+            [taken(3), taken(4)],
+            "the policy's own wish counts too"
+        );
+    }
+
+    #[test]
     fn what_led_nowhere_is_not_tried_again() {
         let choose = |tried: &[ActionType]| {
-            decide(&actions(ActionType::MoveAhead), &objects("Mug"), &[], tried, Selection::Greedy).action.kind
+            decide(&Heads::of(&actions(ActionType::MoveAhead), &objects("Mug")), &[], tried, Selection::Greedy)
+                .action
+                .kind
         };
         assert_eq!(choose(&[]), ActionType::MoveAhead);
         assert_eq!(choose(&[ActionType::MoveAhead]), ActionType::RotateLeft);
@@ -236,7 +315,7 @@ mod tests {
         (logits[0], logits[1]) = (0.0, 3f32.ln());
         let mut turns = 0;
         for _ in 0..2000 {
-            let decision = decide(&logits, &objects("Mug"), &[], &[], Selection::Sample(&mut rng));
+            let decision = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Sample(&mut rng));
             turns += usize::from(decision.action.kind == ActionType::RotateLeft);
             assert_eq!(decision.mind.unwrap().greedy.kind, ActionType::RotateLeft);
         }
@@ -247,7 +326,7 @@ mod tests {
     fn all_probability_on_masked_actions_leaves_a_uniform_choice() {
         let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
         logits[ActionType::Slice.index()] = 0.0;
-        let mind = decide(&logits, &objects("Mug"), &[], &[], Selection::Greedy).mind.unwrap();
+        let mind = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Greedy).mind.unwrap();
         assert_eq!(mind.actions[0], Some(0.2));
     }
 }

@@ -18,6 +18,8 @@ pub struct Transitions {
     pub actions: Tensor,
     /// Object classes, by index [n]; 0 for navigation.
     pub objects: Tensor,
+    /// The classes that the policy's object head learns to name, by index [n]; 0 for none.
+    pub named: Tensor,
     /// 1 on the transition into the span's last state, [n] floats.
     pub terminal: Tensor,
     /// 1 where the action was taken and led to s′, 0 where it is only what would have been right, [n] floats.
@@ -122,6 +124,7 @@ impl Batch {
             told: cat(&|row| row.3.shallow_clone()),
             actions: cat(&|row| row.2.actions.shallow_clone()),
             objects: cat(&|row| row.2.objects.shallow_clone()),
+            named: cat(&|row| row.2.named.shallow_clone()),
             terminal: cat(&|row| row.4.shallow_clone()),
             taken: cat(&|row| row.2.taken.shallow_clone()),
         };

@@ -4,7 +4,7 @@ use tch::{Kind, Tensor};
 
 use crate::nets::policy::Logits;
 
-/// How surprising each item's demonstration is, both [n]; the second is 0 where nothing was interacted with.
+/// How surprising each item's demonstration is, both [n]; the second is 0 where no class is to be named.
 #[derive(Debug)]
 pub struct Surprise {
     /// Cross-entropy of the action head.
@@ -13,23 +13,23 @@ pub struct Surprise {
     pub object: Tensor,
 }
 
-/// How well `logits` tell the demonstrated `actions` [n] and `objects` [n] (class indices, 0 for navigation).
-pub fn surprise(logits: &Logits, actions: &Tensor, objects: &Tensor) -> Surprise {
+/// How well `logits` tell the demonstrated `actions` [n] and the `named` classes [n] (indices, 0 for none).
+pub fn surprise(logits: &Logits, actions: &Tensor, named: &Tensor) -> Surprise {
     let of = |logits: &Tensor, labels: &Tensor| {
         -logits.log_softmax(-1, Kind::Float).gather(1, &labels.unsqueeze(1), false).squeeze_dim(1)
     };
-    Surprise { action: of(&logits.actions, actions), object: of(&logits.objects, objects) * interactions(objects) }
+    Surprise { action: of(&logits.actions, actions), object: of(&logits.objects, named) * naming(named) }
 }
 
-/// 1 where an object was interacted with, [n].
-pub fn interactions(objects: &Tensor) -> Tensor {
-    objects.gt(0).to_kind(Kind::Float)
+/// 1 where a class is to be named, [n].
+pub fn naming(named: &Tensor) -> Tensor {
+    named.gt(0).to_kind(Kind::Float)
 }
 
 /// Shares of right answers: of the action head, and of the object head among interactions (1 without any).
 pub fn accuracy(logits: &Logits, actions: &Tensor, objects: &Tensor) -> (f64, f64) {
     let right = |logits: &Tensor, labels: &Tensor| logits.argmax(-1, false).eq_tensor(labels).to_kind(Kind::Float);
-    let interaction = interactions(objects);
+    let interaction = naming(objects);
     let count = interaction.sum(Kind::Float).double_value(&[]);
     let named = (right(&logits.objects, objects) * interaction).sum(Kind::Float).double_value(&[]);
     let share = if count > 0.0 { named / count } else { 1.0 };

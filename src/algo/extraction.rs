@@ -37,7 +37,7 @@ impl<'a> Pass<'a> {
 }
 
 /// Weighted policy extraction over both heads: the action's surprise is averaged over a part's items, the object's over its
-/// interactions. Without weights, behaviour cloning.
+/// those that name a class. Without weights, behaviour cloning.
 pub(super) fn loss(
     logits: &Logits,
     all: &Transitions,
@@ -47,14 +47,14 @@ pub(super) fn loss(
 ) -> Tensor {
     let weigh =
         |surprise: Tensor| weights.map_or_else(|| surprise.shallow_clone(), |weights| &surprise * pass.of(weights));
-    let objects = pass.of(&all.objects);
-    let bc::Surprise { action, object } = bc::surprise(logits, &pass.of(&all.actions), &objects);
-    let (action, object, interactions) = (weigh(action), weigh(object), bc::interactions(&objects));
+    let named = pass.of(&all.named);
+    let bc::Surprise { action, object } = bc::surprise(logits, &pass.of(&all.actions), &named);
+    let (action, object, naming) = (weigh(action), weigh(object), bc::naming(&named));
     let mut start = 0;
     let part_loss = |part: &&Part| {
         let of = |numbers: &Tensor| numbers.narrow(0, start, part.len());
         let action = of(&action).mean(Kind::Float);
-        let object = of(&object).sum(Kind::Float) / of(&interactions).sum(Kind::Float).clamp_min(1.0);
+        let object = of(&object).sum(Kind::Float) / of(&naming).sum(Kind::Float).clamp_min(1.0);
         start += part.len();
         terms.add(part.label("action_loss"), &action);
         terms.add(part.label("object_loss"), &object);

@@ -22,6 +22,10 @@ pub struct Iql {
     /// at random. The paper has no such phase, and 140,000 steps.
     #[serde(default)]
     pub warmup_share: f64,
+    /// How many times the advantage enters the exponent by which the agent weighs its policy when it decides. The paper's
+    /// agent decides by its policy alone: 0.
+    #[serde(default)]
+    pub weighing: f64,
 }
 
 /// (V − Q̄)² times τ where V is below Q̄, else times 1 − τ. No gradient reaches `q`.

@@ -169,6 +169,7 @@ mod tests {
         weight_cap: 100.0,
         target_rate: 0.05,
         warmup_share: 0.0,
+        weighing: 0.0,
     };
 
     const CHAINING: Chaining = Chaining {
@@ -227,6 +228,7 @@ mod tests {
             next: Some(look(&column(|row| row.3))),
             told: say(&column(|row| row.1)),
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
+            named: Tensor::from_slice(&vec![0i64; rows.len()]),
             actions: Tensor::from_slice(&actions),
             terminal: Tensor::from_slice(&rows.iter().map(|row| row.4).collect::<Vec<f32>>()),
             taken: Tensor::ones([rows.len() as i64], (Kind::Float, Device::Cpu)),

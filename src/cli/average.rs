@@ -16,7 +16,7 @@ use crate::nets::sentence::default_folder;
 use crate::run::presets::{Appraisal, Preset};
 
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
-/// checkpoint it makes another that is balanced otherwise.
+/// checkpoint it makes another that decides otherwise.
 #[derive(Args)]
 pub struct Average {
     /// Checkpoints; one that is named twice weighs twice
@@ -25,6 +25,9 @@ pub struct Average {
     /// How much of what is merely frequent it takes off its actions' logits when it decides, 0 to 1 [default: as the first]
     #[arg(long, value_name = "STRENGTH")]
     balance: Option<f32>,
+    /// How much its critic's advantages count when it decides; 0: its policy decides alone [default: as the first]
+    #[arg(long, value_name = "WEIGHT")]
+    weighing: Option<f32>,
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -49,10 +52,12 @@ impl Average {
         );
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;
+        let file = || self.checkpoints[0].join("config.json").display().to_string();
         if let Some(strength) = self.balance {
-            config
-                .set_balance(strength)
-                .with_context(|| self.checkpoints[0].join("config.json").display().to_string())?;
+            config.set_balance(strength).with_context(file)?;
+        }
+        if let Some(weight) = self.weighing {
+            config.set_weighing(weight).with_context(file)?;
         }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;

@@ -7,7 +7,7 @@ use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::selection::{Composites, Past, Selection};
+use super::selection::{Composites, Named, Past, Selection};
 use super::summaries::Summaries;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{ActionType, Trajectory};
@@ -74,6 +74,8 @@ pub struct Items {
     pub firsts: Vec<u32>,
     /// How far back observations reach.
     pub past: Past,
+    /// What the object head learns.
+    pub named: Named,
 }
 
 /// A drawn item: the transition from `frame` to the frame after it.
@@ -104,7 +106,8 @@ impl Items {
     ) -> anyhow::Result<Items> {
         let learned = |label: &Label| label.taken || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
-        let mut items = Items { labels, firsts: vec![0], past: selection.past, ..Items::default() };
+        let mut items =
+            Items { labels, firsts: vec![0], past: selection.past, named: selection.named, ..Items::default() };
         let mut numbers = HashMap::new();
         let mut first = 0;
         for (position, trajectory) in source.trajectories.iter().enumerate() {
@@ -161,6 +164,16 @@ impl Items {
                 };
             }
         }
+    }
+
+    /// The class that the object head learns to name at an item's frame; 0 where there is none.
+    pub fn named_by(&self, item: &Item) -> u8 {
+        let last = match self.named {
+            Named::Own => item.frame + 1,
+            Named::Ahead => item.end,
+        };
+        let labels = self.labels.get(item.frame as usize..last as usize).unwrap_or_default();
+        labels.iter().flatten().map(|label| label.object).find(|&object| object > 0).unwrap_or(0)
     }
 
     /// Each action's share of what is drawn to learn from, in the order of the action head.
@@ -389,6 +402,24 @@ mod tests {
             Vec::from_iter::<std::collections::BTreeSet<u32>>(late.map(|item| item.first).collect())
         };
         assert_eq!([Past::Trajectory, Past::Span, Past::Either].map(firsts), [vec![0], vec![2], vec![0, 2]]);
+    }
+
+    #[test]
+    fn on_the_way_what_comes_next_is_named_where_the_selection_says_so() {
+        let two = [trajectory(vec![0, 3], 5)];
+        let mut labels = labels(&two);
+        labels[2] = Some(Label { action: 5, object: 7, taken: true });
+        labels[4] = Some(Label { action: 6, object: 9, taken: true });
+        let named = |named, end| -> Vec<u8> {
+            let summaries = Summaries::default();
+            let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+            let selection = Selection { named, ..Selection::of(Composites::None) };
+            let items = Items::of(&source, labels.clone(), &selection, 0).unwrap();
+            (0..end).map(|frame| items.named_by(&Item { first: 0, frame, end, text: 0 })).collect()
+        };
+        assert_eq!(named(Named::Own, 5), [0, 0, 7, 0, 9]);
+        assert_eq!(named(Named::Ahead, 5), [7, 7, 7, 9, 9]);
+        assert_eq!(named(Named::Ahead, 4), [7, 7, 7, 0], "what comes after the span is not asked for");
     }
 
     #[test]

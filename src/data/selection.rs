@@ -42,6 +42,17 @@ impl Past {
     }
 }
 
+/// Which class the policy's object head learns to name at a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Named {
+    /// That of the thing the step interacts with; none on the way.
+    #[default]
+    Own,
+    /// On the way that of the thing the span interacts with next.
+    Ahead,
+}
+
 /// Which spans are learned from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,12 +68,15 @@ pub struct Selection {
     /// How far back observations reach.
     #[serde(default)]
     pub past: Past,
+    /// What the object head learns.
+    #[serde(default)]
+    pub named: Named,
 }
 
 impl Selection {
     /// A selection of composites; with labels, of the only source there is.
     pub fn of(composites: Composites) -> Selection {
-        Selection { composites, labels_of: None, corrections: false, past: Past::Trajectory }
+        Selection { composites, labels_of: None, corrections: false, past: Past::Trajectory, named: Named::Own }
     }
 }
 

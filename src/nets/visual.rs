@@ -17,16 +17,28 @@ pub const SIDE: i64 = 7;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VisualSpec {
-    /// The side of the image it reads, in pixels: 16 times [`SIDE`].
+    /// The side of the image it reads, in pixels: [`SIDE`], doubled as often as there are channels.
     pub input: i64,
-    /// Channels at 1/2, 1/4, 1/8 and 1/16 of the image; the last are the features.
-    pub channels: [i64; 4],
+    /// Channels at 1/2, 1/4, 1/8 of the image and so on; the last are the features.
+    pub channels: Vec<i64>,
 }
 
 impl VisualSpec {
+    /// Whether an image becomes a map of [`SIDE`] x [`SIDE`] places.
+    ///
+    /// # Errors
+    /// When it becomes another, or there is no channel.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let halvings = self.channels.len();
+        anyhow::ensure!((1..=6).contains(&halvings), "visual.channels has {halvings} entries, not 1 to 6");
+        let side = SIDE << halvings;
+        anyhow::ensure!(self.input == side, "visual.input is {}, not {side} for {halvings} channels", self.input);
+        Ok(())
+    }
+
     /// Features in each of the 7 x 7 places.
     pub fn features(&self) -> i64 {
-        self.channels[3]
+        self.channels.last().copied().unwrap_or(0)
     }
 
     /// Numbers in a feature map.
@@ -208,7 +220,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(3);
         let store = nn::VarStore::new(Device::Cpu);
-        let spec = VisualSpec { input: 112, channels: [8, 8, 8, 16] };
+        let spec = VisualSpec { input: 112, channels: vec![8, 8, 8, 16] };
         let encoder = VisualEncoder::new(&store.root(), &spec);
         let images: Vec<Vec<u8>> = (0..3u8).map(|i| vec![40 * i; 3 * 112 * 112]).collect();
         let maps = encoder.encode(&images);
@@ -222,7 +234,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(5);
         let store = nn::VarStore::new(Device::Cpu);
-        let encoder = VisualEncoder::new(&store.root(), &VisualSpec { input: 112, channels: [4, 8, 8, 16] });
+        let encoder = VisualEncoder::new(&store.root(), &VisualSpec { input: 112, channels: vec![4, 8, 8, 16] });
         let noise = Tensor::randint(255, [4, 3, 112, 112], (Kind::Uint8, Device::Cpu));
         // Batch norms that are not the identity.
         for _ in 0..20 {

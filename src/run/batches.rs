@@ -146,6 +146,7 @@ impl<'a> Batches<'a> {
     fn transitions(&self, items: &[Item], told: Tensor) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
         let (mut actions, mut objects, mut taken) = (Vec::new(), Vec::new(), Vec::new());
+        let named: Vec<i64> = items.iter().map(|item| i64::from(self.material.items.named_by(item))).collect();
         for item in items {
             let label = self.material.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
@@ -166,6 +167,7 @@ impl<'a> Batches<'a> {
             told,
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
+            named: Tensor::from_slice(&named).to_device(self.device),
             terminal: Tensor::from_slice(&terminal).to_device(self.device),
             taken: Tensor::from_slice(&taken).to_device(self.device),
         })

@@ -43,14 +43,16 @@ fn told(config: &Config) -> String {
 }
 
 /// How it decides, in words, where not by the logits alone.
-fn balanced(config: &Config) -> String {
-    match config.balance.as_ref().map(|balance| balance.strength).filter(|&strength| strength > 0.0) {
-        Some(strength) => format!(
-            " When it decides, {:.0} % of what is merely frequent is taken off the actions' logits (`balance`).",
-            100.0 * strength
-        ),
-        None => String::new(),
-    }
+fn deciding(config: &Config) -> String {
+    let balance = config.balance.as_ref().map(|balance| balance.strength).filter(|&strength| strength > 0.0);
+    let balanced = balance.map(|strength| {
+        format!("{:.0} % of what is merely frequent is taken off the actions' logits (`balance`)", 100.0 * strength)
+    });
+    let weighed = config
+        .weighing
+        .map(|weight| format!("a choice of advantage A by its critic is exp({weight} A) times as likely (`weighing`)"));
+    let ways: Vec<String> = balanced.into_iter().chain(weighed).collect();
+    if ways.is_empty() { String::new() } else { format!(" When it decides, {}.", ways.join(", and ")) }
 }
 
 /// What it learned from, in words.
@@ -81,7 +83,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         text,
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
-         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.{balanced}\n\n\
+         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.{deciding}\n\n\
          {origin}\n\n\
          ## Measured in generated houses that no training saw\n\n\
          `sprint {command}` measures this at its end.\n\n\
@@ -91,7 +93,7 @@ pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
         history = config.policy.history,
         eyes = eyes(config),
         told = told(config),
-        balanced = balanced(config),
+        deciding = deciding(config),
         origin = origin(config),
         command = if config.provenance.averaged.is_some() { "average" } else { "pretrain" },
         agent = findings.agent,

@@ -175,7 +175,7 @@ mod tests {
     fn encoder() -> impl FrameEncoder {
         tch::manual_seed(2);
         let store = nn::VarStore::new(Device::Cpu);
-        let spec = VisualSpec { input: 112, channels: [4, 4, 8, 16] };
+        let spec = VisualSpec { input: 112, channels: vec![4, 4, 8, 16] };
         VisualEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
     }
 

@@ -169,6 +169,7 @@ impl Preset {
         }
         let balance = preset.balance;
         anyhow::ensure!((0.0..=1.0).contains(&balance), "balance is {balance}, which is not a share");
+        preset.visual.check()?;
         preset.check_method()?;
         Ok(preset)
     }
@@ -190,6 +191,9 @@ impl Preset {
         }
         if let Some(share) = self.iql.as_ref().map(|iql| iql.warmup_share) {
             anyhow::ensure!((0.0..=1.0).contains(&share), "iql.warmup_share is {share}, which is not a share");
+        }
+        if let Some(weight) = self.iql.as_ref().map(|iql| iql.weighing) {
+            anyhow::ensure!(weight.is_finite() && weight >= 0.0, "iql.weighing is {weight}, which is no weight");
         }
         let Some(chaining) = &self.chaining else { return Ok(()) };
         anyhow::ensure!(self.critic.is_some(), "chaining needs a critic");
@@ -302,6 +306,8 @@ mod tests {
         refused("[policy]\ngoal = [4, 4, 4, 4]\n[appraisal]\nswaps = 0", "goals have none");
         refused("[chaining]\nbatch = 0", "chaining.batch");
         refused("[iql]\nwarmup_share = 3000.0", "iql.warmup_share");
+        refused("[iql]\nweighing = -1.0", "iql.weighing");
+        refused("[visual]\ninput = 224", "visual.input is 224, not 112");
         refused("eyes = \"ears\"", "resnet18");
     }
 }

@@ -162,7 +162,7 @@ impl Trainer<'_> {
             });
             let (actions, objects) = bc::accuracy(&logits, &items.actions, &items.objects);
             let sum = |tensor: &Tensor| tensor.sum(Kind::Double).double_value(&[]);
-            let (count, named) = (items.actions.size()[0] as f64, sum(&bc::interactions(&items.objects)));
+            let (count, named) = (items.actions.size()[0] as f64, sum(&bc::naming(&items.objects)));
             let found = [count, sum(&surprise.action), actions * count, named, sum(&surprise.object), objects * named];
             sums.iter_mut().zip(found).for_each(|(sum, value)| *sum += value);
         }
@@ -217,7 +217,7 @@ mod tests {
     use crate::algo::chain::Pairs;
     use crate::data::features::{Features, Header, Writer};
     use crate::data::items::{Items, Label};
-    use crate::data::selection::Past;
+    use crate::data::selection::{Named, Past};
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::eyes::Eyes;
@@ -250,7 +250,7 @@ mod tests {
                 chaining.pairs = Pairs::Pool(5);
             }
         }
-        preset.visual.channels = [2; 4];
+        preset.visual.channels = vec![2; 4];
         (preset.training.steps, preset.training.batch) = (steps, 16);
         (preset.training.schedule.warmup_steps, preset.training.schedule.learning_rate) = (2, 0.01);
         (preset.save_every, preset.report_every) = (1000, 1000);
@@ -286,6 +286,7 @@ mod tests {
             held_out: vec![span(0, 0), span(1, 0)],
             firsts: vec![0, 6, 12, 18, FRAMES as u32],
             past: Past::Trajectory,
+            named: Named::Own,
         }
     }
 

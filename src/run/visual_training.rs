@@ -201,7 +201,7 @@ mod tests {
         let footage = footage();
         assert_eq!(footage.frames(), 10);
         let mut preset = Preset::named("l-bc").unwrap();
-        preset.visual.channels = [4, 4, 8, 16];
+        preset.visual.channels = vec![4, 4, 8, 16];
         preset.visual_training.optimisation.steps = 90;
         preset.visual_training.optimisation.batch = 8;
         preset.visual_training.optimisation.schedule.warmup_steps = 2;

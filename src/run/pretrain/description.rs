@@ -37,6 +37,7 @@ impl Pretraining {
             critic: self.preset.critic.clone(),
             words: None,
             balance: None,
+            weighing: self.preset.iql.as_ref().map(|iql| iql.weighing as f32).filter(|&weight| weight > 0.0),
             sentence_encoder: SentenceSpec {
                 name: self.sentence_encoder.clone(),
                 digest: embedder.encoder().digest().to_string(),
