@@ -11,7 +11,7 @@ use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::algo::chain::Pairs;
 use sprint_explorer::data::features::{Features, Header, Writer};
 use sprint_explorer::data::items::{Items, Label, Span};
-use sprint_explorer::data::selection::Past;
+use sprint_explorer::data::selection::{Named, Past};
 use sprint_explorer::nets::device::best_device;
 use sprint_explorer::nets::eyes::Eyes;
 use sprint_explorer::run::batches::Batches;
@@ -134,5 +134,6 @@ fn items() -> Items {
         held_out: Vec::new(),
         firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
         past: Past::Trajectory,
+        named: Named::Ahead,
     }
 }
