@@ -146,8 +146,8 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
         "{}",
         sprint.read("wiser/README.md")
     );
-    let refused = sprint.run("average agent --weighing -1 --out none");
-    assert!(refused.stderr.contains("-1"), "{}", refused.stderr);
+    let refused = sprint.run("average agent --weighing=-1 --out none").stderr;
+    assert!(refused.contains("agent/config.json: weighing is -1, which is no weight"), "{refused}");
     let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
     let refused = sprint.run(&format!("average {first} --balance 0.2 --out none")).stderr;
     assert!(refused.contains("how often each action was shown was not noted"), "{refused}");

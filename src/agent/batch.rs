@@ -198,31 +198,49 @@ mod tests {
         }
     }
 
+    /// What a shipped agent thinks first, in one seat of a team; alone it must think the same.
+    fn first_thought(name: &str, change: impl Fn(&mut Config)) -> Option<Mind> {
+        let (mut one, mut agent) = (shipped(name)?, shipped(name)?);
+        change(&mut one.config);
+        change(&mut agent.config);
+        let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
+        let together = minds(&mut team, 3, &[0, 1, 2]).remove(0);
+        let mut house = turned(Heading::West);
+        one.begin(3);
+        let mut here =
+            Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
+        let alone = one.decide(&mut here).unwrap().mind.unwrap();
+        // Another shape of the pass may round otherwise, no more.
+        for (a, b) in together.actions.iter().zip(alone.actions) {
+            assert!((a.unwrap_or(-1.0) - b.unwrap_or(-1.0)).abs() < 1e-4, "{together:?} {alone:?}");
+        }
+        Some(together)
+    }
+
     #[test]
     fn several_at_once_think_what_one_alone_thinks() {
         let mut ahead = Vec::new();
         let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
         for balance in [None, Some(Balance { strength: 0.5, shares })] {
-            let (Some(mut one), Some(mut agent)) = (shipped("first"), shipped("first")) else {
+            let Some(mind) = first_thought("first", |config| config.balance = balance.clone()) else {
                 eprintln!("skipped: the shipped agent needs its sentence encoder");
                 return;
             };
-            (one.config.balance, agent.config.balance) = (balance.clone(), balance);
-            let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
-            let together = minds(&mut team, 3, &[0, 1, 2]).remove(0);
-            let mut house = turned(Heading::West);
-            one.begin(3);
-            let mut here =
-                Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
-            let alone = one.decide(&mut here).unwrap().mind.unwrap();
-            // Another shape of the pass may round otherwise, no more.
-            for (a, b) in together.actions.iter().zip(alone.actions) {
-                assert!((a.unwrap_or(-1.0) - b.unwrap_or(-1.0)).abs() < 1e-4, "{together:?} {alone:?}");
-            }
-            let odds = |action: usize| alone.actions[action].unwrap();
+            let odds = |action: usize| mind.actions[action].unwrap();
             ahead.push(odds(0) / odds(1));
         }
         // Nine times the share, at half strength: a third of the odds.
         assert!((ahead[0] / ahead[1] - 3.0).abs() < 1e-3, "{ahead:?}");
+    }
+
+    #[test]
+    fn an_agent_that_weighs_by_its_critic_thinks_otherwise_than_by_its_policy_alone() {
+        let [alone, weighed] = [None, Some(10.0)].map(|weight| first_thought("sprint", |it| it.weighing = weight));
+        let (Some(alone), Some(weighed)) = (alone, weighed) else {
+            eprintln!("skipped: the shipped agent needs its sentence encoder");
+            return;
+        };
+        let apart = |(a, b): (&Option<f32>, &Option<f32>)| (a.unwrap_or(0.0) - b.unwrap_or(0.0)).abs() > 1e-3;
+        assert!(alone.actions.iter().zip(&weighed.actions).any(apart), "{alone:?} {weighed:?}");
     }
 }

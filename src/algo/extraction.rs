@@ -36,8 +36,8 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// Weighted policy extraction over both heads: the action's surprise is averaged over a part's items, the object's over its
-/// those that name a class. Without weights, behaviour cloning.
+/// Weighted policy extraction over both heads: the action's surprise is averaged over a part's items, the object's over those
+/// that name a class. Without weights, behaviour cloning.
 pub(super) fn loss(
     logits: &Logits,
     all: &Transitions,

@@ -379,6 +379,18 @@ mod tests {
     }
 
     #[test]
+    fn the_object_head_learns_the_named_classes_and_not_what_the_steps_interact_with() {
+        let _chance = crate::nets::testing::chance();
+        let loss = |objects: i64, named: i64| {
+            let of_all = |class| Tensor::full([4], class, (Kind::Int64, Device::Cpu));
+            let base = Transitions { objects: of_all(objects), named: of_all(named), ..transitions(&CHAIN_OF_TWO) };
+            update(&nets(), 1, IQL, None).update(&Batch { base, pairs: None }, false).unwrap()["object_loss"]
+        };
+        assert_eq!((loss(0, 0), loss(1, 0)), (0.0, 0.0));
+        assert!(loss(0, 1) > 0.0);
+    }
+
+    #[test]
     fn a_loss_that_is_no_number_is_named_and_changes_nothing() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();

@@ -230,6 +230,19 @@ mod tests {
     }
 
     #[test]
+    fn a_larger_image_is_halved_once_more_and_what_does_not_fit_is_refused() {
+        let _chance = crate::nets::testing::chance();
+        let spec = VisualSpec { input: 224, channels: vec![2, 2, 2, 2, 3] };
+        spec.check().unwrap();
+        let store = nn::VarStore::new(Device::Cpu);
+        let maps = VisualEncoder::new(&store.root(), &spec).encode(&[vec![9; 3 * 224 * 224]]);
+        assert_eq!(maps.size(), [1, 3, SIDE, SIDE]);
+        let refused = |input, channels| VisualSpec { input, channels }.check().unwrap_err().to_string();
+        assert!(refused(112, vec![2; 5]).contains("visual.input is 112, not 224"));
+        assert!(refused(7, Vec::new()).contains("visual.channels has 0 entries"));
+    }
+
+    #[test]
     fn frozen_it_sees_the_same() {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(5);

@@ -262,7 +262,7 @@ fn resize(table: &mut toml::Table, size: toml::Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::selection::Composites;
+    use crate::data::selection::{Composites, Named};
 
     #[test]
     fn every_shipped_preset_parses_in_every_size_and_is_what_its_name_says() {
@@ -273,6 +273,8 @@ mod tests {
             assert_eq!((paper.training.batch, paper.policy.embedding), (1024, 768), "{name}");
             assert_eq!(paper.method(), preset.method(), "{name}");
             assert!(paper.critic.is_none_or(|critic| !critic.shared_trunk), "{name}");
+            assert_eq!((preset.data.named, paper.data.named), (Named::Ahead, Named::Own), "{name}");
+            assert!(paper.iql.is_none_or(|iql| iql.weighing == 0.0), "{name}");
             assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == Pairs::InBatch), "{name}");
         }
         let method = |name| Preset::named(name).unwrap().method();

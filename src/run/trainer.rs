@@ -313,7 +313,7 @@ mod tests {
 
     /// Trains, stopping once and going on when `stop_after` says so; the final state and numbers.
     fn trained(preset: &Preset, stop_after: u64) -> (weights::Tensors, Scalars) {
-        let (features, items) = (features(preset), items());
+        let (features, items) = (features(preset), Items { named: preset.data.named, ..items() });
         let sentences = Tensor::from_slice2(&[[1.0f32, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let folder = tempfile::tempdir().unwrap();
         let state = folder.path().join("state.safetensors");
@@ -359,6 +359,18 @@ mod tests {
         let (_, last) = trained(&preset("l-bc", 250), u64::MAX);
         assert!(last.values["held_out_action_accuracy"] > 0.95, "{last:?}");
         assert!(last.values["held_out_object_accuracy"] > 0.95, "{last:?}");
+    }
+
+    #[test]
+    fn the_object_head_is_taught_what_the_preset_says() {
+        let _chance = crate::nets::testing::chance();
+        let losses = [Named::Own, Named::Ahead].map(|named| {
+            let mut preset = preset("l-bc", 1);
+            preset.data.named = named;
+            trained(&preset, u64::MAX).1.values
+        });
+        assert_eq!(losses[0]["action_loss"], losses[1]["action_loss"]);
+        assert!(losses[0]["object_loss"] != losses[1]["object_loss"], "{losses:?}");
     }
 
     #[test]
