@@ -34,11 +34,13 @@ pub struct Decision {
 /// A policy's distribution over what it could do now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mind {
-    /// Probability of each action in the order of [`ActionType::ALL`], balanced and masked; `None` where masked.
+    /// Probability of each action in the order of [`ActionType::ALL`], balanced, weighed and masked; `None` where masked.
     pub actions: [Option<f32>; ActionType::COUNT],
-    /// Object classes by falling probability (before restriction to candidates), with whether one of that class is a
-    /// candidate of the chosen or likeliest interaction.
+    /// Object classes by falling probability (before restriction to candidates and weighing), with whether one of that class
+    /// is a candidate of the chosen or likeliest interaction.
     pub objects: Vec<(Class, f32, bool)>,
+    /// The weight of each class among those that an interaction could name; all weigh alike where none is listed.
+    pub choices: Vec<(ActionType, Class, f32)>,
     /// Entropy of the masked action distribution, in nats.
     pub entropy: f32,
     /// The action that argmax would choose.
@@ -49,7 +51,10 @@ impl Mind {
     /// The distribution over everything that could be done now: navigation, and each interaction with each class that is a
     /// candidate of it, in the order of actions. Sums to 1.
     pub fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
-        let share = |class: Class| self.objects.iter().find(|(known, ..)| *known == class).map_or(0.0, |found| found.1);
+        let share = |kind: ActionType, class: Class| {
+            let mut weights = self.choices.iter().filter(|choice| (choice.0, choice.1) == (kind, class));
+            weights.next().map_or(0.0, |choice| choice.2)
+        };
         let mut found = Vec::new();
         for kind in ActionType::ALL {
             let p = self.actions[kind.index()].unwrap_or(0.0);
@@ -63,10 +68,9 @@ impl Mind {
                     classes.push(candidate.class);
                 }
             }
-            let all: f32 = classes.iter().map(|&class| share(class)).sum();
+            let all: f32 = classes.iter().map(|&class| share(kind, class)).sum();
             for &class in &classes {
-                // Classes that are too unlikely to be listed share alike where none is.
-                let part = if all > 0.0 { share(class) / all } else { 1.0 / classes.len() as f32 };
+                let part = if all > 0.0 { share(kind, class) / all } else { 1.0 / classes.len() as f32 };
                 found.push((kind, Some(class), p * part));
             }
         }

@@ -59,6 +59,7 @@ impl Policy for RandomPolicy {
         let mind = Mind {
             actions: ActionType::ALL.map(|kind| possible.contains(&kind).then_some(chance)),
             objects: named.iter().map(|&class| (class, 1.0 / named.len() as f32, true)).collect(),
+            choices: Vec::new(),
             entropy: (possible.len() as f32).ln(),
             greedy: action,
         };

@@ -68,6 +68,7 @@ pub fn decide(heads: &Heads<'_>, candidates: &[Candidate], tried: &[ActionType],
     let mind = Mind {
         actions: probabilities,
         objects: ranking(heads.objects, candidates, shown, &open, &shares),
+        choices: open.iter().flat_map(|&index| choices(ActionType::ALL[index], heads, candidates)).collect(),
         entropy,
         greedy,
     };
@@ -139,19 +140,27 @@ fn ranking(
 /// Adds the target to a kind of action.
 fn complete(index: usize, heads: &Heads<'_>, candidates: &[Candidate], selection: &mut Selection<'_>) -> Action {
     let kind = ActionType::ALL[index];
-    let mut classes = classes_of(kind, candidates);
-    classes.retain(|&class| class < heads.objects.len());
-    if !kind.is_interaction() || classes.is_empty() {
+    let choices = choices(kind, heads, candidates);
+    if choices.is_empty() {
         return Action::navigate(kind);
     }
-    let mut shares = softmax_over(heads.objects, &classes);
-    shares.iter_mut().zip(&classes).for_each(|(share, &class)| *share *= heads.factor(kind, Some(class)));
+    let shares: Vec<f32> = choices.iter().map(|choice| choice.2).collect();
     let chosen = match selection {
         Selection::Greedy => argmax(&shares),
         Selection::Sample(rng) => draw(&shares, rng),
     };
-    let target = Class::from_index(classes[chosen]).and_then(|class| nearest(candidates, kind, class));
-    target.map_or_else(|| Action::navigate(kind), Candidate::action)
+    nearest(candidates, kind, choices[chosen].1).map_or_else(|| Action::navigate(kind), Candidate::action)
+}
+
+/// The classes that an interaction could name now, each with its weight among them; none for navigation.
+fn choices(kind: ActionType, heads: &Heads<'_>, candidates: &[Candidate]) -> Vec<(ActionType, Class, f32)> {
+    let mut classes = classes_of(kind, candidates);
+    classes.retain(|&class| class < heads.objects.len());
+    let shares = softmax_over(heads.objects, &classes);
+    let weighed = |(&class, share): (&usize, f32)| {
+        Some((kind, Class::from_index(class)?, share * heads.factor(kind, Some(class))))
+    };
+    classes.iter().zip(shares).filter_map(weighed).collect()
 }
 
 /// The softmax of some entries of `logits`; uniform when they underflow or are not numbers.
@@ -284,6 +293,9 @@ mod tests {
             (times(ActionType::Pickup) - 2.0).abs() < 1e-4,
             "three times the apple and once the mug, as likely before"
         );
+        let apple = after.joint(&candidates).into_iter().find(|choice| choice.1 == Some(class("Apple"))).unwrap().2;
+        let share = apple / after.actions[ActionType::Pickup.index()].unwrap();
+        assert!((share - 0.75).abs() < 1e-4, "three times the mug, in what is shown, too: {share}");
         let pick = |heads: &Heads<'_>| complete(ActionType::Pickup.index(), heads, &candidates, &mut Selection::Greedy);
         let taken = |index| Action::interact(ActionType::Pickup, Instance::Object(index));
         assert_eq!((pick(&alone), pick(&weighed)), (taken(4), taken(4)));

@@ -129,7 +129,10 @@ mod tests {
             let likely = if left { ActionType::RotateLeft } else { ActionType::RotateRight };
             actions[likely.index()] = Some(1.0);
             let action = Action::navigate(likely);
-            Ok(Decision { action, mind: Some(Mind { actions, objects: vec![], entropy: 0.0, greedy: action }) })
+            Ok(Decision {
+                action,
+                mind: Some(Mind { actions, objects: vec![], choices: vec![], entropy: 0.0, greedy: action }),
+            })
         }
     }
 

@@ -89,6 +89,7 @@ fn legal(now: &Snapshot) -> Vec<(ActionType, Option<Class>, f32)> {
     let uniform = Mind {
         actions: [None; ActionType::COUNT],
         objects: Vec::new(),
+        choices: Vec::new(),
         entropy: 0.0,
         greedy: Action::navigate(ActionType::MoveAhead),
     };

@@ -111,9 +111,11 @@ pub fn thought(now: &Snapshot) -> Report {
         (class("Bowl"), 0.04, false),
         (class("CoffeeMachine"), 0.03, false),
     ];
+    let weighs = |kind: ActionType| objects.iter().map(move |&(class, p, _)| (kind, class, p));
+    let choices = [ActionType::Pickup, ActionType::Open].into_iter().flat_map(weighs).collect();
     let action = now.candidates[0].action();
     Report::Thought(
-        Decision { action, mind: Some(Mind { actions, objects, entropy: 1.13, greedy: action }) },
+        Decision { action, mind: Some(Mind { actions, objects, choices, entropy: 1.13, greedy: action }) },
         "Pickup Mug".into(),
         None,
     )
