@@ -6,8 +6,8 @@
 #
 # DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), EYES a checkpoint whose visual encoder
 # all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. CLONING (updates of cloning, which
-# methods that learn from the same words share), STEPS (updates after that), SEEDS (as "1 2 3") and JOBS may be set; HOUSES
-# may name further datasets to learn from.
+# methods that learn from the same words share), STEPS (updates after that), SEEDS (as "1 2 3"), PRECISION (mixed, for
+# processors that compute with bfloat16) and JOBS may be set; HOUSES may name further datasets to learn from.
 set -euo pipefail
 if [ $# -lt 3 ]; then
     sed -n '2,10s/^# \{0,1\}//p' "$0"
@@ -24,7 +24,7 @@ sprint=${SPRINT:-target/release/sprint}
 pretrain() {
     local seed=$1 name=$2 checkpoint=$out/$1/$2 preset=$out/$1/presets/$2.toml resume=()
     mkdir -p "$out/$seed/presets"
-    printf 'extends = "%s"\nseed = %s\nhold_out = 0\n%s\n' "$3" "$seed" "$5" >"$preset"
+    printf 'extends = "%s"\nseed = %s\nhold_out = 0\nprecision = "%s"\n%s\n' "$3" "$seed" "${PRECISION:-full}" "$5" >"$preset"
     [ ! -d "$checkpoint/training" ] || resume=(--resume)
     [ -f "$checkpoint/README.md" ] || "$sprint" pretrain "$data" ${HOUSES:-} --preset "$preset" \
         --steps "$4" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}" "${@:6}"

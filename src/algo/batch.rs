@@ -1,8 +1,9 @@
 //! Batches: demonstrated transitions, chained pairs, and how an update lays them out.
 
-use tch::{Kind, Tensor};
+use tch::Tensor;
 
 use super::chain::Chaining;
+use crate::nets::precision::Precision;
 use crate::nets::visual::SIDE;
 
 /// Transitions (s, a, s′) with what the agent was told, n of each.
@@ -100,8 +101,8 @@ pub(super) fn of_all(parts: &[&Part], all: &Tensor) -> Tensor {
 }
 
 impl Batch {
-    /// The batch and its relabelled copies, one after the other.
-    pub(super) fn relabelled(&self, chaining: Option<&Chaining>) -> (Transitions, Vec<Part>) {
+    /// The batch and its relabelled copies, one after the other, seen with `precision`.
+    pub(super) fn relabelled(&self, chaining: Option<&Chaining>, precision: Precision) -> (Transitions, Vec<Part>) {
         let base = &self.base;
         let mut rows: Vec<Row<'_>> = vec![(BASE, 1.0, base, &base.told, &base.terminal)];
         if let (Some(pairs), Some(chaining)) = (&self.pairs, chaining) {
@@ -119,8 +120,8 @@ impl Batch {
         };
         let next = |row: &Row<'_>| row.2.next.as_ref().unwrap_or(&row.2.observation).shallow_clone();
         let all = Transitions {
-            observation: seen(&cat(&|row| row.2.observation.shallow_clone())),
-            next: base.next.is_some().then(|| seen(&cat(&next))),
+            observation: seen(&cat(&|row| row.2.observation.shallow_clone()), precision),
+            next: base.next.is_some().then(|| seen(&cat(&next), precision)),
             told: cat(&|row| row.3.shallow_clone()),
             actions: cat(&|row| row.2.actions.shallow_clone()),
             objects: cat(&|row| row.2.objects.shallow_clone()),
@@ -139,7 +140,7 @@ impl Batch {
     }
 }
 
-/// Observations as the networks take them: [n, channels, 7, 7] in 32 bits.
-pub fn seen(observation: &Tensor) -> Tensor {
-    observation.to_kind(Kind::Float).reshape([observation.size()[0], -1, SIDE, SIDE])
+/// Observations as the networks take them: [n, channels, 7, 7].
+pub fn seen(observation: &Tensor, precision: Precision) -> Tensor {
+    precision.shown(&observation.reshape([observation.size()[0], -1, SIDE, SIDE]))
 }

@@ -13,6 +13,7 @@ use super::extraction::{self, Pass};
 use super::learner::{Learner, Optimisation};
 use super::terms::{NotFinite, Terms};
 use crate::nets::policy::{Logits, PolicyNet};
+use crate::nets::precision::Precision;
 use crate::nets::weights::{self, Tensors};
 
 /// A policy, and for IQL its critic, under training.
@@ -21,6 +22,7 @@ pub struct Update<'a> {
     learner: Learner<'a>,
     critic: Option<CriticLearner<'a>>,
     chaining: Option<Chaining>,
+    precision: Precision,
 }
 
 impl<'a> Update<'a> {
@@ -32,7 +34,13 @@ impl<'a> Update<'a> {
         optimisation: Optimisation,
         seed: u64,
     ) -> Update<'a> {
-        Update { policy, learner: Learner::new(store, optimisation, seed), critic, chaining }
+        let learner = Learner::new(store, optimisation, seed);
+        Update { policy, learner, critic, chaining, precision: Precision::Full }
+    }
+
+    /// The same, but its networks compute with `precision`.
+    pub fn with(self, precision: Precision) -> Update<'a> {
+        Update { precision, ..self }
     }
 
     /// Steps taken.
@@ -51,7 +59,7 @@ impl<'a> Update<'a> {
     /// [`NotFinite`].
     pub fn update(&mut self, batch: &Batch, report: bool) -> Result<BTreeMap<String, f64>, NotFinite> {
         self.learner.begin_step();
-        let (all, parts) = batch.relabelled(self.chaining.as_ref());
+        let (all, parts) = batch.relabelled(self.chaining.as_ref(), self.precision);
         let mut terms = Terms::default();
         let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
         // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.

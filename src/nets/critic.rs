@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use tch::Tensor;
 use tch::nn::{self, Module};
 
+use super::precision;
 use super::trunk::{Convolutions, Dense, Telling, Trunk};
 use super::value::ValueHead;
 use crate::domain::{ActionType, Class};
@@ -71,8 +72,9 @@ impl QHead {
     }
 
     fn forward(&self, input: &Tensor, actions: &Tensor, objects: &Tensor, train: bool) -> Tensor {
-        let joined = Tensor::cat(&[input, &self.action.forward(actions), &self.object.forward(objects)], 1);
-        self.out.forward(&self.dense.forward(joined, train)).squeeze_dim(1)
+        let chosen = [self.action.forward(actions), self.object.forward(objects)].map(|x| x.to_kind(input.kind()));
+        let joined = Tensor::cat(&[input, &chosen[0], &chosen[1]], 1);
+        precision::answer(&self.out, &self.dense.forward(joined, train)).squeeze_dim(1)
     }
 }
 
@@ -126,7 +128,7 @@ impl Critic {
     /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` [n]
     /// (class indices, 0 for navigation).
     pub fn judge(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Judgement {
-        let told = self.telling.forward(told, true);
+        let told = self.telling.forward(told, observation.kind(), true);
         let first = self.input(0, observation, &told, None, true);
         let second = self.input(1, observation, &told, Some(&first), true);
         let third = self.input(2, observation, &told, Some(&first), true);
@@ -140,7 +142,7 @@ impl Critic {
     /// min(Q1, Q2) [n], without dropout and without gradient.
     pub fn least_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
         tch::no_grad(|| {
-            let told = self.telling.forward(told, false);
+            let told = self.telling.forward(told, observation.kind(), false);
             let first = self.input(0, observation, &told, None, false);
             let second = self.input(1, observation, &told, Some(&first), false);
             let [one, other] =
@@ -152,7 +154,7 @@ impl Critic {
     /// V [n], without dropout and without gradient.
     pub fn value(&self, observation: &Tensor, told: &Tensor) -> Tensor {
         tch::no_grad(|| {
-            let told = self.telling.forward(told, false);
+            let told = self.telling.forward(told, observation.kind(), false);
             self.value.forward(&self.input(2, observation, &told, None, false), false)
         })
     }
@@ -164,7 +166,7 @@ impl Critic {
         };
         let (actions, objects) = (column(|pair| pair.0), column(|pair| pair.1));
         tch::no_grad(|| {
-            let told = self.telling.forward(told, false);
+            let told = self.telling.forward(told, observation.kind(), false);
             let first = self.input(0, observation, &told, None, false);
             let inputs =
                 [0, 1, 2].map(|head| self.input(head, observation, &told, (head > 0).then_some(&first), false));

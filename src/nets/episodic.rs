@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tch::nn::{self, Module};
 use tch::{Kind, Tensor};
 
+use super::precision;
 use super::trunk::{Convolutions, Trunk};
 use super::visual::SIDE;
 
@@ -123,8 +124,9 @@ impl Episodic {
         let bias = |mask: &Tensor| (mask.unsqueeze(1).unsqueeze(1) - 1.0) * 1e4;
         let read = self.words.forward(words) + self.places(0, words.size()[1], words);
         let read = self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&told), train));
-        let frames = observation.view([n * self.history, -1, SIDE, SIDE]);
-        let seen = self.frame.forward(&self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
+        let frames = observation.reshape([n * self.history, -1, SIDE, SIDE]);
+        let seen =
+            precision::answer(&self.frame, &self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
         // Frames come after the longest text, so that their places do not depend on what is told.
         let tokens = Tensor::cat(&[&read, &(&seen + self.places(1000, self.history, words))], 1);
         let mask = Tensor::cat(&[&told, &told.new_ones([n, self.history], (Kind::Float, told.device()))], 1);

@@ -1,7 +1,9 @@
 //! FiLM: a sentence scales and shifts the channels of a convolution (Perez et al., 2018).
 
 use tch::Tensor;
-use tch::nn::{self, Init, Module};
+use tch::nn::{self, Init};
+
+use super::precision;
 
 /// Per-channel scale and shift, read off a sentence embedding. It starts as the identity.
 #[derive(Debug)]
@@ -24,8 +26,8 @@ impl Film {
     pub fn forward(&self, features: &Tensor, sentence: &Tensor) -> Tensor {
         let spread = |per_channel: Tensor| per_channel.unsqueeze(-1).unsqueeze(-1);
         // In place, as much as the gradient allows: for maps this small memory costs as much as arithmetic.
-        let mut scaled = features * (spread(self.scale.forward(sentence)) + 1.0);
-        scaled += spread(self.shift.forward(sentence));
+        let mut scaled = features * (spread(precision::linear(&self.scale, sentence)) + 1.0);
+        scaled += spread(precision::linear(&self.shift, sentence));
         scaled
     }
 }

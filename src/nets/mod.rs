@@ -13,6 +13,7 @@ pub mod eyes;
 pub mod film;
 pub mod frozen;
 pub mod policy;
+pub mod precision;
 pub mod resnet18;
 pub mod shrink;
 pub mod sight_heads;

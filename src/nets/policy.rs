@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use tch::Tensor;
-use tch::nn::{self, Module};
+use tch::nn;
 
 use super::episodic::{AttentionSpec, Episodic};
+use super::precision;
 use super::trunk::{Convolutions, Dense, Telling, Trunk};
 use crate::domain::{ActionType, Class};
 
@@ -40,7 +41,7 @@ impl PolicySpec {
     }
 }
 
-/// Logits of both heads.
+/// Logits of both heads, in 32 bits.
 #[derive(Debug)]
 pub struct Logits {
     /// [n, 12]: what to do.
@@ -104,12 +105,12 @@ impl PolicyNet {
         let features = match &self.body {
             Body::Episodic(episodic) => episodic.forward(observation, told, train),
             Body::Trunk { telling, trunk } => {
-                let told = telling.forward(told, train);
+                let told = telling.forward(told, observation.kind(), train);
                 Tensor::cat(&[trunk.forward(observation, Some(&told), train), told], 1)
             }
         };
         let x = self.dense.forward(features, train);
-        Logits { actions: self.actions.forward(&x), objects: self.objects.forward(&x) }
+        Logits { actions: precision::answer(&self.actions, &x), objects: precision::answer(&self.objects, &x) }
     }
 }
 

@@ -1,10 +1,11 @@
 //! What policy and critic have in common: the convolutional trunk over stacked feature maps, modulated by what the agent is
 //! told, and the fully connected layers above it.
 
-use tch::Tensor;
-use tch::nn::{self, Module, ModuleT};
+use tch::nn::{self, ModuleT};
+use tch::{Kind, Tensor};
 
 use super::film::Film;
+use super::precision;
 use super::visual::SIDE;
 
 /// The convolutions of a trunk.
@@ -31,8 +32,16 @@ impl Convolutions<'_> {
 /// Four convolutions, the first 1 x 1, the others 3 x 3, each with batch norm, FiLM and ReLU.
 #[derive(Debug)]
 pub struct Trunk {
-    convs: Vec<(nn::Conv2D, nn::BatchNorm, Option<Film>)>,
+    stages: Vec<Stage>,
     width: i64,
+}
+
+#[derive(Debug)]
+struct Stage {
+    conv: nn::Conv2D,
+    stride: i64,
+    norm: nn::BatchNorm,
+    film: Option<Film>,
 }
 
 impl Trunk {
@@ -40,19 +49,21 @@ impl Trunk {
     /// there is one.
     pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, told: Option<i64>) -> Trunk {
         let mut from = from;
-        let mut convs = Vec::new();
+        let mut stages = Vec::new();
         for (i, &to) in convolutions.channels.iter().enumerate() {
             let here = path / format!("conv{}", i + 1);
             let (kernel, padding) = if i == 0 { (1, 0) } else { (3, 1) };
-            let config = nn::ConvConfig { padding, stride: convolutions.stride(i), bias: false, ..Default::default() };
-            convs.push((
-                nn::conv2d(&here / "conv", from, to, kernel, config),
-                nn::batch_norm2d(&here / "norm", to, Default::default()),
-                told.map(|width| Film::new(&(&here / "film"), width, to)),
-            ));
+            let stride = convolutions.stride(i);
+            let config = nn::ConvConfig { padding, stride, bias: false, ..Default::default() };
+            stages.push(Stage {
+                conv: nn::conv2d(&here / "conv", from, to, kernel, config),
+                stride,
+                norm: nn::batch_norm2d(&here / "norm", to, Default::default()),
+                film: told.map(|width| Film::new(&(&here / "film"), width, to)),
+            });
             from = to;
         }
-        Trunk { convs, width: from * convolutions.side().pow(2) }
+        Trunk { stages, width: from * convolutions.side().pow(2) }
     }
 
     /// How many numbers come out.
@@ -60,11 +71,11 @@ impl Trunk {
         self.width
     }
 
-    /// `observation` [n, channels, 7, 7] and `told` [n, width] to [n, [`Trunk::width`]].
+    /// `observation` [n, channels, 7, 7] and `told` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
     pub fn forward(&self, observation: &Tensor, told: Option<&Tensor>, train: bool) -> Tensor {
         let mut x = observation.shallow_clone();
-        for (conv, norm, film) in &self.convs {
-            x = norm.forward_t(&x.apply(conv), train);
+        for Stage { conv, stride, norm, film } in &self.stages {
+            x = norm.forward_t(&precision::convolution(conv, &x, *stride), train);
             if let (Some(film), Some(told)) = (film, told) {
                 x = film.forward(&x, told);
             }
@@ -101,7 +112,7 @@ impl Dense {
 
     /// `x` [n, from] to [n, [`Dense::width`]].
     pub fn forward(&self, x: Tensor, train: bool) -> Tensor {
-        self.layers.iter().fold(x, |x, layer| layer.forward(&x).relu_().dropout(self.dropout, train))
+        self.layers.iter().fold(x, |x, layer| precision::linear(layer, &x).relu_().dropout(self.dropout, train))
     }
 }
 
@@ -132,19 +143,21 @@ impl Telling {
         Telling::Goal { trunk, out }
     }
 
-    /// `told`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width].
-    pub fn forward(&self, told: &Tensor, train: bool) -> Tensor {
+    /// `told`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width], as wide as `kind` says.
+    pub fn forward(&self, told: &Tensor, kind: Kind, train: bool) -> Tensor {
         match self {
             // A unit vector's entries are tiny; scaled to unit variance they weigh as much as the other features.
-            Telling::Sentence { width } => told * (*width as f64).sqrt(),
-            Telling::Goal { trunk, out } => out.forward(&trunk.forward(told, None, train)).tanh(),
+            Telling::Sentence { width } => (told * (*width as f64).sqrt()).to_kind(kind),
+            Telling::Goal { trunk, out } => {
+                precision::linear(out, &trunk.forward(&told.to_kind(kind), None, train)).tanh()
+            }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use tch::{Device, Kind};
+    use tch::Device;
 
     use super::*;
 

@@ -1,8 +1,9 @@
 //! V(s, z): the head that says how likely the instruction will be fulfilled from here.
 
 use tch::Tensor;
-use tch::nn::{self, Module};
+use tch::nn;
 
+use super::precision;
 use super::trunk::Dense;
 
 /// Fully connected layers over a trunk's features and what the agent is told, down to one number.
@@ -21,6 +22,6 @@ impl ValueHead {
 
     /// `input` [n, from] to [n].
     pub fn forward(&self, input: &Tensor, train: bool) -> Tensor {
-        self.out.forward(&self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
+        precision::answer(&self.out, &self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
     }
 }

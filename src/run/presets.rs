@@ -11,6 +11,7 @@ use crate::algo::learner::Optimisation;
 use crate::data::selection::Selection;
 use crate::nets::critic::CriticSpec;
 use crate::nets::policy::PolicySpec;
+use crate::nets::precision::Precision;
 use crate::nets::visual::VisualSpec;
 
 /// A training, in full.
@@ -51,6 +52,9 @@ pub struct Preset {
     pub chaining: Option<Chaining>,
     /// The training of policy and critic.
     pub training: Optimisation,
+    /// How wide the numbers are that policy and critic compute with while they learn.
+    #[serde(default)]
+    pub precision: Precision,
     /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.
     #[serde(default)]
     pub balance: f32,

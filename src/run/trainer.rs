@@ -18,6 +18,7 @@ use crate::algo::bc;
 use crate::algo::critic::CriticLearner;
 use crate::algo::update::Update;
 use crate::data::items::Span;
+use crate::nets::precision::Precision;
 use crate::nets::weights;
 
 /// Held-out items on which the policy is measured while it trains.
@@ -119,7 +120,7 @@ impl Trainer<'_> {
     /// # Errors
     /// When the preset has a critic without IQL, or IQL without a critic.
     pub fn update(&self) -> anyhow::Result<Update<'_>> {
-        let Preset { training, chaining, seed, .. } = self.preset;
+        let Preset { training, chaining, seed, precision, .. } = self.preset;
         let critic = match (&self.networks.critic, &self.preset.iql) {
             (Some(critics), Some(iql)) => Some(CriticLearner::new(
                 (&critics.online, &critics.online_store),
@@ -132,7 +133,7 @@ impl Trainer<'_> {
             _ => anyhow::bail!("the preset has one of critic and iql: it needs both, or none"),
         };
         let policy = (&self.networks.policy, &self.networks.policy_store);
-        Ok(Update::new(policy, critic, chaining.clone(), training.clone(), *seed))
+        Ok(Update::new(policy, critic, chaining.clone(), training.clone(), *seed).with(*precision))
     }
 
     fn save(&self, update: &Update<'_>) -> anyhow::Result<()> {
@@ -154,7 +155,7 @@ impl Trainer<'_> {
     fn measure(&self, measured: &[Transitions], scalars: &mut Scalars) {
         let mut sums = [0.0; 6];
         for items in measured {
-            let observation = seen(&items.observation);
+            let observation = seen(&items.observation, Precision::Full);
             let (logits, surprise) = tch::no_grad(|| {
                 let logits = self.networks.policy.forward(&observation, &items.told, false);
                 let surprise = bc::surprise(&logits, &items.actions, &items.objects);
@@ -374,10 +375,32 @@ mod tests {
     }
 
     #[test]
+    fn mixed_precision_learns_nearly_the_same_and_keeps_32_bits() {
+        let _chance = crate::nets::testing::chance();
+        for name in ["sprint", "am", "et"] {
+            // What is dropped by chance differs with the width of what it is dropped from.
+            let mut preset = preset(name, 1);
+            preset.policy.dropout = 0.0;
+            preset.critic = preset.critic.map(|critic| CriticSpec { dropout: 0.0, ..critic });
+            let of = |precision| trained(&Preset { precision, ..preset.clone() }, u64::MAX);
+            let ((_, full), (state, mixed)) = (of(Precision::Full), of(Precision::Mixed));
+            assert!(
+                state.values().all(|tensor| tensor.kind() == Kind::Float || tensor.kind() == Kind::Int64),
+                "{name}"
+            );
+            assert!(full.values["action_loss"] != mixed.values["action_loss"], "{name}");
+            for loss in ["action_loss", "object_loss", "held_out_action_loss", "q_loss"] {
+                let Some((full, mixed)) = full.values.get(loss).zip(mixed.values.get(loss)) else { continue };
+                assert!((full - mixed).abs() < 0.03 * full.abs().max(0.1), "{name}: {loss} is {full} and {mixed}");
+            }
+        }
+    }
+
+    #[test]
     fn a_training_that_was_stopped_and_resumed_equals_the_uninterrupted_one_to_the_bit() {
         let _chance = crate::nets::testing::chance();
-        for name in ["l-bc", "sprint", "am"] {
-            let preset = preset(name, 8);
+        for (name, precision) in [("l-bc", Precision::Mixed), ("sprint", Precision::Full), ("am", Precision::Full)] {
+            let preset = Preset { precision, ..preset(name, 8) };
             let (whole, resumed) = (trained(&preset, u64::MAX).0, trained(&preset, 3).0);
             assert_eq!(whole.len(), resumed.len());
             assert_eq!(whole.keys().any(|key| key.starts_with("critic.square.")), name != "l-bc");
