@@ -104,6 +104,7 @@ mod tests {
 
     #[test]
     fn each_policy_counts_as_often_as_it_is_named_and_the_eyes_are_kept() {
+        let _chance = crate::nets::testing::chance();
         let one = checkpoint(1.0, 0.5, |config| config.provenance.dataset = "a-b".into());
         let four = checkpoint(4.0, 0.5, |config| config.provenance.dataset = "b-c".into());
         let (config, networks) = of(&[&one, &four, &four]).unwrap();
@@ -114,6 +115,7 @@ mod tests {
 
     #[test]
     fn what_does_not_go_with_the_first_is_refused() {
+        let _chance = crate::nets::testing::chance();
         let one = checkpoint(1.0, 0.5, |_| ());
         let error = |other: tempfile::TempDir| format!("{:#}", of(&[&one, &other]).unwrap_err());
         assert!(error(checkpoint(1.0, 0.6, |_| ())).contains("other eyes"));

@@ -140,6 +140,7 @@ mod tests {
 
     #[test]
     fn a_saved_checkpoint_loads_with_equal_weights() {
+        let _chance = crate::nets::testing::chance();
         let (folder, config) = saved();
         let first = Networks::load(folder.path(), &Config::read(folder.path()).unwrap(), Device::Cpu).unwrap();
         let again = tempfile::tempdir().unwrap();
@@ -150,6 +151,7 @@ mod tests {
 
     #[test]
     fn a_critic_and_its_target_are_saved_with_the_policy() {
+        let _chance = crate::nets::testing::chance();
         let (mut config, folder) = (small(), tempfile::tempdir().unwrap());
         config.method = Some("iql".into());
         config.critic = Some(CriticSpec {
@@ -173,6 +175,7 @@ mod tests {
 
     #[test]
     fn the_shipped_agents_load() {
+        let _chance = crate::nets::testing::chance();
         for (name, judges) in [("alfred", true), ("first", false), ("sprint", true)] {
             let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
             let config = Config::read(&folder).unwrap();
@@ -182,6 +185,7 @@ mod tests {
 
     #[test]
     fn missing_extra_and_misshapen_tensors_are_all_named() {
+        let _chance = crate::nets::testing::chance();
         let (folder, config) = saved();
         let path = folder.path().join("model.safetensors");
         let mut tensors = weights::read(&path).unwrap();

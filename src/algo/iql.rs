@@ -149,6 +149,7 @@ mod tests {
     /// All is learned by tables, with every equation of this file, from zero.
     #[test]
     fn a_chain_of_two_states_is_learned_to_a_hundredth() {
+        let _chance = crate::nets::testing::chance();
         const DISCOUNT: f64 = 0.9;
         const EXPECTILE: f64 = 0.9;
         const TEMPERATURE: f64 = 3.0;

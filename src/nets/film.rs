@@ -40,6 +40,7 @@ mod tests {
 
     #[test]
     fn film_starts_as_the_identity_and_then_follows_the_sentence() {
+        let _chance = crate::nets::testing::chance();
         let store = nn::VarStore::new(Device::Cpu);
         let mut film = Film::new(&store.root(), 3, 2);
         let features = Tensor::rand([1, 2, 4, 4], (Kind::Float, Device::Cpu));

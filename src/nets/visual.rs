@@ -6,6 +6,7 @@ use tch::nn::{self, ModuleT};
 use tch::{Device, Kind, Tensor};
 
 use super::frozen::{Folded, FrameEncoder, Norm, stacked};
+use super::precision::{self, Precision};
 use super::shrink::shrink;
 use super::weights;
 use crate::house::view::Frame;
@@ -55,6 +56,7 @@ impl VisualSpec {
 #[derive(Debug)]
 struct Layer {
     conv: nn::Conv2D,
+    stride: i64,
     norm: nn::BatchNorm,
 }
 
@@ -63,16 +65,17 @@ impl Layer {
         let config = nn::ConvConfig { stride, padding: 1, bias: false, ..Default::default() };
         Layer {
             conv: nn::conv2d(path / "conv", from, to, 3, config),
+            stride,
             norm: nn::batch_norm2d(path / "norm", to, Default::default()),
         }
     }
 
     fn forward(&self, x: &Tensor, train: bool) -> Tensor {
-        self.norm.forward_t(&x.apply(&self.conv), train)
+        self.norm.forward_t(&precision::convolution(&self.conv, x, self.stride), train)
     }
 
-    fn folded(&self, stride: i64) -> Folded {
-        Folded::new(&self.conv.ws, Norm::of(&self.norm).as_ref(), stride)
+    fn folded(&self) -> Folded {
+        Folded::new(&self.conv.ws, Norm::of(&self.norm).as_ref(), self.stride)
     }
 }
 
@@ -133,9 +136,14 @@ impl VisualEncoder {
 
     /// `pixels` [n, 3, input, input] in 0..255, any kind, to [n, features, 7, 7].
     pub fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
-        let x = (pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0;
+        self.forward_with(Precision::Full, pixels, train)
+    }
+
+    /// The same, computed with `precision`; the maps have 32 bits.
+    pub fn forward_with(&self, precision: Precision, pixels: &Tensor, train: bool) -> Tensor {
+        let x = precision.shown(&((pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0));
         let stem = self.stem.forward(&x, train).relu();
-        self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train))
+        self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train)).to_kind(Kind::Float)
     }
 
     /// The encoder as it is now, for computing alone.
@@ -143,10 +151,10 @@ impl VisualEncoder {
     /// # Errors
     /// When the weights cannot be read.
     pub fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
-        let stage = |stage: &Stage| [stage.down.folded(2), stage.first.folded(1), stage.second.folded(1)];
+        let stage = |stage: &Stage| [stage.down.folded(), stage.first.folded(), stage.second.folded()];
         Ok(FrozenVisual {
             spec: self.spec.clone(),
-            stem: self.stem.folded(2),
+            stem: self.stem.folded(),
             stages: self.stages.iter().map(stage).collect(),
             device: self.device,
             digest: weights::digest(store.variables())?,

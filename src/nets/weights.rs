@@ -367,6 +367,7 @@ mod tests {
 
     #[test]
     fn a_file_that_does_not_fit_leaves_the_model_as_it_was() {
+        let _chance = crate::nets::testing::chance();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("w.safetensors");
         let mut model = nn::VarStore::new(Device::Cpu);

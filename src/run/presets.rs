@@ -52,7 +52,7 @@ pub struct Preset {
     pub chaining: Option<Chaining>,
     /// The training of policy and critic.
     pub training: Optimisation,
-    /// How wide the numbers are that policy and critic compute with while they learn.
+    /// How wide the numbers are that networks compute with while they learn.
     #[serde(default)]
     pub precision: Precision,
     /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.

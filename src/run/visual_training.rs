@@ -52,7 +52,7 @@ pub fn train(
         let (images, known) =
             batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
         learner.begin_step();
-        let loss = heads.loss(&encoder.forward(&images, true), &known, training.positive_weight);
+        let loss = heads.loss(&encoder.forward_with(preset.precision, &images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
         let mut scalars = Scalars::new("visual", learner.step(), training.optimisation.steps);
         if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
@@ -193,6 +193,7 @@ pub mod testing {
 mod tests {
     use super::testing::{Notes, footage};
     use super::*;
+    use crate::nets::precision::Precision;
     use tch::Device;
 
     #[test]
@@ -202,18 +203,24 @@ mod tests {
         assert_eq!(footage.frames(), 10);
         let mut preset = Preset::named("l-bc").unwrap();
         preset.visual.channels = vec![4, 4, 8, 16];
-        preset.visual_training.optimisation.steps = 90;
         preset.visual_training.optimisation.batch = 8;
         preset.visual_training.optimisation.schedule.warmup_steps = 2;
         (preset.report_every, preset.save_every) = (1, 100);
-        tch::manual_seed(2);
-        let store = nn::VarStore::new(Device::Cpu);
-        let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
-        let folder = tempfile::tempdir().unwrap();
-        let (state, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
-        let mut notes = Notes(Vec::new());
-        assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
-        let loss = |i: usize| notes.0[i].values["marks"];
-        assert!(loss(89) < 0.5 * loss(0), "{} then {}", loss(0), loss(89));
+        let mut losses = |precision, steps| -> Vec<f64> {
+            preset.precision = precision;
+            preset.visual_training.optimisation.steps = steps;
+            tch::manual_seed(2);
+            let store = nn::VarStore::new(Device::Cpu);
+            let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
+            let folder = tempfile::tempdir().unwrap();
+            let (state, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+            let mut notes = Notes(Vec::new());
+            assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
+            notes.0.iter().map(|scalars| scalars.values["marks"]).collect()
+        };
+        let (full, mixed) = (losses(Precision::Full, 90), losses(Precision::Mixed, 2));
+        assert!(full[89] < 0.5 * full[0], "{} then {}", full[0], full[89]);
+        assert!(mixed[0] != full[0] && (mixed[0] - full[0]).abs() < 0.01 * full[0], "{} and {}", mixed[0], full[0]);
+        assert!(mixed[1].is_finite());
     }
 }

@@ -1,5 +1,6 @@
 //! How long an update takes with each preset in its own size once its critic is warm, and how long its batch takes to
-//! gather. Maps and texts are random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`.
+//! gather. Maps and texts are random: they cost what real ones cost. `cargo bench --bench training -- [PRESET ...]`, where a
+//! preset may be a file.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,14 +29,15 @@ const WARM: u64 = 3;
 const STEPS: u64 = 30;
 
 fn main() -> anyhow::Result<()> {
-    let asked: Vec<String> = std::env::args().skip(1).filter(|name| !name.starts_with("--")).collect();
+    let mut asked: Vec<String> = std::env::args().skip(1).filter(|name| !name.starts_with("--")).collect();
+    if asked.is_empty() {
+        asked = Preset::names().into_iter().map(String::from).collect();
+    }
     let device = best_device();
     println!("{device:?}, {} threads; milliseconds, medians of {STEPS} and the least", tch::get_num_threads());
     println!("{:<18} {:>6} {:>7} {:>8} {:>8} {:>9}", "preset", "batch", "pairs", "update", "least", "gathering");
-    for name in Preset::names() {
-        if asked.is_empty() || asked.iter().any(|wanted| wanted == name) {
-            measure(&warm(Preset::named(name)?), device)?;
-        }
+    for name in asked {
+        measure(&warm(Preset::named(&name)?), device)?;
     }
     Ok(())
 }

@@ -327,6 +327,7 @@ mod tests {
 
     #[test]
     fn a_learner_acts_greedily_in_some_episodes_and_draws_in_others() {
+        let _chance = crate::nets::testing::chance();
         let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
             eprintln!("skipped: needs the sentence encoder (`make setup`)");
             return;
