@@ -39,7 +39,7 @@ impl<'a> Update<'a> {
     }
 
     /// The same, but its networks compute with `precision`.
-    pub fn with(self, precision: Precision) -> Update<'a> {
+    pub fn with_precision(self, precision: Precision) -> Update<'a> {
         Update { precision, ..self }
     }
 
