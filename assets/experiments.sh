@@ -30,17 +30,18 @@ pretrain() {
         --steps "$4" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}" "${@:6}"
 }
 
-# A method's policy begins as a clone of what it learns from, where it is of the clones' kind.
+# A method's policy begins as a clone of what it learns from; the episodic transformer is one as it is.
 train() {
-    local method=$1 seed=$2 clone base=l-bc otherwise=''
+    local method=$1 seed=$2 clone base=l-bc-agg otherwise=''
     case $method in
-    et | am)
-        pretrain "$seed" "$method" "$method" $((${CLONING:-15000} + ${STEPS:-3000})) ''
+    et)
+        pretrain "$seed" et et $((${CLONING:-15000} + ${STEPS:-3000})) ''
         return
         ;;
-    l-bc | iql-primitive | sprint-no-agg) clone=clone ;;
-    sprint-concat-agg) clone=clone-concat base=l-bc-agg otherwise=$'[data]\ncomposites = "concat"' ;;
-    *) clone=clone-agg base=l-bc-agg ;;
+    am) clone=clone-goals base=am otherwise=$'critic = false\niql = false\nchaining = false' ;;
+    l-bc | iql-primitive | sprint-no-agg) clone=clone base=l-bc ;;
+    sprint-concat-agg) clone=clone-concat otherwise=$'[data]\ncomposites = "concat"' ;;
+    *) clone=clone-agg ;;
     esac
     pretrain "$seed" $clone $base "${CLONING:-15000}" "$otherwise"
     pretrain "$seed" "$method" "$method" "${STEPS:-3000}" $'[training.schedule]\nlearning_rate = 3e-4' \

@@ -66,16 +66,19 @@ impl Layer {
         }
     }
 
-    /// `tokens` [n, tokens, width]; `bias` [n, 1, 1, tokens] keeps attention away from padding.
-    fn forward(&self, tokens: &Tensor, bias: &Tensor, train: bool) -> Tensor {
+    /// `tokens` [n, tokens, width], 32 bits as what comes out; `bias` [n, 1, 1, tokens] keeps attention away from padding.
+    /// Between the sums and norms it computes with numbers of `kind`.
+    fn forward(&self, tokens: &Tensor, bias: &Tensor, kind: Kind, train: bool) -> Tensor {
         let (n, count) = (tokens.size()[0], tokens.size()[1]);
-        let split = self.query_key_value.forward(tokens).view([n, count, 3, self.heads, -1]).permute([2, 0, 3, 1, 4]);
+        let split = precision::linear(&self.query_key_value, &tokens.to_kind(kind));
+        let split = split.view([n, count, 3, self.heads, -1]).permute([2, 0, 3, 1, 4]);
         let (query, key, value) = (split.get(0), split.get(1), split.get(2));
         let scores = query.matmul(&key.transpose(-1, -2)) / (key.size()[3] as f64).sqrt() + bias;
-        let read = scores.softmax(-1, Kind::Float).matmul(&value).transpose(1, 2).reshape([n, count, -1]);
-        let read = self.attended.forward(&read).dropout(self.dropout, train);
+        let read = scores.softmax(-1, Kind::Float).to_kind(kind).matmul(&value).transpose(1, 2).reshape([n, count, -1]);
+        let read = precision::linear(&self.attended, &read).dropout(self.dropout, train);
         let tokens = self.attended_norm.forward(&(tokens + read));
-        let changed = self.outer.forward(&self.inner.forward(&tokens).relu()).dropout(self.dropout, train);
+        let changed = precision::linear(&self.inner, &tokens.to_kind(kind)).relu();
+        let changed = precision::linear(&self.outer, &changed).dropout(self.dropout, train);
         self.norm.forward(&(tokens + changed))
     }
 }
@@ -119,11 +122,11 @@ impl Episodic {
 
     /// `observation` [n, history * features, 7, 7] and `words` [n, words], 0 for padding, to [n, width].
     pub fn forward(&self, observation: &Tensor, words: &Tensor, train: bool) -> Tensor {
-        let n = words.size()[0];
+        let (n, kind) = (words.size()[0], observation.kind());
         let told = words.gt(0).to_kind(Kind::Float);
         let bias = |mask: &Tensor| (mask.unsqueeze(1).unsqueeze(1) - 1.0) * 1e4;
         let read = self.words.forward(words) + self.places(0, words.size()[1], words);
-        let read = self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&told), train));
+        let read = self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&told), kind, train));
         let frames = observation.reshape([n * self.history, -1, SIDE, SIDE]);
         let seen =
             precision::answer(&self.frame, &self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
@@ -131,7 +134,7 @@ impl Episodic {
         let tokens = Tensor::cat(&[&read, &(&seen + self.places(1000, self.history, words))], 1);
         let mask = Tensor::cat(&[&told, &told.new_ones([n, self.history], (Kind::Float, told.device()))], 1);
         let tokens = self.norm.forward(&tokens);
-        let tokens = self.fusion.iter().fold(tokens, |tokens, layer| layer.forward(&tokens, &bias(&mask), train));
+        let tokens = self.fusion.iter().fold(tokens, |tokens, layer| layer.forward(&tokens, &bias(&mask), kind, train));
         tokens.select(1, -1) + seen.select(1, -1)
     }
 
