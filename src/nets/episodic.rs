@@ -147,3 +147,23 @@ impl Episodic {
         Tensor::cat(&[angles.sin(), angles.cos()], 1) / (self.width as f64).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tch::Device;
+
+    use super::*;
+
+    #[test]
+    fn attention_computes_as_wide_as_it_is_told_and_its_tokens_keep_32_bits() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(4);
+        let store = nn::VarStore::new(Device::Cpu);
+        let layer = Layer::new(&store.root(), 8, &AttentionSpec { words: 9, layers: 1, heads: 2, inner: 16 }, 0.0);
+        let (tokens, bias) = (Tensor::randn([3, 5, 8], (Kind::Float, Device::Cpu)), Tensor::from(0.0f32));
+        let [full, mixed] = [Kind::Float, Kind::BFloat16].map(|kind| layer.forward(&tokens, &bias, kind, false));
+        assert_eq!([full.kind(), mixed.kind()], [Kind::Float, Kind::Float]);
+        let apart = (&full - &mixed).abs().max().double_value(&[]);
+        assert!(0.0 < apart && apart < 0.1, "{apart}");
+    }
+}
