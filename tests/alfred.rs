@@ -80,8 +80,8 @@ fn the_train_split_has_as_many_spans_as_are_known_of_it() {
     let of_one = |one: &Trajectory| std::iter::repeat_n(label, one.actions.len()).chain([None]).collect::<Vec<_>>();
     let labels: Vec<Option<Label>> = trajectories.iter().flat_map(of_one).collect();
     let items = |held_out: &[String]| {
-        let source = Source { trajectories: &trajectories, held_out, summaries: &summaries };
-        Items::of(&source, labels.clone(), &Selection::of(Composites::Concat), 0).unwrap()
+        let source = Source { trajectories: &trajectories, apart: &[], held_out, summaries: &summaries };
+        Items::of(&source, labels.clone(), &Selection::of(Composites::Concat)).unwrap()
     };
     let (all, without) = (items(&[]), items(&held_out));
     let count = |items: &Items, primitive| items.training.iter().filter(|s| s.is_primitive() == primitive).count();

@@ -208,11 +208,3 @@ pub fn encoders() -> Option<std::path::PathBuf> {
     let found = std::env::var_os("SPRINT_HOME").map(Into::into).or_else(|| Some(cache.or(home)?.join("sprint")))?;
     found.join("encoders").is_dir().then_some(found)
 }
-
-fn wait_for(happened: impl Fn() -> bool) {
-    let began = Instant::now();
-    while !happened() {
-        assert!(began.elapsed() < Duration::from_secs(60), "it did not happen within a minute");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}

@@ -1,6 +1,7 @@
 //! The program as tests start it.
 
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -80,5 +81,14 @@ impl Sprint {
         assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
         assert!(!self.path("refused").exists(), "nothing is half-written");
         ended.stderr
+    }
+}
+
+/// Waits until it happened, a minute at the most.
+pub fn wait_for(happened: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !happened() {
+        assert!(began.elapsed() < Duration::from_secs(60), "it did not happen within a minute");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -8,7 +8,7 @@ use sprint_explorer::nets::sentence::default_folder;
 use sprint_explorer::nets::weights::{self, Tensors};
 use tch::{Device, Tensor};
 
-use crate::program::Sprint;
+use crate::program::{Sprint, wait_for};
 
 /// SPRINT in miniature: every part of it, in seconds.
 const TINY: &str = r#"
@@ -188,8 +188,10 @@ fn a_training_begins_with_the_networks_it_was_given() {
 fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
     let Some(sprint) = demonstrations() else { return };
     let tiny = TINY.replace("\"sprint\"", "\"am\"").replace("pairs = { pool = 4 }\n", "").replace("swaps = 0\n", "");
-    std::fs::write(sprint.path("am.toml"), tiny.replace("[critic]", "goal = [4, 4, 4, 4]\n\n[critic]")).unwrap();
+    let goal = tiny.replace("[critic]", "goal = [4, 4, 4, 4]\n\n[critic]");
+    std::fs::write(sprint.path("am.toml"), format!("precision = \"mixed\"\n{goal}")).unwrap();
     done(&sprint, "pretrain D --preset am.toml --out agent");
+    assert!(sprint.read("agent/README.md").contains("6 steps of the policy in mixed precision, seed"));
     done(&sprint, "average agent agent --out mean --appraise 1");
     for folder in ["agent", "mean"] {
         assert!(!sprint.read(&format!("{folder}/README.md")).contains("two objects in view"));
@@ -217,6 +219,42 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     assert!(judging.stderr.contains("has no critic") && !sprint.path("other").exists(), "{}", judging.stderr);
     let trying = sprint.run("pretrain D --preset tiny.toml --out other --trials nowhere.json");
     assert!(trying.stderr.contains("nowhere.json") && !sprint.path("other").exists(), "{}", trying.stderr);
+}
+
+#[test]
+fn a_training_that_is_stopped_and_killed_on_the_way_ends_with_the_same_bytes() {
+    let Some(sprint) = demonstrations() else { return };
+    let longer = TINY.replace("steps = 2\n", "steps = 60\n").replace("steps = 6\n", "steps = 120\n");
+    std::fs::write(sprint.path("longer.toml"), longer).unwrap();
+    done(&sprint, "pretrain D --preset longer.toml --out whole");
+    let begin = |line: &str| {
+        let (out, err) = (std::process::Stdio::null(), std::process::Stdio::null());
+        sprint.command(line).stdout(out).stderr(err).spawn().unwrap()
+    };
+    let reported = |stage: &str| {
+        let progress = std::fs::read_to_string(sprint.path("parts/training/progress.jsonl")).unwrap_or_default();
+        progress.lines().filter(|line| line.contains(&format!("\"{stage}\""))).count()
+    };
+    let mut stopped = begin("pretrain D --preset longer.toml --out parts");
+    wait_for(|| reported("visual") > 5);
+    assert!(std::process::Command::new("kill").args(["-TERM", &stopped.id().to_string()]).status().unwrap().success());
+    assert_eq!(stopped.wait().unwrap().code(), Some(130));
+    assert!(reported("visual") < 60 && reported("policy") == 0, "it was stopped while it learned to see");
+    let mut killed = begin("pretrain D --preset longer.toml --out parts --resume");
+    wait_for(|| reported("policy") > 5);
+    killed.kill().unwrap();
+    assert_eq!(killed.wait().unwrap().code(), None);
+    let before = sprint.read("D/labels.jsonl");
+    std::fs::write(sprint.path("D/labels.jsonl"), before.replacen("\"text\":\"", "\"text\":\"Please ", 1)).unwrap();
+    let retold = sprint.run("pretrain D --preset longer.toml --out parts --resume");
+    assert!(retold.stderr.contains("state.safetensors: items is"), "{}", retold.stderr);
+    std::fs::write(sprint.path("D/labels.jsonl"), before).unwrap();
+    done(&sprint, "pretrain D --preset longer.toml --out parts --resume");
+    for file in ["model.safetensors", "config.json", "README.md"] {
+        let [whole, parts] = ["whole", "parts"].map(|folder| std::fs::read(sprint.path(folder).join(file)).unwrap());
+        let named = |bytes: Vec<u8>, folder| String::from_utf8_lossy(&bytes).replace(folder, "agent");
+        assert_eq!(named(whole, "whole") == named(parts, "parts"), true, "{file} is another");
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tch::Device;
@@ -10,9 +10,11 @@ use tch::Device;
 use super::balance::Balance;
 use super::values::{Values, Weighing};
 use crate::domain::{ActionType, Class};
+use crate::language::vocabulary::Vocabulary;
 use crate::nets::critic::CriticSpec;
 use crate::nets::eyes::Eyes;
 use crate::nets::policy::PolicySpec;
+use crate::nets::precision::Precision;
 use crate::nets::resnet18;
 use crate::nets::sentence::SentenceEncoder;
 use crate::nets::visual::VisualSpec;
@@ -65,6 +67,9 @@ pub struct Provenance {
     pub visual_steps: u64,
     /// Steps of the policy's training.
     pub policy_steps: u64,
+    /// How wide the numbers were that the networks computed with while they learned.
+    #[serde(default)]
+    pub precision: Precision,
     /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u64>,
@@ -145,7 +150,7 @@ impl Config {
             config.ontology.actions,
             own.actions
         );
-        config.check(&path)?;
+        config.check().with_context(|| path.display().to_string())?;
         Ok(config)
     }
 
@@ -235,69 +240,37 @@ impl Config {
         self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
     }
 
-    /// Sizes that no network can have are refused before anything is allocated for them.
-    fn check(&self, path: &Path) -> anyhow::Result<()> {
-        let sizes = [
-            ("policy.history", std::slice::from_ref(&self.policy.history), 64),
-            ("policy.embedding", std::slice::from_ref(&self.policy.embedding), 8192),
-            ("policy.channels", &self.policy.channels[..], 4096),
-            ("policy.hidden", &self.policy.hidden[..], 16384),
-        ];
-        let critic = self.critic.iter().flat_map(|critic| {
-            [
-                ("critic.channels", &critic.channels[..], 4096),
-                ("critic.hidden", &critic.hidden[..], 16384),
-                ("critic.action_embedding", std::slice::from_ref(&critic.action_embedding), 8192),
-                ("critic.object_embedding", std::slice::from_ref(&critic.object_embedding), 8192),
-            ]
-        });
-        let visual = self.visual.iter().flat_map(|visual| {
-            [
-                ("visual.input", std::slice::from_ref(&visual.input), 1024),
-                ("visual.channels", &visual.channels[..], 4096),
-            ]
-        });
-        let goal = self.policy.goal.iter().map(|goal| ("policy.goal", &goal[..], 4096));
-        let attention = self.policy.attention.iter().flat_map(|attention| {
-            [
-                ("policy.attention.words", std::slice::from_ref(&attention.words), 1 << 20),
-                ("policy.attention.layers", std::slice::from_ref(&attention.layers), 64),
-                ("policy.attention.heads", std::slice::from_ref(&attention.heads), 64),
-                ("policy.attention.inner", std::slice::from_ref(&attention.inner), 16384),
-            ]
-        });
-        for (field, values, most) in sizes.into_iter().chain(visual).chain(critic).chain(goal).chain(attention) {
-            for &value in values {
-                anyhow::ensure!(
-                    (1..=most).contains(&value),
-                    "{}: {field} is {value}, which is not between 1 and {most}",
-                    path.display()
-                );
-            }
+    /// What no network or agent can have is refused before anything is allocated for it.
+    fn check(&self) -> anyhow::Result<()> {
+        self.policy.check()?;
+        if let Some(critic) = &self.critic {
+            critic.check()?;
         }
-        anyhow::ensure!(
-            self.visual.is_some() != self.resnet18.is_some(),
-            "{}: an agent sees through either visual or resnet18, not both or none",
-            path.display()
-        );
         if let Some(visual) = &self.visual {
-            visual.check().with_context(|| path.display().to_string())?;
+            visual.check()?;
         }
-        if let Some(attention) = &self.policy.attention {
-            attention.check(self.policy.embedding).with_context(|| format!("{}: policy", path.display()))?;
-        }
+        ensure!(
+            self.visual.is_some() != self.resnet18.is_some(),
+            "an agent sees through either visual or resnet18, not both or none"
+        );
+        self.check_words()?;
         if let Some(balance) = &self.balance {
-            balance.check().map_err(|wrong| anyhow::anyhow!("{}: {wrong}", path.display()))?;
+            balance.check().map_err(anyhow::Error::msg)?;
         }
-        self.check_weighing().with_context(|| path.display().to_string())?;
-        let critic = self.critic.as_ref().map(|critic| ("critic.dropout", critic.dropout));
-        for (field, share) in std::iter::once(("policy.dropout", self.policy.dropout)).chain(critic) {
-            anyhow::ensure!(
-                (0.0..1.0).contains(&share),
-                "{}: {field} is {share}, which is not a share",
-                path.display()
-            );
-        }
+        self.check_weighing()
+    }
+
+    /// An agent that attends to words has a number for each that it knows, and neither a critic nor a goal to be shown.
+    fn check_words(&self) -> anyhow::Result<()> {
+        let Some(attention) = &self.policy.attention else {
+            ensure!(self.words.is_none(), "words are there, and no policy.attention that reads them");
+            return Ok(());
+        };
+        ensure!(self.critic.is_none(), "policy.attention reads words, which no critic here does");
+        ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
+        let words = self.words.as_ref().context("words is missing, which policy.attention reads")?.len();
+        let most = Vocabulary::most(attention.words);
+        ensure!(words <= most, "words are {words}, and policy.attention.words has numbers for {most}");
         Ok(())
     }
 }
@@ -337,6 +310,7 @@ pub(super) mod tests {
                 seed: 1,
                 visual_steps: 0,
                 policy_steps: 0,
+                precision: Precision::Full,
                 averaged: None,
             },
         }
@@ -361,8 +335,6 @@ pub(super) mod tests {
         let folder = written();
         let error = edit(folder.path(), |value| value["format_version"] = 7.into());
         assert!(error.contains("format_version is 7") && error.contains("reads 1"), "{error}");
-        let error = edit(written().path(), |value| value["ontology"]["classes"] = "abc".into());
-        assert!(error.contains("config.json") || error.contains("ontology"), "{error}");
         let folder = written();
         let error = edit(folder.path(), |value| value["ontology"]["classes"] = "abc".into());
         assert!(error.contains("ontology.classes is abc"), "{error}");
@@ -373,6 +345,19 @@ pub(super) mod tests {
         let error = edit(folder.path(), |value| value["policy"]["hidden"] = vec![1u64 << 40].into());
         assert!(error.contains("policy.hidden"), "{error}");
         let folder = written();
+        let error = edit(folder.path(), |value| value["words"] = vec!["mug"].into());
+        assert!(error.contains("no policy.attention that reads them"), "{error}");
+        let folder = written();
+        let attention = serde_json::json!({"words": 4, "layers": 1, "heads": 2, "inner": 8});
+        let attending = |words: Option<[&str; 3]>| {
+            edit(written().path(), |value| {
+                value["policy"]["attention"] = attention.clone();
+                value["words"] = serde_json::json!(words);
+            })
+        };
+        assert!(attending(None).contains("words is missing"), "{}", attending(None));
+        let many = attending(Some(["mug", "cup", "sink"]));
+        assert!(many.contains("words are 3") && many.contains("numbers for 2"), "{many}");
         let error = edit(folder.path(), |value| value["resnet18"] = "abc".into());
         assert!(error.contains("either visual or resnet18"), "{error}");
     }

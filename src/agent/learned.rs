@@ -13,7 +13,6 @@ use super::policy::{Carried, Decision, Policy, Reading, Situation};
 use super::select::Heads;
 use super::told;
 use super::values::Values;
-use crate::language::instruction::normalise;
 use crate::nets::frozen::FrameEncoder;
 
 /// A policy from a checkpoint.
@@ -113,9 +112,7 @@ impl Policy for LearnedPolicy {
     }
 
     fn reading(&self, instruction: &str) -> Option<Reading> {
-        let embedder = self.sentences.lock().ok()?;
-        let count = embedder.encoder().tokens(&normalise(instruction)).ok()?;
-        Some(Reading { tokens: count.used, cut: count.truncated })
+        told::reading(instruction, &self.config, &self.sentences)
     }
 
     fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
@@ -139,6 +136,7 @@ mod tests {
     use crate::house::testing::{kitchen_house, role, subtask};
     use crate::nets::critic::CriticSpec;
     use crate::nets::embedding_cache::Embedder;
+    use crate::nets::episodic::AttentionSpec;
     use crate::nets::policy::PolicySpec;
     use crate::nets::sentence::{SentenceEncoder, default_folder};
 
@@ -184,6 +182,18 @@ mod tests {
         let wanted: std::collections::BTreeSet<_> = candidates.iter().map(|c| (c.kind, c.class.index())).collect();
         assert_eq!(values.choices.len(), 5 + wanted.len());
         assert!(values.state.is_finite() && values.q(ActionType::MoveAhead, None).is_some());
+    }
+
+    #[test]
+    fn an_agent_says_how_much_of_an_instruction_it_reads() {
+        let _chance = crate::nets::testing::chance();
+        let Some(mut told) = agent(None) else { return };
+        let read = told.reading("take the mug").unwrap();
+        assert!(read.tokens > 3 && read.cut == 0, "{read:?}");
+        assert_eq!(agent(Some([4; 4])).unwrap().reading("take the mug"), None, "it is shown its goal");
+        told.config.policy.attention = Some(AttentionSpec { words: 9, layers: 1, heads: 1, inner: 4 });
+        assert_eq!(told.reading("take the mug"), Some(Reading { tokens: 3, cut: 0 }));
+        assert_eq!(told.reading(&"mug ".repeat(130)), Some(Reading { tokens: 128, cut: 2 }));
     }
 
     #[test]

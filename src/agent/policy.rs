@@ -78,7 +78,7 @@ impl Mind {
     }
 }
 
-/// What the sentence encoder makes of an instruction.
+/// How much of an instruction an agent reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// Tokens that are read.

@@ -7,14 +7,15 @@ use tch::{Device, Kind, Tensor};
 use super::config::Config;
 use super::goal;
 use super::memory::SharedEmbedder;
-use super::policy::Situation;
+use super::policy::{Reading, Situation};
 use crate::house::House;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::visual::SIDE;
 
-/// Words that an agent which reads words takes in; shorter instructions are padded, so that every pass has one shape.
+/// Words that an agent which reads words takes in: shorter instructions are padded and longer ones cut, so that every pass has
+/// one shape.
 const WORDS: usize = 128;
 
 /// The instruction's embedding [1, embedding] or its words [1, 128], or the maps of its goal's last frames, like an observation.
@@ -33,13 +34,33 @@ pub fn told(
     }
     let instruction = normalise(situation.instruction);
     if config.policy.attention.is_some() {
-        let words = Vocabulary::new(config.words.clone().unwrap_or_default());
-        let mut numbers = words.numbers(&instruction);
+        let mut numbers = words(config, &instruction);
         numbers.resize(WORDS, Vocabulary::PADDING);
         return Ok(Tensor::from_slice(&numbers).unsqueeze(0).to_device(device));
     }
     let mut embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
     Ok(embedder.embed(&[&instruction])?.to_device(device).to_kind(Kind::Float))
+}
+
+/// How much of an instruction the agent reads; nothing where it is shown its goal, or the sentence encoder fails.
+pub fn reading(instruction: &str, config: &Config, sentences: &SharedEmbedder) -> Option<Reading> {
+    let instruction = normalise(instruction);
+    match (&config.policy.goal, &config.policy.attention) {
+        (Some(_), _) => None,
+        (None, Some(_)) => {
+            let words = words(config, &instruction).len();
+            Some(Reading { tokens: words.min(WORDS), cut: words.saturating_sub(WORDS) })
+        }
+        (None, None) => {
+            let count = sentences.lock().ok()?.encoder().tokens(&instruction).ok()?;
+            Some(Reading { tokens: count.used, cut: count.truncated })
+        }
+    }
+}
+
+/// The numbers of an instruction's words.
+fn words(config: &Config, instruction: &str) -> Vec<i64> {
+    Vocabulary::new(config.words.clone().unwrap_or_default()).numbers(instruction)
 }
 
 /// Of the same shape, for nobody.

@@ -47,7 +47,7 @@ pub enum Extracted {
 pub enum Normalised {
     /// Those of the whole batch: what an agent sees later is normalised by a mixture that it never meets.
     Together,
-    /// The running ones of demonstrated items, which alone keep them up.
+    /// The running ones of demonstrated items, which alone keep them up. Of chained items no unit is dropped then.
     ByDemonstrations,
 }
 

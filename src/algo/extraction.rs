@@ -11,7 +11,7 @@ use crate::nets::policy::Logits;
 /// Parts that go through the policy together.
 pub(super) struct Pass<'a> {
     parts: Vec<&'a Part>,
-    /// Whether they are normalised by their own statistics, and these kept up.
+    /// Whether they are normalised by their own statistics, these are kept up, and units are dropped.
     pub train: bool,
 }
 

@@ -28,6 +28,24 @@ pub struct Iql {
     pub weighing: f64,
 }
 
+impl Iql {
+    /// Whether the equations hold with these numbers.
+    ///
+    /// # Errors
+    /// Names the field of `iql` that is out of its bounds.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let Iql { discount, expectile, temperature, weight_cap, target_rate, warmup_share, weighing } = *self;
+        for (field, share) in [("discount", discount), ("target_rate", target_rate), ("warmup_share", warmup_share)] {
+            anyhow::ensure!((0.0..=1.0).contains(&share), "iql.{field} is {share}, which is not a share");
+        }
+        anyhow::ensure!(0.0 < expectile && expectile < 1.0, "iql.expectile is {expectile}, not between 0 and 1");
+        for (field, weight) in [("temperature", temperature), ("weight_cap", weight_cap), ("weighing", weighing)] {
+            anyhow::ensure!(weight.is_finite() && weight >= 0.0, "iql.{field} is {weight}, which is no weight");
+        }
+        Ok(())
+    }
+}
+
 /// (V − Q̄)² times τ where V is below Q̄, else times 1 − τ. No gradient reaches `q`.
 pub fn value_loss(value: &Tensor, q: &Tensor, expectile: f64) -> Tensor {
     let above = value - q.detach();

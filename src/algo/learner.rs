@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use anyhow::ensure;
 use tch::{Tensor, nn};
 
 use super::adamw::{AdamW, AdamWConfig};
@@ -20,6 +21,34 @@ pub struct Optimisation {
     pub schedule: Schedule,
     /// The optimiser.
     pub adamw: AdamWConfig,
+}
+
+impl Optimisation {
+    /// Whether weights can be optimised so. `name` is the field of the preset that holds these numbers.
+    ///
+    /// # Errors
+    /// Names the field that is out of its bounds.
+    pub fn check(&self, name: &str) -> anyhow::Result<()> {
+        let Schedule { learning_rate, final_share, .. } = self.schedule;
+        let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.adamw;
+        let batch = self.batch;
+        ensure!((2..=65_536).contains(&batch), "{name}.batch is {batch}, which is not between 2 and 65536");
+        let positive = |number: f64| number.is_finite() && number > 0.0;
+        ensure!(positive(learning_rate), "{name}.schedule.learning_rate is {learning_rate}, which is no rate");
+        ensure!(
+            (0.0..=1.0).contains(&final_share),
+            "{name}.schedule.final_share is {final_share}, which is not a share"
+        );
+        for (field, beta) in [("beta1", beta1), ("beta2", beta2)] {
+            ensure!((0.0..1.0).contains(&beta), "{name}.adamw.{field} is {beta}, which is not below 1, or negative");
+        }
+        ensure!(positive(epsilon), "{name}.adamw.epsilon is {epsilon}, which is not above 0");
+        ensure!(
+            weight_decay.is_finite() && weight_decay >= 0.0,
+            "{name}.adamw.weight_decay is {weight_decay}, which is no weight"
+        );
+        Ok(())
+    }
 }
 
 /// Weights under training.
@@ -54,7 +83,7 @@ impl<'a> Learner<'a> {
     /// Before a step's forward pass: whatever libtorch draws in it is a function of seed and step.
     pub fn begin_step(&self) {
         let mixed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(self.step());
-        tch::manual_seed((mixed >> 1) as i64);
+        tch::manual_seed(mixed as i64);
     }
 
     /// Takes a step against the gradients of `loss`.
@@ -80,29 +109,49 @@ impl<'a> Learner<'a> {
         weights::copy(tensors, "weight.", self.store)
     }
 
-    /// Writes weights, moments and the count of steps as one file, whole or not at all.
+    /// Takes up the state that was read from the file `path`.
     ///
     /// # Errors
-    /// When the file cannot be written.
-    pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        let metadata = [("step".to_string(), self.step().to_string()), ("seed".to_string(), self.seed.to_string())];
-        Ok(weights::write(path, &self.state(), &metadata.into())?)
+    /// When it does not fit the networks; each tensor that is at fault is named.
+    pub fn take_up(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+        let forms = self.state().iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
+        weights::check(path, tensors, &forms)?;
+        self.restore(step, tensors)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+
+    #[test]
+    fn what_is_drawn_in_a_step_is_its_own_and_the_same_again() {
+        let _chance = crate::nets::testing::chance();
+        let store = nn::VarStore::new(Device::Cpu);
+        let weight = store.root().zeros("weight", &[1]);
+        let mut learner = Learner::new(&store, optimisation(), 3);
+        let mut drawn = || {
+            let draw = || {
+                learner.begin_step();
+                f32::try_from(Tensor::rand([1], (Kind::Float, Device::Cpu)).get(0)).unwrap()
+            };
+            let (once, again) = (draw(), draw());
+            assert_eq!(once, again);
+            learner.minimise(&weight.square().sum(Kind::Float));
+            once
+        };
+        let steps = [(); 4].map(|()| drawn());
+        assert!(steps.windows(2).all(|pair| pair[0] != pair[1]), "{steps:?}");
     }
 
-    /// Takes up a training that was saved.
-    ///
-    /// # Errors
-    /// When the file cannot be read, was written with another seed, or does not fit the networks; each fault is named.
-    pub fn resume(&mut self, path: &Path) -> anyhow::Result<()> {
-        let (tensors, metadata) = weights::read_with_metadata(path)?;
-        let number = |key: &str| -> anyhow::Result<u64> {
-            let text = metadata.get(key).ok_or_else(|| anyhow::anyhow!("{}: {key} is missing", path.display()))?;
-            text.parse().map_err(|_| anyhow::anyhow!("{}: {key} is {text:?}, not a number", path.display()))
-        };
-        let (step, seed) = (number("step")?, number("seed")?);
-        anyhow::ensure!(seed == self.seed, "{}: seed is {seed}, the preset's is {}", path.display(), self.seed);
-        let forms = self.state().iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
-        weights::check(path, &tensors, &forms)?;
-        self.restore(step, &tensors)
+    fn optimisation() -> Optimisation {
+        Optimisation {
+            steps: 9,
+            batch: 2,
+            schedule: Schedule { learning_rate: 0.1, warmup_steps: 0, final_share: 1.0 },
+            adamw: AdamWConfig { beta1: 0.9, beta2: 0.999, epsilon: 1e-8, weight_decay: 0.0 },
+        }
     }
 }

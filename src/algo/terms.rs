@@ -33,9 +33,9 @@ impl Terms {
     }
 }
 
-/// A loss that is not a number; no weight was changed by it.
+/// A loss that is not a number; no weight was changed by it. Batch norms have seen the items of its step.
 #[derive(Debug, thiserror::Error)]
-#[error("step {step}: {term} is {value}; nothing was changed by this step, and the last saved state is kept")]
+#[error("step {step}: {term} is {value}; no weight was changed by this step, and the last saved state is kept")]
 pub struct NotFinite {
     /// The step that failed, from 1.
     pub step: u64,

@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_that_is_no_number_is_named_and_changes_nothing() {
+    fn a_loss_that_is_no_number_is_named_and_changes_no_weight() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();
         let mut update = update(&nets, 10, IQL, None);

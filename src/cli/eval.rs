@@ -100,13 +100,7 @@ impl Eval {
         let summary =
             crate::run::evaluate(&evaluation, &chosen.team, &mut run, &stop, &mut |progress| meter.show(progress))?;
         meter.finish();
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", serde_json::to_string(&summary)?)?;
-        } else {
-            writeln!(out, "{}", summary.markdown())?;
-        }
-        out.flush()?;
+        print(&summary, self.json)?;
         say(&format!("wrote {}", path.display()));
         chosen.check_unchanged()?;
         self.ending(&summary)
@@ -151,6 +145,17 @@ impl Eval {
         }
         Ok(ending)
     }
+}
+
+/// Prints what was measured to standard output: a page, or a JSON object in a line.
+pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    if json {
+        writeln!(out, "{}", serde_json::to_string(summary)?)?;
+    } else {
+        writeln!(out, "{}", summary.markdown())?;
+    }
+    Ok(out.flush()?)
 }
 
 /// Progress on standard error: a bar in a terminal, else a plain line now and then.

@@ -7,9 +7,9 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use etcetera::BaseStrategy;
 
+use super::rooms::RoomName;
 use super::{Ending, logging, policies};
 use crate::data::{dataset::Dataset, taskset};
-use crate::domain::scene::Room;
 use crate::run::scenes::Scenes;
 use crate::tui::config::Config;
 use crate::tui::engine::Engine;
@@ -131,14 +131,6 @@ fn settings() -> anyhow::Result<Config> {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum RoomName {
-    Kitchen,
-    LivingRoom,
-    Bedroom,
-    Bathroom,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum GraphicsName {
     Auto,
     Kitty,
@@ -216,12 +208,6 @@ impl Origin {
             }
             return Ok((Start::Recorded { scene, trajectories }, none));
         }
-        let room = match self.room {
-            RoomName::Kitchen => Room::Kitchen,
-            RoomName::LivingRoom => Room::LivingRoom,
-            RoomName::Bedroom => Room::Bedroom,
-            RoomName::Bathroom => Room::Bathroom,
-        };
-        Ok((Start::Generated(room), none))
+        Ok((Start::Generated(self.room.into()), none))
     }
 }

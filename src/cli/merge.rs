@@ -1,6 +1,5 @@
 //! `sprint merge`: joins the shares of a run.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -28,13 +27,7 @@ impl Merge {
     pub fn run(self) -> anyhow::Result<Ending> {
         let shares = if self.shares.is_empty() { merge::shares_in(&self.run)? } else { self.shares };
         let summary = merge::merge(&shares, &self.run)?;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", serde_json::to_string(&summary)?)?;
-        } else {
-            writeln!(out, "{}", summary.markdown())?;
-        }
-        out.flush()?;
+        super::eval::print(&summary, self.json)?;
         Ok(if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed })
     }
 }

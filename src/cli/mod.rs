@@ -25,6 +25,7 @@ mod pretrain;
 mod relabel;
 mod replay;
 mod report;
+mod rooms;
 mod schema;
 mod shell;
 mod stop;

@@ -49,7 +49,7 @@ pub struct Pretrain {
     #[arg(long, value_name = "N")]
     encoder_steps: Option<u64>,
     /// Steps of the policy's training, instead of the preset's
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
     /// Let the agent play these tasks while it trains: not those it will be judged by
     #[arg(long, value_name = "FILE")]

@@ -10,6 +10,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use indicatif::ProgressBar;
 
 use super::Ending;
+use super::rooms::RoomName;
 use crate::agent::{ExpertPolicy, Solo, Team};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
@@ -96,14 +97,6 @@ impl std::str::FromStr for Lengths {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum RoomName {
-    Kitchen,
-    LivingRoom,
-    Bedroom,
-    Bathroom,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum PhrasingName {
     /// The program's own grammar
     Own,
@@ -172,17 +165,6 @@ impl Sample {
         };
         taskset::write(&self.out, &set)?;
         Ok(Ending::Ok)
-    }
-}
-
-impl From<RoomName> for Room {
-    fn from(name: RoomName) -> Room {
-        match name {
-            RoomName::Kitchen => Room::Kitchen,
-            RoomName::LivingRoom => Room::LivingRoom,
-            RoomName::Bedroom => Room::Bedroom,
-            RoomName::Bathroom => Room::Bathroom,
-        }
     }
 }
 

@@ -141,7 +141,9 @@ impl Dataset {
         let reader = BufReader::new(zstd::Decoder::new(file)?);
         Ok(reader.lines().enumerate().map(move |(number, line)| {
             let place = || format!("{}, line {}", path.display(), number + 1);
-            serde_json::from_str(&line.with_context(place)?).with_context(place)
+            let trajectory: Trajectory = serde_json::from_str(&line.with_context(place)?).with_context(place)?;
+            trajectory.check().map_err(anyhow::Error::msg).with_context(place)?;
+            Ok(trajectory)
         }))
     }
 
@@ -239,6 +241,24 @@ impl Writer {
         let file = self.trajectories.finish()?;
         whole::keep(file, &path).with_context(|| path.display().to_string())?;
         json::write(&self.folder.join("dataset.json"), manifest)
+    }
+}
+
+/// Manifests for tests.
+#[cfg(test)]
+pub mod testing {
+    use super::*;
+
+    /// Of a test's dataset, without counts.
+    pub fn manifest(scenes: u64, held_out: &[&str]) -> Manifest {
+        Manifest {
+            format_version: Manifest::FORMAT,
+            source: "test".into(),
+            counts: BTreeMap::new(),
+            scenes,
+            held_out: held_out.iter().map(ToString::to_string).collect(),
+            skipped: Vec::new(),
+        }
     }
 }
 

@@ -92,15 +92,8 @@ impl Features {
         }));
     }
 
-    /// Appends the bytes of one map: little-endian 16-bit floats.
-    ///
-    /// # Errors
-    /// When there is no such map, or the disk fails.
-    pub fn gather(&self, map: usize, into: &mut Vec<u8>) -> anyhow::Result<()> {
-        self.gather_run(map..map + 1, into)
-    }
-
-    /// Appends the bytes of maps in any order, with repetitions; those that follow each other in a file are read at once.
+    /// Appends the bytes of maps, little-endian 16-bit floats, in any order, with repetitions; those that follow each other in a
+    /// file are read at once.
     ///
     /// # Errors
     /// When one of them does not exist, or the disk fails.
@@ -271,7 +264,7 @@ mod tests {
         write(folder.path(), header(), &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
         let features = Features::read(folder.path(), &header()).unwrap().unwrap();
         let mut bytes = Vec::new();
-        features.gather(1, &mut bytes).unwrap();
+        features.gather_all([1].into_iter(), &mut bytes).unwrap();
         assert_eq!((features.len(), bytes), (2, vec![7, 8, 9, 10, 11, 12]));
         assert!(Features::read(folder.path(), &Header { maps: 3, ..header() }).unwrap().is_none());
     }

@@ -6,7 +6,9 @@ use std::ops::Range;
 use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sha2::{Digest, Sha256};
 
+use super::json::hex;
 use super::selection::{Composites, Named, Past, Selection};
 use super::summaries::Summaries;
 use crate::domain::trajectory::Annotation;
@@ -29,6 +31,8 @@ pub struct Label {
 pub struct Source<'a> {
     /// The trajectories, in the order of their frames.
     pub trajectories: &'a [Trajectory],
+    /// Which of them are kept apart from training.
+    pub apart: &'a [bool],
     /// Those of which the whole must not be learned as one span.
     pub held_out: &'a [String],
     /// What composite spans are called; needed for [`Composites::Labels`] alone.
@@ -68,10 +72,13 @@ pub struct Items {
     pub texts: Vec<String>,
     /// Spans to learn from.
     pub training: Vec<Span>,
-    /// Spans that are held out: whole trajectories, those of splits other than `train` among them.
+    /// Spans of the trajectories that are kept apart.
     pub held_out: Vec<Span>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     pub firsts: Vec<u32>,
+    /// Of each trajectory of several skills whose whole must not be learned: the frames from the end of its first skill to the
+    /// beginning of its last one.
+    pub withheld: HashMap<u32, Range<u32>>,
     /// How far back observations reach.
     pub past: Past,
     /// What the object head learns.
@@ -92,18 +99,13 @@ pub struct Item {
 }
 
 impl Items {
-    /// All primitives, and the composites that are selected, once for each aligned annotation. Held out are every `hold_out`th
-    /// trajectory and the splits other than `train`; dropped are the wholes that [`Source::held_out`] names, and spans in which
-    /// nothing has a label. `labels` are those of all frames; without [`Selection::corrections`] those not taken are left out.
+    /// All primitives, and the composites that are selected, once for each aligned annotation. Dropped are the wholes that
+    /// [`Source::held_out`] names, spans in which nothing has a label, and those of which nothing is said but white space and
+    /// marks. `labels` are those of all frames; without [`Selection::corrections`] those not taken are left out.
     ///
     /// # Errors
     /// When composites should have labels and one has none.
-    pub fn of(
-        source: &Source<'_>,
-        labels: Vec<Option<Label>>,
-        selection: &Selection,
-        hold_out: usize,
-    ) -> anyhow::Result<Items> {
+    pub fn of(source: &Source<'_>, labels: Vec<Option<Label>>, selection: &Selection) -> anyhow::Result<Items> {
         let learned = |label: &Label| label.taken || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
         let mut items =
@@ -111,7 +113,11 @@ impl Items {
         let mut numbers = HashMap::new();
         let mut first = 0;
         for (position, trajectory) in source.trajectories.iter().enumerate() {
-            let held_out = trajectory.split != "train" || hold_out > 0 && position % hold_out == hold_out - 1;
+            let apart = source.apart.get(position).copied().unwrap_or(false);
+            if source.held_out.contains(&trajectory.id) && trajectory.skills.len() > 1 {
+                let at = |skill| first + trajectory.skill_range(skill).start as u32;
+                items.withheld.insert(position as u32, at(1)..at(trajectory.skills.len() - 1));
+            }
             for annotation in &trajectory.annotations {
                 for (skills, text) in told(source, selection, trajectory, annotation)? {
                     let (from, to) =
@@ -133,7 +139,7 @@ impl Items {
                         end: frames.end as u32,
                         text,
                     };
-                    if held_out { &mut items.held_out } else { &mut items.training }.push(span);
+                    if apart { &mut items.held_out } else { &mut items.training }.push(span);
                 }
             }
             first += trajectory.actions.len() as u32 + 1;
@@ -176,6 +182,21 @@ impl Items {
         labels.iter().flatten().map(|label| label.object).find(|&object| object > 0).unwrap_or(0)
     }
 
+    /// Identifies what is learned and how it is told: the first 16 digits of the sha256 of all spans and texts.
+    pub fn digest(&self) -> String {
+        let mut hash = Sha256::new();
+        for span in self.training.iter().chain(&self.held_out) {
+            let Span { trajectory, skills, first, start, end, text } = span;
+            let numbers = [*trajectory, skills.start.into(), skills.end.into(), *first, *start, *end, *text];
+            numbers.iter().for_each(|number| hash.update(number.to_le_bytes()));
+        }
+        for text in &self.texts {
+            hash.update(text);
+            hash.update([0]);
+        }
+        hex(&hash.finalize())[..16].to_string()
+    }
+
     /// Each action's share of what is drawn to learn from, in the order of the action head.
     pub fn action_shares(&self) -> Vec<f32> {
         let mut shares = vec![0.0; ActionType::COUNT];
@@ -193,11 +214,13 @@ impl Items {
         self.labels.get(frame).is_some_and(Option::is_some)
     }
 
-    /// All frames of the trajectory that an item lies in.
-    pub fn trajectory_of(&self, item: &Item) -> Range<u32> {
+    /// The frames that an item may be asked to reach: what is left of its trajectory. Where the whole must not be learned, its
+    /// last skill is no goal within its first one.
+    pub fn goals(&self, item: &Item) -> Range<u32> {
         let next = self.firsts.partition_point(|&first| first <= item.frame);
-        let first = self.firsts[..next].last().copied().unwrap_or(item.first);
-        first..self.firsts.get(next).copied().unwrap_or(item.end + 1)
+        let end = self.firsts.get(next).copied().unwrap_or(item.end + 1);
+        let withheld = self.withheld.get(&(next as u32).wrapping_sub(1)).filter(|inner| item.frame < inner.start);
+        item.frame + 1..withheld.map_or(end, |inner| inner.end + 1)
     }
 }
 
@@ -249,11 +272,6 @@ impl Item {
         stack(self.first, self.frame, history)
     }
 
-    /// The frames of the observation after the step.
-    pub fn next_stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
-        stack(self.first, self.frame + 1, history)
-    }
-
     /// Whether the step ends the span: reward 1, and nothing after it.
     pub fn is_last(&self) -> bool {
         self.frame + 1 == self.end
@@ -268,17 +286,12 @@ pub fn stack(first: u32, frame: u32, history: u32) -> impl Iterator<Item = usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::task::SceneRef;
-    use crate::domain::trajectory::Annotation;
-    use crate::domain::{Action, ActionType, SkillKind, Subtask, World};
+    use crate::domain::trajectory::{self, Annotation};
+    use crate::domain::{Action, ActionType, SkillKind, Subtask};
 
     fn trajectory(skill_starts: Vec<u32>, steps: usize) -> Trajectory {
         let skill = Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None };
         Trajectory {
-            id: "t".into(),
-            split: "train".into(),
-            scene: SceneRef::Named("s".into()),
-            start: World::default(),
             actions: vec![Action::navigate(ActionType::MoveAhead); steps],
             roles: Vec::new(),
             skills: vec![skill; skill_starts.len()],
@@ -287,16 +300,14 @@ mod tests {
                 steps: (0..skill_starts.len()).map(|i| format!("step {i}")).collect(),
             }],
             skill_starts,
-            goal: None,
-            boxes: Vec::new(),
-            choices: Vec::new(),
+            ..trajectory::testing::empty("t", "s")
         }
     }
 
-    fn items(trajectories: &[Trajectory], composites: Composites, hold_out: usize, held_out: &[String]) -> Items {
+    fn items(trajectories: &[Trajectory], composites: Composites, held_out: &[String]) -> Items {
         let summaries = Summaries::default();
-        let source = Source { trajectories, held_out, summaries: &summaries };
-        Items::of(&source, labels(trajectories), &Selection::of(composites), hold_out).unwrap()
+        let source = Source { trajectories, apart: &[], held_out, summaries: &summaries };
+        Items::of(&source, labels(trajectories), &Selection::of(composites)).unwrap()
     }
 
     fn labels(trajectories: &[Trajectory]) -> Vec<Option<Label>> {
@@ -313,30 +324,42 @@ mod tests {
 
     #[test]
     fn a_trajectory_gives_its_primitives_and_its_whole() {
-        let items = items(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Composites::Whole, 0, &[]);
+        let items = items(&[trajectory(vec![0, 2], 5), trajectory(vec![0], 3)], Composites::Whole, &[]);
         assert_eq!(edges(&items), [(0, 0, 2), (0, 2, 5), (0, 0, 5), (6, 6, 9), (6, 6, 9)]);
         assert_eq!(items.texts, ["step 0", "step 1", "all"].map(normalise));
         assert_eq!(items.firsts, [0, 6, 10]);
-        assert_eq!(items.trajectory_of(&Item { first: 0, frame: 1, end: 2, text: 0 }), 0..6);
+        assert_eq!(items.goals(&Item { first: 0, frame: 1, end: 2, text: 0 }), 2..6);
     }
 
     #[test]
     fn every_run_of_skills_is_a_span_and_a_held_out_whole_is_not() {
         let three = [trajectory(vec![0, 2, 3], 5)];
-        let concat = items(&three, Composites::Concat, 0, &[]);
+        let concat = items(&three, Composites::Concat, &[]);
         assert_eq!(edges(&concat), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 0, 5), (0, 2, 5)]);
         assert_eq!(concat.texts[concat.training[3].text as usize], "Step 0. step 1.");
         assert_eq!(concat.training[5].skills, 1..3);
-        let dropped = items(&three, Composites::Concat, 0, &["t".to_string()]);
+        let dropped = items(&three, Composites::Concat, &["t".to_string()]);
         assert_eq!(edges(&dropped), [(0, 0, 2), (0, 2, 3), (0, 3, 5), (0, 0, 3), (0, 2, 5)]);
-        assert_eq!(items(&three, Composites::None, 0, &[]).training.len(), 3);
+        assert_eq!(items(&three, Composites::None, &[]).training.len(), 3);
+        assert_ne!(concat.digest(), dropped.digest());
+        let goals = |items: &Items, frame| items.goals(&Item { first: 0, frame, end: 5, text: 0 });
+        assert_eq!([1, 2, 4].map(|frame| goals(&dropped, frame)), [2..4, 3..6, 5..6]);
+        assert_eq!(goals(&concat, 1), 2..6);
+    }
+
+    #[test]
+    fn a_held_out_trajectory_of_one_skill_is_learned_as_that_skill() {
+        let one = items(&[trajectory(vec![0], 3)], Composites::Concat, &["t".to_string()]);
+        assert_eq!(edges(&one), [(0, 0, 3)]);
+        assert_eq!(one.goals(&Item { first: 0, frame: 0, end: 3, text: 0 }), 1..4);
     }
 
     #[test]
     fn a_span_without_its_label_is_an_error_that_says_what_to_do() {
         let summaries = Summaries::default();
-        let source = Source { trajectories: &[trajectory(vec![0, 2], 5)], held_out: &[], summaries: &summaries };
-        let error = Items::of(&source, labels(source.trajectories), &Selection::of(Composites::Labels), 0)
+        let source =
+            Source { trajectories: &[trajectory(vec![0, 2], 5)], apart: &[], held_out: &[], summaries: &summaries };
+        let error = Items::of(&source, labels(source.trajectories), &Selection::of(Composites::Labels))
             .unwrap_err()
             .to_string();
         assert!(error.contains("skills 0..2") && error.contains("sprint relabel"), "{error}");
@@ -346,14 +369,14 @@ mod tests {
     fn an_annotation_that_is_not_aligned_is_left_out() {
         let mut odd = trajectory(vec![0, 2], 5);
         odd.annotations[0].steps.pop();
-        assert!(items(&[odd], Composites::Concat, 0, &[]).training.is_empty());
+        assert!(items(&[odd], Composites::Concat, &[]).training.is_empty());
     }
 
     #[test]
-    fn held_out_trajectories_are_whole_and_draws_depend_on_the_step_alone() {
-        let mut seen = trajectory(vec![0], 4);
-        seen.split = "valid_seen".into();
-        let items = items(&[trajectory(vec![0], 4), trajectory(vec![0], 4), seen], Composites::None, 2, &[]);
+    fn trajectories_are_kept_apart_as_wholes_and_draws_depend_on_the_step_alone() {
+        let (three, summaries) = ([(); 3].map(|()| trajectory(vec![0], 4)), Summaries::default());
+        let source = Source { trajectories: &three, apart: &[false, true, true], held_out: &[], summaries: &summaries };
+        let items = Items::of(&source, labels(&three), &Selection::of(Composites::None)).unwrap();
         assert_eq!((items.training.len(), items.held_out.len()), (1, 2));
         let draw = |step| items.draw(&items.training, 7, step, 20);
         assert_eq!(draw(3), draw(3));
@@ -369,9 +392,9 @@ mod tests {
         labels[3] = Some(Label { action: 0, object: 0, taken: false });
         let drawn = |corrections| {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &one, held_out: &[], summaries: &summaries };
+            let source = Source { trajectories: &one, apart: &[], held_out: &[], summaries: &summaries };
             let selection = Selection { corrections, ..Selection::of(Composites::Whole) };
-            let items = Items::of(&source, labels.clone(), &selection, 0).unwrap();
+            let items = Items::of(&source, labels.clone(), &selection).unwrap();
             assert_eq!(edges(&items), [(0, 2, 5), (0, 0, 5)]);
             let frames = items.draw(&items.training, 1, 0, 50).iter().map(|item| item.frame).collect();
             Vec::from_iter::<std::collections::BTreeSet<u32>>(frames)
@@ -384,7 +407,6 @@ mod tests {
     fn history_repeats_the_first_frame() {
         let item = |frame| Item { first: 10, frame, end: 20, text: 0 };
         assert_eq!(item(11).stack(5).collect::<Vec<_>>(), [10, 10, 10, 10, 11]);
-        assert_eq!(item(11).next_stack(5).collect::<Vec<_>>(), [10, 10, 10, 11, 12]);
         assert_eq!(item(16).stack(5).collect::<Vec<_>>(), [12, 13, 14, 15, 16]);
     }
 
@@ -393,12 +415,12 @@ mod tests {
         let two = [trajectory(vec![0, 2], 5)];
         let firsts = |past| {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+            let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
             let selection = Selection { past, ..Selection::of(Composites::None) };
-            let items = Items::of(&source, labels(&two), &selection, 0).unwrap();
+            let items = Items::of(&source, labels(&two), &selection).unwrap();
             let drawn = items.draw(&items.training, 1, 0, 50);
             let late = drawn.iter().filter(|item| item.frame >= 2);
-            assert!(drawn.iter().all(|item| items.trajectory_of(item) == (0..6)));
+            assert!(drawn.iter().all(|item| items.goals(item) == (item.frame + 1..6)));
             Vec::from_iter::<std::collections::BTreeSet<u32>>(late.map(|item| item.first).collect())
         };
         assert_eq!([Past::Trajectory, Past::Span, Past::Either].map(firsts), [vec![0], vec![2], vec![0, 2]]);
@@ -412,9 +434,9 @@ mod tests {
         labels[4] = Some(Label { action: 6, object: 9, taken: true });
         let named = |named, end| -> Vec<u8> {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+            let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
             let selection = Selection { named, ..Selection::of(Composites::None) };
-            let items = Items::of(&source, labels.clone(), &selection, 0).unwrap();
+            let items = Items::of(&source, labels.clone(), &selection).unwrap();
             (0..end).map(|frame| items.named_by(&Item { first: 0, frame, end, text: 0 })).collect()
         };
         assert_eq!(named(Named::Own, 5), [0, 0, 7, 0, 9]);
@@ -426,11 +448,11 @@ mod tests {
     fn an_action_has_the_share_of_the_draws_in_which_it_is_the_label() {
         let two = [trajectory(vec![0, 2], 6)];
         let summaries = Summaries::default();
-        let source = Source { trajectories: &two, held_out: &[], summaries: &summaries };
+        let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
         let mut labels = labels(&two);
         labels[1] = Some(Label { action: 5, object: 1, taken: true });
         labels[2] = None;
-        let items = Items::of(&source, labels, &Selection::of(Composites::None), 0).unwrap();
+        let items = Items::of(&source, labels, &Selection::of(Composites::None)).unwrap();
         let shares = items.action_shares();
         assert_eq!((shares[0], shares[5], shares[3]), (0.75, 0.25, 0.0), "half of the first of two skills");
         let drawn = items.draw(&items.training, 1, 0, 4000);

@@ -52,6 +52,27 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// The most skills that one may have.
+    pub const MOST_SKILLS: usize = 255;
+
+    /// Whether its skills divide its actions.
+    ///
+    /// # Errors
+    /// Names the field that does not fit.
+    pub fn check(&self) -> Result<(), String> {
+        let (skills, starts, steps) = (self.skills.len(), &self.skill_starts, self.actions.len());
+        if skills > Trajectory::MOST_SKILLS {
+            return Err(format!("skills: {skills} are more than {}", Trajectory::MOST_SKILLS));
+        }
+        if starts.len() != skills {
+            return Err(format!("skill_starts: {} for {skills} skills", starts.len()));
+        }
+        if !starts.is_sorted() || starts.last().is_some_and(|&last| last as usize > steps) {
+            return Err(format!("skill_starts: {starts:?} do not rise within the {steps} actions"));
+        }
+        Ok(())
+    }
+
     /// What a learner should do at a step.
     pub fn choice(&self, step: usize) -> Option<Action> {
         self.choices.get(step).or_else(|| self.actions.get(step)).copied()
@@ -61,5 +82,52 @@ impl Trajectory {
     pub fn skill_range(&self, skill: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.skill_starts.get(i).map_or(self.actions.len(), |&start| start as usize);
         at(skill)..at(skill + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{ActionType, SkillKind};
+
+    #[test]
+    fn skills_that_do_not_divide_the_actions_are_named() {
+        let skill = Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None };
+        let check = |skills, skill_starts: &[u32]| {
+            let actions = vec![Action::navigate(ActionType::MoveAhead); 5];
+            let skills = vec![skill.clone(); skills];
+            Trajectory { actions, skills, skill_starts: skill_starts.to_vec(), ..testing::empty("t", "s") }.check()
+        };
+        assert_eq!(check(2, &[0, 3]), Ok(()));
+        assert_eq!(check(0, &[]), Ok(()));
+        assert_eq!(check(2, &[0]), Err("skill_starts: 1 for 2 skills".into()));
+        for starts in [[0, 6], [3, 2]] {
+            assert!(check(2, &starts).unwrap_err().contains("do not rise within the 5 actions"));
+        }
+        assert_eq!(check(256, &[0; 256]), Err("skills: 256 are more than 255".into()));
+    }
+}
+
+/// Trajectories for tests.
+#[cfg(test)]
+pub mod testing {
+    use super::*;
+
+    /// One of the split train that nothing happens in.
+    pub fn empty(id: &str, scene: &str) -> Trajectory {
+        Trajectory {
+            id: id.into(),
+            split: "train".into(),
+            scene: SceneRef::Named(scene.into()),
+            start: World::default(),
+            actions: Vec::new(),
+            roles: Vec::new(),
+            skills: Vec::new(),
+            skill_starts: Vec::new(),
+            goal: None,
+            annotations: Vec::new(),
+            boxes: Vec::new(),
+            choices: Vec::new(),
+        }
     }
 }

@@ -96,7 +96,7 @@ impl Summarizer for Concatenation {
 mod tests {
     use super::*;
     use crate::domain::SkillKind;
-    use crate::domain::task::SceneRef;
+    use crate::domain::trajectory;
     use crate::house::testing::{put_subtask, role, subtask};
 
     #[test]
@@ -123,18 +123,11 @@ mod tests {
     #[test]
     fn an_annotation_that_is_not_aligned_gives_no_passage() {
         let mut trajectory = Trajectory {
-            id: "t".into(),
-            split: "train".into(),
-            scene: SceneRef::Named("s".into()),
-            start: Default::default(),
-            actions: Vec::new(),
             roles: vec![role("Mug"), role("Desk")],
             skills: vec![subtask(SkillKind::Pickup, 0), put_subtask(0, 1)],
             skill_starts: vec![0, 1],
-            goal: None,
             annotations: vec![Annotation { goal: "g".into(), steps: vec!["one".into(), "two".into()] }],
-            boxes: Vec::new(),
-            choices: Vec::new(),
+            ..trajectory::testing::empty("t", "s")
         };
         let found = |trajectory: &Trajectory, skills| {
             Passage::of(trajectory, &trajectory.annotations[0], skills).map(|passage| passage.sentences.len())

@@ -23,14 +23,19 @@ impl Vocabulary {
         Vocabulary { words, numbers }
     }
 
+    /// How many words a table of so many `entries` has numbers for.
+    pub fn most(entries: i64) -> usize {
+        usize::try_from(entries).unwrap_or(0).saturating_sub(Vocabulary::FIRST)
+    }
+
     /// The most frequent words of texts, so many that all numbers lie below `entries`.
-    pub fn of<'a>(texts: impl Iterator<Item = &'a str>, entries: usize) -> Vocabulary {
+    pub fn of<'a>(texts: impl Iterator<Item = &'a str>, entries: i64) -> Vocabulary {
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         texts.flat_map(split).for_each(|word| *counts.entry(word).or_default() += 1);
         let mut words: Vec<(String, usize)> = counts.into_iter().collect();
         // A stable sort: words of one frequency stay in the order of the alphabet.
         words.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-        words.truncate(entries.saturating_sub(Vocabulary::FIRST));
+        words.truncate(Vocabulary::most(entries));
         Vocabulary::new(words.into_iter().map(|(word, _)| word).collect())
     }
 

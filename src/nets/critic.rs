@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use tch::Tensor;
 use tch::nn::{self, Module};
 
+use super::bounds;
 use super::precision;
 use super::trunk::{Convolutions, Dense, Telling, Trunk};
 use super::value::ValueHead;
@@ -31,6 +32,18 @@ pub struct CriticSpec {
 }
 
 impl CriticSpec {
+    /// Whether there can be a critic of this size.
+    ///
+    /// # Errors
+    /// Names the field of `critic` that is out of its bounds.
+    pub fn check(&self) -> anyhow::Result<()> {
+        bounds::sizes("critic.channels", &self.channels, 4096)?;
+        bounds::sizes("critic.hidden", &self.hidden, 16_384)?;
+        bounds::sizes("critic.action_embedding", &[self.action_embedding], 8192)?;
+        bounds::sizes("critic.object_embedding", &[self.object_embedding], 8192)?;
+        bounds::dropout("critic.dropout", self.dropout)
+    }
+
     /// Whether a critic of this size can take another's weights: dropout is no matter of size.
     pub fn fits(&self, other: &CriticSpec) -> bool {
         CriticSpec { dropout: other.dropout, ..self.clone() } == *other

@@ -29,7 +29,7 @@ pub fn threads() -> usize {
     usize::try_from(tch::get_num_threads()).unwrap_or(1)
 }
 
-/// Sets how many threads libtorch computes with, for the whole process; the command decides, never a library function.
+/// Sets how many threads libtorch computes with, on the calling thread.
 pub fn set_threads(count: usize) {
     tch::set_num_threads(i32::try_from(count.max(1)).unwrap_or(i32::MAX));
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tch::nn::{self, Module};
 use tch::{Kind, Tensor};
 
+use super::bounds;
 use super::precision;
 use super::trunk::{Convolutions, Trunk};
 use super::visual::SIDE;
@@ -24,14 +25,19 @@ pub struct AttentionSpec {
 }
 
 impl AttentionSpec {
-    /// Whether tokens of `width` numbers can be attended to.
+    /// Whether there can be such layers over tokens of `width` numbers.
     ///
     /// # Errors
-    /// When they do not divide among the heads, or have no halves for sines and cosines.
+    /// Names the field of `policy` that is out of its bounds; also when tokens do not divide among the heads, or have no halves
+    /// for sines and cosines.
     pub fn check(&self, width: i64) -> anyhow::Result<()> {
+        bounds::sizes("policy.attention.words", &[self.words], 1 << 20)?;
+        bounds::sizes("policy.attention.layers", &[self.layers], 64)?;
+        bounds::sizes("policy.attention.heads", &[self.heads], 64)?;
+        bounds::sizes("policy.attention.inner", &[self.inner], 16_384)?;
         anyhow::ensure!(
-            width % 2 == 0 && self.heads > 0 && width % self.heads == 0,
-            "embedding is {width}, which is not even or no multiple of attention.heads, {}",
+            width % 2 == 0 && width % self.heads == 0,
+            "policy.embedding is {width}, which is not even or no multiple of policy.attention.heads, {}",
             self.heads
         );
         Ok(())

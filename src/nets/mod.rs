@@ -22,6 +22,7 @@ pub mod value;
 pub mod visual;
 
 mod bert;
+mod bounds;
 mod encoder_stack;
 mod mpnet;
 mod pooling;

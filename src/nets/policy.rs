@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use tch::Tensor;
 use tch::nn;
 
+use super::bounds;
 use super::episodic::{AttentionSpec, Episodic};
 use super::precision;
 use super::trunk::{Convolutions, Dense, Telling, Trunk};
@@ -35,6 +36,22 @@ pub struct PolicySpec {
 }
 
 impl PolicySpec {
+    /// Whether there can be a network of this size.
+    ///
+    /// # Errors
+    /// Names the field of `policy` that is out of its bounds.
+    pub fn check(&self) -> anyhow::Result<()> {
+        bounds::sizes("policy.history", &[self.history], 64)?;
+        bounds::sizes("policy.embedding", &[self.embedding], 8192)?;
+        bounds::sizes("policy.channels", &self.channels, 4096)?;
+        bounds::sizes("policy.hidden", &self.hidden, 16_384)?;
+        bounds::dropout("policy.dropout", self.dropout)?;
+        if let Some(channels) = &self.goal {
+            bounds::sizes("policy.goal", channels, 4096)?;
+        }
+        self.attention.as_ref().map_or(Ok(()), |attention| attention.check(self.embedding))
+    }
+
     /// Whether a network of this size can take another's weights: dropout is no matter of size.
     pub fn fits(&self, other: &PolicySpec) -> bool {
         PolicySpec { dropout: other.dropout, ..self.clone() } == *other

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tch::nn::{self, ModuleT};
 use tch::{Device, Kind, Tensor};
 
+use super::bounds;
 use super::frozen::{Folded, FrameEncoder, Norm, stacked};
 use super::precision::{self, Precision};
 use super::shrink::shrink;
@@ -33,6 +34,7 @@ impl VisualSpec {
         let halvings = self.channels.len();
         anyhow::ensure!((1..=6).contains(&halvings), "visual.channels has {halvings} entries, not 1 to 6");
         let side = SIDE << halvings;
+        bounds::sizes("visual.channels", &self.channels, 4096)?;
         anyhow::ensure!(self.input == side, "visual.input is {}, not {side} for {halvings} channels", self.input);
         Ok(())
     }

@@ -58,9 +58,7 @@ impl<'a> Batches<'a> {
         if let Told::Goals = self.material.told {
             let mut rng = self.chance(GOALS, step);
             for item in &mut items {
-                // A state to reach anywhere in what is left of the trajectory.
-                let end = self.material.items.trajectory_of(item).end.max(item.end + 1);
-                item.end = rng.random_range(item.frame + 1..end);
+                item.end = rng.random_range(self.material.items.goals(item));
             }
         }
         items
@@ -154,7 +152,7 @@ impl<'a> Batches<'a> {
             objects.push(i64::from(label.object));
             taken.push(flag(label.taken));
         }
-        let terminal: Vec<f32> = items.iter().map(|item| flag(item.frame + 1 == item.end)).collect();
+        let terminal: Vec<f32> = items.iter().map(|item| flag(item.is_last())).collect();
         // Both observations share all frames but two, which are gathered once.
         let last = u32::from(self.judged);
         let stack = |item: &Item| Item { frame: item.frame + last, ..*item }.stack(self.history + last);

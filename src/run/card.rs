@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::appraise::Findings;
 use crate::agent::config::{Config, Provenance};
+use crate::nets::precision::Precision;
 
 /// The method in words.
 fn method(config: &Config) -> &'static str {
@@ -57,8 +58,13 @@ fn deciding(config: &Config) -> String {
 
 /// What it learned from, in words.
 fn origin(config: &Config) -> String {
-    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, averaged } = &config.provenance;
+    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, precision, averaged } =
+        &config.provenance;
     let method = method(config);
+    let width = match precision {
+        Precision::Full => "",
+        Precision::Mixed => " in mixed precision",
+    };
     let seen = match config.visual {
         Some(_) => format!("{visual_steps} steps of the visual encoder, "),
         None => String::new(),
@@ -66,11 +72,12 @@ fn origin(config: &Config) -> String {
     match averaged {
         None => format!(
             "Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets `{dataset}`): \
-             {seen}{policy_steps} steps of the policy, seed {seed}."
+             {seen}{policy_steps} steps of the policy{width}, seed {seed}."
         ),
         Some(count) => format!(
             "Its policy is the mean of {count} checkpoints' (presets `{preset}`, datasets `{dataset}`); all else is the first \
-             one's, which had ({method}) {seen}{policy_steps} steps of the policy on {trajectories} demonstrations, seed {seed}."
+             one's, which had ({method}) {seen}{policy_steps} steps of the policy{width} on {trajectories} demonstrations, \
+             seed {seed}."
         ),
     }
 }

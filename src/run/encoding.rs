@@ -192,7 +192,7 @@ mod tests {
         let features = Features::read(folder.path(), &header()).unwrap().unwrap();
         let map = |frame| {
             let mut bytes = Vec::new();
-            features.gather(frame, &mut bytes).unwrap();
+            features.gather_all([frame].into_iter(), &mut bytes).unwrap();
             bytes
         };
         assert_eq!(features.len(), 10);

@@ -11,7 +11,7 @@ use crate::data::dataset::Dataset;
 use crate::data::items::Label;
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Trajectory, World};
-use crate::house::{generate, rules};
+use crate::house::{generate, rules, validate};
 
 /// The trajectories of datasets with the scenes they play in.
 pub struct Footage {
@@ -30,7 +30,7 @@ impl Footage {
     /// Reads the trajectories of datasets, one after the other, and makes their scenes.
     ///
     /// # Errors
-    /// When a trajectory or a scene cannot be read.
+    /// When a trajectory or a scene cannot be read, or a trajectory does not fit its scene; it is named with the field.
     pub fn open(datasets: &[Dataset]) -> anyhow::Result<Footage> {
         let mut trajectories: Vec<Trajectory> = Vec::new();
         let mut parts = Vec::new();
@@ -52,7 +52,12 @@ impl Footage {
             };
             Ok((reference, scene))
         });
-        let scenes = made.collect::<anyhow::Result<_>>()?;
+        let scenes: HashMap<SceneRef, Arc<Scene>> = made.collect::<anyhow::Result<_>>()?;
+        trajectories.par_iter().try_for_each(|trajectory| {
+            let Trajectory { id, scene, start, .. } = trajectory;
+            let scene = scenes.get(scene).with_context(|| format!("{id}: its scene is missing"))?;
+            validate::world(scene, start).map_err(|misfit| misfit.under("start")).with_context(|| id.clone())
+        })?;
         let mut firsts = vec![0];
         for trajectory in &trajectories {
             firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
@@ -71,10 +76,19 @@ impl Footage {
         self.firsts[trajectories.end] - self.firsts[trajectories.start]
     }
 
-    /// Whether a frame belongs to a held-out trajectory: every `hold_out`th is.
-    pub fn is_held_out(&self, frame: usize, hold_out: usize) -> bool {
-        let trajectory = self.firsts.partition_point(|&first| first <= frame) - 1;
-        hold_out > 0 && trajectory % hold_out == hold_out - 1
+    /// Which trajectories are kept apart from all training, to measure on: those of splits other than `train`, and every
+    /// `hold_out`th of a dataset (0: none), the same ones each time that a dataset is named.
+    pub fn kept_apart(&self, hold_out: usize) -> Vec<bool> {
+        let places = self.parts.iter().flat_map(|part| 0..part.len());
+        let kept = |(trajectory, place): (&Trajectory, usize)| {
+            trajectory.split != "train" || hold_out > 0 && place % hold_out == hold_out - 1
+        };
+        self.trajectories.iter().zip(places).map(kept).collect()
+    }
+
+    /// The trajectory that a frame belongs to.
+    pub fn trajectory_of(&self, frame: usize) -> usize {
+        self.firsts.partition_point(|&first| first <= frame) - 1
     }
 
     /// The scene of a trajectory.
@@ -110,7 +124,7 @@ impl Footage {
     /// When there is no such frame.
     pub fn state(&self, frame: usize) -> anyhow::Result<(&Arc<Scene>, World)> {
         anyhow::ensure!(frame < self.frames(), "there is no frame {frame}");
-        let trajectory = self.firsts.partition_point(|&first| first <= frame) - 1;
+        let trajectory = self.trajectory_of(frame);
         let (scene, recorded) = (self.scene(trajectory)?, &self.trajectories[trajectory]);
         let mut world = recorded.start.clone();
         for &action in &recorded.actions[..frame - self.firsts[trajectory]] {
@@ -154,8 +168,36 @@ fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
 
 #[cfg(test)]
 mod tests {
-    use crate::domain::{Action, ActionType};
+    use super::Footage;
+    use crate::data::dataset::{self, Dataset};
+    use crate::domain::{Action, ActionType, Cell, Trajectory, trajectory};
+    use crate::house::testing::kitchen;
     use crate::run::visual_training::testing::footage;
+
+    #[test]
+    fn trajectories_of_other_splits_and_every_so_manieth_of_each_dataset_are_kept_apart() {
+        let mut footage = footage();
+        assert_eq!(footage.kept_apart(0), [false, false]);
+        assert_eq!(footage.kept_apart(2), [false, true]);
+        footage.parts = vec![0..1, 1..2];
+        assert_eq!(footage.kept_apart(2), [false, false], "each dataset is counted for itself");
+        footage.trajectories[0].split = "valid_seen".into();
+        assert_eq!(footage.kept_apart(0), [true, false]);
+    }
+
+    #[test]
+    fn a_trajectory_that_does_not_fit_its_scene_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, mut start) = kitchen();
+        start.agent.cell = Cell::new(900, 900);
+        let mut writer = dataset::Writer::new(folder.path()).unwrap();
+        writer.scene(&scene).unwrap();
+        writer.trajectory(&Trajectory { start, ..trajectory::testing::empty("lost", &scene.name) }).unwrap();
+        writer.finish(&dataset::testing::manifest(1, &[])).unwrap();
+        let error = Footage::open(&[Dataset::open(folder.path()).unwrap()]).err().unwrap();
+        let error = format!("{error:#}");
+        assert!(error.starts_with("lost: start.agent.cell: (900, 900) is no cell"), "{error}");
+    }
 
     #[test]
     fn what_the_expert_only_would_have_done_is_a_label_that_was_not_taken() {

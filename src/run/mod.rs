@@ -46,6 +46,7 @@ pub mod rollout;
 pub mod scenes;
 pub mod shard;
 pub mod sights;
+pub mod state;
 pub mod stats;
 mod table;
 pub mod taskcheck;

@@ -162,18 +162,24 @@ impl Preset {
             preset.format_version,
             Preset::FORMAT
         );
-        for (field, value) in [("save_every", preset.save_every), ("report_every", preset.report_every)] {
+        for (field, value) in [
+            ("save_every", preset.save_every),
+            ("report_every", preset.report_every),
+            ("training.steps", preset.training.steps),
+        ] {
             anyhow::ensure!(value > 0, "{field} is 0");
         }
-        for (field, batch) in [
-            ("training.batch", preset.training.batch),
-            ("visual_training.optimisation.batch", preset.visual_training.optimisation.batch),
-        ] {
-            anyhow::ensure!((2..=65_536).contains(&batch), "{field} is {batch}, which is not between 2 and 65536");
-        }
+        preset.training.check("training")?;
+        preset.visual_training.optimisation.check("visual_training.optimisation")?;
+        let weight = preset.visual_training.positive_weight;
+        anyhow::ensure!(
+            weight.is_finite() && weight > 0.0,
+            "visual_training.positive_weight is {weight}, which is not above 0"
+        );
         let balance = preset.balance;
         anyhow::ensure!((0.0..=1.0).contains(&balance), "balance is {balance}, which is not a share");
         preset.visual.check()?;
+        preset.policy.check()?;
         preset.check_method()?;
         Ok(preset)
     }
@@ -184,20 +190,19 @@ impl Preset {
             self.critic.is_some() == self.iql.is_some(),
             "critic and iql go together: one of them is absent"
         );
-        if let Some(attention) = &self.policy.attention {
+        if self.policy.attention.is_some() {
             anyhow::ensure!(self.critic.is_none(), "policy.attention reads words, which no critic here does");
             anyhow::ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
-            attention.check(self.policy.embedding).context("policy")?;
         }
         if self.policy.goal.is_some() {
             let swaps = self.appraisal.swaps;
             anyhow::ensure!(swaps == 0, "appraisal.swaps is {swaps}, but with policy.goal no instruction is read");
         }
-        if let Some(share) = self.iql.as_ref().map(|iql| iql.warmup_share) {
-            anyhow::ensure!((0.0..=1.0).contains(&share), "iql.warmup_share is {share}, which is not a share");
+        if let Some(critic) = &self.critic {
+            critic.check()?;
         }
-        if let Some(weight) = self.iql.as_ref().map(|iql| iql.weighing) {
-            anyhow::ensure!(weight.is_finite() && weight >= 0.0, "iql.weighing is {weight}, which is no weight");
+        if let Some(iql) = &self.iql {
+            iql.check()?;
         }
         let Some(chaining) = &self.chaining else { return Ok(()) };
         anyhow::ensure!(self.critic.is_some(), "chaining needs a critic");
@@ -313,6 +318,14 @@ mod tests {
         refused("[chaining]\nbatch = 0", "chaining.batch");
         refused("[iql]\nwarmup_share = 3000.0", "iql.warmup_share");
         refused("[iql]\nweighing = -1.0", "iql.weighing");
+        refused("[iql]\nexpectile = 1.5", "iql.expectile");
+        refused("[iql]\ndiscount = 2.0", "iql.discount");
+        refused("[policy]\ndropout = 1.5", "policy.dropout");
+        refused("[policy]\nhistory = -1", "policy.history");
+        refused("[critic]\nchannels = [0, 4, 4, 4]", "critic.channels is 0");
+        refused("[training.schedule]\nlearning_rate = nan", "training.schedule.learning_rate");
+        refused("[training]\nsteps = 0", "training.steps is 0");
+        refused("[visual_training.optimisation.adamw]\nbeta2 = 1.0", "visual_training.optimisation.adamw.beta2");
         refused("[visual]\ninput = 224", "visual.input is 224, not 112");
         refused("eyes = \"ears\"", "resnet18");
     }

@@ -126,13 +126,12 @@ mod tests {
     use std::sync::atomic::AtomicUsize;
 
     use super::*;
-    use crate::data::dataset::{Manifest, Writer};
+    use crate::data::dataset::{self, Writer};
     use crate::data::items::{Items, Label, Source};
     use crate::data::selection::{Composites, Selection};
     use crate::data::summaries::Summaries;
-    use crate::domain::task::SceneRef;
-    use crate::domain::trajectory::Annotation;
-    use crate::domain::{Action, ActionType, SkillKind, World};
+    use crate::domain::trajectory::{self, Annotation};
+    use crate::domain::{Action, ActionType, SkillKind};
     use crate::house::testing::{put_subtask, role, subtask};
     use crate::language::passage::Concatenation;
     use crate::language::rules::Rules;
@@ -173,30 +172,16 @@ mod tests {
         };
         for id in ["a", "b", "held"] {
             let trajectory = Trajectory {
-                id: id.into(),
-                split: "train".into(),
-                scene: SceneRef::Named("s".into()),
-                start: World::default(),
                 actions: vec![Action::navigate(ActionType::MoveAhead); 3],
                 roles: vec![role("Mug"), role("Desk")],
                 skills: vec![subtask(SkillKind::Pickup, 0), subtask(SkillKind::Clean, 0), put_subtask(0, 1)],
                 skill_starts: vec![0, 1, 2],
-                goal: None,
                 annotations: vec![annotation.clone(); 2],
-                boxes: Vec::new(),
-                choices: Vec::new(),
+                ..trajectory::testing::empty(id, "s")
             };
             writer.trajectory(&trajectory).unwrap();
         }
-        let manifest = Manifest {
-            format_version: Manifest::FORMAT,
-            source: "test".into(),
-            counts: Default::default(),
-            scenes: 0,
-            held_out: vec!["held".into()],
-            skipped: Vec::new(),
-        };
-        writer.finish(&manifest).unwrap();
+        writer.finish(&dataset::testing::manifest(0, &["held"])).unwrap();
         folder
     }
 
@@ -237,11 +222,15 @@ mod tests {
         let texts = |source| {
             let summaries = Summaries::read(&[folder.path()], Some(source)).unwrap();
             let selection = Selection { labels_of: Some(source.into()), ..Selection::of(Composites::Labels) };
-            let source =
-                Source { trajectories: &trajectories, held_out: &dataset.manifest().held_out, summaries: &summaries };
+            let source = Source {
+                apart: &[],
+                trajectories: &trajectories,
+                held_out: &dataset.manifest().held_out,
+                summaries: &summaries,
+            };
             let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();
             let labels = vec![Some(Label { action: 0, object: 0, taken: true }); frames];
-            let items = Items::of(&source, labels, &selection, 0).unwrap();
+            let items = Items::of(&source, labels, &selection).unwrap();
             (items.training.len(), items.texts)
         };
         let (spans, of_rules) = texts("rules");

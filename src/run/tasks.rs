@@ -244,10 +244,10 @@ fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::dataset::{Manifest, Writer};
+    use crate::data::dataset::{self, Writer};
     use crate::data::taskset;
     use crate::domain::skill::Original;
-    use crate::domain::trajectory::Annotation;
+    use crate::domain::trajectory::{self, Annotation};
     use crate::domain::{Class, Instance, Role, SkillKind, Subtask};
     use crate::house::expert::Expert;
     use crate::house::grading::{Grader, Grading};
@@ -308,31 +308,19 @@ mod tests {
         let mut writer = Writer::new(folder).unwrap();
         writer.scene(&scene).unwrap();
         let trajectory = Trajectory {
-            id: "mug".into(),
-            split: "train".into(),
-            scene: SceneRef::Named(scene.name.clone()),
             start,
             actions,
             roles,
             skills,
             skill_starts,
-            goal: None,
             annotations: vec![Annotation {
                 goal: "Set the table.".into(),
                 steps: vec!["grab the cup".into(), "put the cup down".into()],
             }],
-            boxes: Vec::new(),
-            choices: Vec::new(),
+            ..trajectory::testing::empty("mug", &scene.name)
         };
         writer.trajectory(&trajectory).unwrap();
-        let manifest = Manifest {
-            format_version: Manifest::FORMAT,
-            source: "test".into(),
-            counts: BTreeMap::new(),
-            scenes: 1,
-            held_out: held_out.iter().map(ToString::to_string).collect(),
-            skipped: Vec::new(),
-        };
+        let manifest = dataset::testing::manifest(1, held_out);
         writer.finish(&manifest).unwrap();
         Dataset::open(folder).unwrap()
     }

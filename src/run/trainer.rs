@@ -1,7 +1,5 @@
 //! The trainer of every method: batches are gathered ahead, an update a batch, scalars reported, states and checkpoints saved.
 
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
@@ -12,6 +10,7 @@ use tch::{Kind, Tensor};
 use super::batches::Batches;
 use super::presets::Preset;
 use super::progress::{Report, Scalars};
+use super::state::State;
 use crate::agent::checkpoint::Networks;
 use crate::algo::batch::{Batch, Transitions, seen};
 use crate::algo::bc;
@@ -19,7 +18,6 @@ use crate::algo::critic::CriticLearner;
 use crate::algo::update::Update;
 use crate::data::items::Span;
 use crate::nets::precision::Precision;
-use crate::nets::weights;
 
 /// Held-out items on which the policy is measured while it trains.
 const MEASURED: usize = 2048;
@@ -34,18 +32,17 @@ pub struct Trainer<'a> {
     pub networks: &'a Networks,
     /// How.
     pub preset: &'a Preset,
-    /// The file of the training's state.
-    pub state: &'a Path,
-    /// What a state must have been made with to be taken up: the dataset, the encoders, by name.
-    pub identity: &'a BTreeMap<String, String>,
+    /// Its state.
+    pub state: State<'a>,
 }
 
 /// Keeps the networks of a saved step, and may add to what is reported of it.
 pub type Keep<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
 
 impl Trainer<'_> {
-    /// Trains up to the preset's last step, from where the state left off if it is there. `keep` is called whenever the state is
-    /// saved. Returns false when it was stopped; its state is saved then.
+    /// Trains up to the preset's last step, from where the state left off if it is there. `keep` is called right before the
+    /// state is saved: what could not be kept is taken again by the resumed training. Returns false when it was stopped; its
+    /// state is saved then.
     ///
     /// # Errors
     /// When a state cannot be read or written, belongs to other data or encoders, or a loss is not a number.
@@ -58,8 +55,8 @@ impl Trainer<'_> {
         keep: &mut Keep<'_>,
     ) -> anyhow::Result<bool> {
         let mut update = self.update()?;
-        if self.state.is_file() {
-            self.resume(&mut update)?;
+        if let Some((step, tensors)) = self.state.read()? {
+            update.restore(self.state.path, step, &tensors)?;
         }
         let measured = batches.held_out(held_out, MEASURED, CHUNK)?;
         let (first, steps) = (update.step(), self.preset.training.steps);
@@ -87,8 +84,8 @@ impl Trainer<'_> {
         let (mut pace, first) = (Pace::new(), update.step());
         while !update.is_done() {
             if stop.load(Ordering::Relaxed) {
-                self.save(update)?;
                 keep(update.step(), &mut Scalars::new("policy", update.step(), self.preset.training.steps))?;
+                self.state.write(update.step(), &update.state())?;
                 return Ok(false);
             }
             let begun = Instant::now();
@@ -107,8 +104,8 @@ impl Trainer<'_> {
                 self.measure(measured, &mut scalars);
             }
             if due(self.preset.save_every) {
-                self.save(update)?;
                 keep(step, &mut scalars)?;
+                self.state.write(step, &update.state())?;
             }
             report.step(&scalars)?;
         }
@@ -134,21 +131,6 @@ impl Trainer<'_> {
         };
         let policy = (&self.networks.policy, &self.networks.policy_store);
         Ok(Update::new(policy, critic, chaining.clone(), training.clone(), *seed).with_precision(*precision))
-    }
-
-    fn save(&self, update: &Update<'_>) -> anyhow::Result<()> {
-        let mut metadata = self.identity.clone();
-        metadata.insert("step".into(), update.step().to_string());
-        Ok(weights::write(self.state, &update.state(), &metadata)?)
-    }
-
-    fn resume(&self, update: &mut Update<'_>) -> anyhow::Result<()> {
-        let (tensors, mut metadata) = weights::read_with_metadata(self.state)?;
-        let path = self.state.display();
-        let step = metadata.remove("step").with_context(|| format!("{path}: step is missing"))?;
-        let step = step.parse().with_context(|| format!("{path}: step is {step:?}, not a number"))?;
-        same(self.state, &metadata, self.identity)?;
-        update.restore(self.state, step, &tensors)
     }
 
     /// Loss and accuracy on held-out items: the same every time.
@@ -197,19 +179,6 @@ impl Pace {
     }
 }
 
-/// A state goes on only with what it was made with.
-fn same(path: &Path, found: &BTreeMap<String, String>, own: &BTreeMap<String, String>) -> anyhow::Result<()> {
-    for (name, own) in own {
-        let found = found.get(name).map_or("missing", String::as_str);
-        anyhow::ensure!(
-            found == own,
-            "{}: {name} is {found}, this training's is {own}; begin another one with another --out",
-            path.display()
-        );
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use tch::Device;
@@ -223,6 +192,7 @@ mod tests {
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::eyes::Eyes;
     use crate::nets::policy::PolicySpec;
+    use crate::nets::weights;
     use crate::run::material::{Maps, Material, Pool, Rows, Told, joined};
 
     const FRAMES: u64 = 24;
@@ -286,6 +256,7 @@ mod tests {
             training: (0..8).map(|i| span(i % 2, i / 2 * 6)).collect(),
             held_out: vec![span(0, 0), span(1, 0)],
             firsts: vec![0, 6, 12, 18, FRAMES as u32],
+            withheld: Default::default(),
             past: Past::Trajectory,
             named: Named::Own,
         }
@@ -312,8 +283,20 @@ mod tests {
         Ok(Tensor::from_slice(&rows).view([-1, 3]))
     }
 
+    /// What says that a checkpoint could not be kept.
+    const FULL: &str = "no space left";
+
     /// Trains, stopping once and going on when `stop_after` says so; the final state and numbers.
     fn trained(preset: &Preset, stop_after: u64) -> (weights::Tensors, Scalars) {
+        trained_keeping(preset, stop_after, &mut |_| Ok(()))
+    }
+
+    /// The same with what keeps checkpoints; goes on after it was [`FULL`], too.
+    fn trained_keeping(
+        preset: &Preset,
+        stop_after: u64,
+        keep: &mut dyn FnMut(u64) -> anyhow::Result<()>,
+    ) -> (weights::Tensors, Scalars) {
         let (features, items) = (features(preset), Items { named: preset.data.named, ..items() });
         let sentences = Tensor::from_slice2(&[[1.0f32, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let folder = tempfile::tempdir().unwrap();
@@ -344,12 +327,14 @@ mod tests {
                 Material { items: &items, maps: Maps::on(&features, Device::Cpu), told, pool, embed: &embed };
             let (judged, size) = (networks.critic.is_some(), (preset.seed, preset.training.batch));
             let batches = Batches::new(material, 2, judged, preset.chaining.as_ref(), size, Device::Cpu);
-            let trainer = Trainer { networks: &networks, preset, state: &state, identity: &identity };
+            let trainer = Trainer { networks: &networks, preset, state: State { path: &state, identity: &identity } };
             let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
             stop.store(false, Ordering::Relaxed);
-            let mut keep = |_, _: &mut Scalars| Ok(());
-            if trainer.train(batches, &items.held_out, &mut watch, &stop, &mut keep).unwrap() {
-                return (weights::read(&state).unwrap(), watch.last);
+            let mut keep = |step, _: &mut Scalars| keep(step);
+            match trainer.train(batches, &items.held_out, &mut watch, &stop, &mut keep) {
+                Ok(true) => return (weights::read(&state).unwrap(), watch.last),
+                Ok(false) => (),
+                Err(error) => assert_eq!(error.to_string(), FULL),
             }
         }
     }
@@ -399,17 +384,31 @@ mod tests {
     #[test]
     fn a_training_that_was_stopped_and_resumed_equals_the_uninterrupted_one_to_the_bit() {
         let _chance = crate::nets::testing::chance();
-        let full = ["l-bc", "sprint", "am"].map(|name| preset(name, 8));
+        let full = ["l-bc", "sprint", "am", "et"].map(|name| preset(name, 8));
         let mixed = Preset { precision: Precision::Mixed, ..preset("l-bc", 8) };
         for preset in full.into_iter().chain([mixed]) {
             let name = preset.name.as_str();
             let (whole, resumed) = (trained(&preset, u64::MAX).0, trained(&preset, 3).0);
             assert_eq!(whole.len(), resumed.len());
-            assert_eq!(whole.keys().any(|key| key.starts_with("critic.square.")), name != "l-bc");
+            assert_eq!(whole.keys().any(|key| key.starts_with("critic.square.")), preset.critic.is_some());
             for (tensor, other) in &whole {
                 assert_eq!(*other, resumed[tensor], "{name}: {tensor}");
             }
         }
+    }
+
+    #[test]
+    fn a_checkpoint_that_could_not_be_kept_is_kept_by_the_resumed_training() {
+        let _chance = crate::nets::testing::chance();
+        let preset = Preset { save_every: 4, ..preset("l-bc", 8) };
+        let mut kept = Vec::new();
+        let (state, _) = trained_keeping(&preset, u64::MAX, &mut |step| {
+            kept.push(step);
+            anyhow::ensure!(kept.len() != 2, FULL);
+            Ok(())
+        });
+        assert_eq!(kept, [4, 8, 8]);
+        assert_eq!(state, trained(&preset, u64::MAX).0);
     }
 
     #[test]
@@ -433,12 +432,5 @@ mod tests {
         let mut preset = preset("sprint", 2);
         preset.chaining.as_mut().unwrap().pairs = Pairs::InBatch;
         assert!(trained(&preset, u64::MAX).1.values["lead_q_loss"].is_finite());
-    }
-
-    #[test]
-    fn a_state_of_other_data_is_refused_with_both_values() {
-        let of = |dataset: &str| [("dataset".to_string(), dataset.to_string())].into();
-        let error = same(Path::new("out/state.safetensors"), &of("abc"), &of("def")).unwrap_err().to_string();
-        assert!(error.contains("dataset is abc") && error.contains("is def"), "{error}");
     }
 }

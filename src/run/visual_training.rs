@@ -1,8 +1,8 @@
 //! Trains the visual encoder on drawn frames of a dataset.
 
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use anyhow::ensure;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -12,6 +12,7 @@ use super::footage::Footage;
 use super::presets::Preset;
 use super::progress::{Report, Scalars};
 use super::sights::{MARKS, Sight};
+use super::state::State;
 use crate::algo::learner::Learner;
 use crate::domain::Class;
 use crate::house::House;
@@ -32,25 +33,28 @@ pub fn train(
     encoder: &VisualEncoder,
     footage: &Footage,
     preset: &Preset,
-    state: &Path,
+    state: State<'_>,
     report: &mut dyn Report,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
     let heads = SightHeads::new(&(store.root() / "heads"), encoder.spec().features(), MARKS as i64);
     let training = &preset.visual_training;
     let mut learner = Learner::new(store, training.optimisation.clone(), preset.seed);
-    if state.is_file() {
-        learner.resume(state)?;
+    if let Some((step, tensors)) = state.read()? {
+        learner.take_up(state.path, step, &tensors)?;
     }
-    let held_out = frames(footage, preset, 0, MEASURED, true);
+    let apart = footage.kept_apart(preset.hold_out);
+    ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
+    let drawn = |step, count, held_out| {
+        frames(footage, preset.seed, step, count, &|frame| apart[footage.trajectory_of(frame)] == held_out)
+    };
+    let held_out = if apart.contains(&true) { drawn(0, MEASURED, true) } else { Vec::new() };
     while !learner.is_done() {
         if stop.load(Ordering::Relaxed) {
-            learner.save(state)?;
+            state.write(learner.step(), &learner.state())?;
             return Ok(false);
         }
-        let step = learner.step();
-        let (images, known) =
-            batch(footage, encoder, &frames(footage, preset, step + 1, training.optimisation.batch, false))?;
+        let (images, known) = batch(footage, encoder, &drawn(learner.step() + 1, training.optimisation.batch, false))?;
         learner.begin_step();
         let loss = heads.loss(&encoder.forward_with(preset.precision, &images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
@@ -60,12 +64,12 @@ pub fn train(
             scalars.add("depth", &loss.depth);
             scalars.add("held", &loss.held);
         }
-        if learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done() {
+        if (learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done()) && !held_out.is_empty() {
             measure(encoder, &heads, footage, &held_out, &mut scalars)?;
         }
         report.step(&scalars)?;
         if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
-            learner.save(state)?;
+            state.write(learner.step(), &learner.state())?;
         }
     }
     Ok(true)
@@ -91,19 +95,14 @@ fn measure(
     Ok(())
 }
 
-/// The frames of a step: a function of the preset's seed and the step. Held-out trajectories are kept apart.
-fn frames(footage: &Footage, preset: &Preset, step: u64, count: usize, held_out: bool) -> Vec<usize> {
-    let mut rng = ChaCha8Rng::seed_from_u64(preset.seed ^ 0x5157);
+/// The frames of a step, of those that are wanted: a function of the seed and the step. There has to be one.
+fn frames(footage: &Footage, seed: u64, step: u64, count: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5157);
     rng.set_stream(step);
-    let mut frames = Vec::with_capacity(count);
-    let any = preset.hold_out > 1 && footage.trajectories.len() >= preset.hold_out;
-    while frames.len() < count {
-        let frame = rng.random_range(0..footage.frames());
-        if !any || footage.is_held_out(frame, preset.hold_out) == held_out {
-            frames.push(frame);
-        }
-    }
-    frames
+    std::iter::repeat_with(|| rng.random_range(0..footage.frames()))
+        .filter(|&frame| wanted(frame))
+        .take(count)
+        .collect()
 }
 
 /// Draws frames: what the encoder reads and what is known of them.
@@ -138,9 +137,8 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
 #[cfg(test)]
 pub mod testing {
     use super::*;
-    use crate::data::dataset::{Dataset, Manifest};
-    use crate::domain::task::SceneRef;
-    use crate::domain::{Action, ActionType, Trajectory};
+    use crate::data::dataset::{self, Dataset};
+    use crate::domain::{Action, ActionType, Trajectory, trajectory};
     use crate::house::testing::kitchen;
 
     /// Two turns around in the test kitchen.
@@ -151,30 +149,13 @@ pub mod testing {
         writer.scene(&scene).unwrap();
         for (id, turn) in [("left", ActionType::RotateLeft), ("right", ActionType::RotateRight)] {
             let trajectory = Trajectory {
-                id: id.into(),
-                split: "train".into(),
-                scene: SceneRef::Named(scene.name.clone()),
                 start: start.clone(),
                 actions: vec![Action::navigate(turn); 4],
-                roles: Vec::new(),
-                skills: Vec::new(),
-                skill_starts: Vec::new(),
-                goal: None,
-                annotations: Vec::new(),
-                boxes: Vec::new(),
-                choices: Vec::new(),
+                ..trajectory::testing::empty(id, &scene.name)
             };
             writer.trajectory(&trajectory).unwrap();
         }
-        let manifest = Manifest {
-            format_version: Manifest::FORMAT,
-            source: "test".into(),
-            counts: Default::default(),
-            scenes: 1,
-            held_out: Vec::new(),
-            skipped: Vec::new(),
-        };
-        writer.finish(&manifest).unwrap();
+        writer.finish(&dataset::testing::manifest(1, &[])).unwrap();
         Footage::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
     }
 
@@ -191,6 +172,8 @@ pub mod testing {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::testing::{Notes, footage};
     use super::*;
     use crate::nets::precision::Precision;
@@ -213,9 +196,10 @@ mod tests {
             let store = nn::VarStore::new(Device::Cpu);
             let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
             let folder = tempfile::tempdir().unwrap();
-            let (state, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+            let (path, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+            let state = State { path: &path, identity: &BTreeMap::new() };
             let mut notes = Notes(Vec::new());
-            assert!(train(&store, &encoder, &footage, &preset, &state, &mut notes, &stop).unwrap());
+            assert!(train(&store, &encoder, &footage, &preset, state, &mut notes, &stop).unwrap());
             notes.0.iter().map(|scalars| scalars.values["marks"]).collect()
         };
         let (full, mixed) = (losses(Precision::Full, 90), losses(Precision::Mixed, 2));

@@ -3,7 +3,7 @@
 use super::files::{Coordinate, HighAction, LowAction, SceneData, TrajData};
 use super::layout::{cell_at, heading_at};
 use super::merge::Merge;
-use super::names::{FARTHEST, Name, Part, class_named};
+use super::names::{FARTHEST, Name, class_named};
 use crate::domain::place::Pose;
 use crate::domain::skill::GoalKind;
 use crate::domain::trajectory::Annotation;
@@ -315,12 +315,4 @@ fn goal(data: &TrajData) -> Result<Goal, String> {
         movable: class("mrecep_target", &params.mrecep_target)?,
         lamp: class("toggle_target", &params.toggle_target)?,
     })
-}
-
-/// Whether a name means a slice.
-pub fn slice_number(name: Name) -> Option<u8> {
-    match name.part {
-        Part::Slice(number) => Some(number),
-        Part::Whole | Part::Basin => None,
-    }
 }

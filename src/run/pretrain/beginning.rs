@@ -11,9 +11,11 @@ use crate::agent::checkpoint::Networks;
 use crate::agent::config::Config;
 use crate::nets::eyes::Eyes;
 use crate::nets::visual::VisualEncoder;
+use crate::nets::weights;
 use crate::run::footage::Footage;
 use crate::run::presets::Sight;
 use crate::run::progress::Report;
+use crate::run::state::State;
 use crate::run::visual_training;
 
 impl Pretraining {
@@ -57,16 +59,17 @@ impl Pretraining {
     pub(super) fn train_visual(
         &self,
         networks: &Networks,
-        footage: &Footage,
+        (footage, data): (&Footage, &str),
         report: &mut dyn Report,
         stop: &AtomicBool,
     ) -> anyhow::Result<bool> {
         let (Eyes::House { store: own, .. }, None) = (&networks.eyes, &self.visual_from) else { return Ok(true) };
-        let state = self.out.join("training/visual.safetensors");
+        let path = self.out.join("training/visual.safetensors");
+        let state = State { path: &path, identity: &self.visual_identity(data) };
         // The heads live in a store of their own shape, so the trained encoder is copied out of it.
         let mut store = VarStore::new(self.device);
         let encoder = VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
-        let finished = visual_training::train(&store, &encoder, footage, &self.preset, &state, report, stop)?;
+        let finished = visual_training::train(&store, &encoder, footage, &self.preset, state, report, stop)?;
         store.freeze();
         copy(&store, "encoder.", own)?;
         Ok(finished)
@@ -132,12 +135,5 @@ impl Pretraining {
 
 /// Copies the tensors of one store, those under `prefix`, over another's.
 fn copy(from: &VarStore, prefix: &str, to: &VarStore) -> anyhow::Result<()> {
-    let from = from.variables();
-    tch::no_grad(|| {
-        for (name, mut tensor) in to.variables() {
-            let name = format!("{prefix}{name}");
-            tensor.f_copy_(from.get(&name).with_context(|| format!("the tensor {name} is missing"))?)?;
-        }
-        Ok(())
-    })
+    weights::copy(&from.variables().into_iter().collect(), prefix, to)
 }

@@ -53,24 +53,31 @@ impl Pretraining {
                     (Sight::House, None) => self.preset.visual_training.optimisation.steps,
                 },
                 policy_steps,
+                precision: self.preset.precision,
                 averaged: None,
             },
         })
     }
 
-    /// What a saved state belongs to.
-    pub(super) fn identity(&self, encoder: &str, data: &str, config: &Config) -> BTreeMap<String, String> {
-        [
-            ("format_version", "1".to_string()),
-            ("dataset", data.to_string()),
+    /// What a saved state of the visual encoder belongs to; `data` are the datasets' digests.
+    pub(super) fn visual_identity(&self, data: &str) -> BTreeMap<String, String> {
+        [("format_version", "1".to_string()), ("dataset", data.to_string()), ("seed", self.preset.seed.to_string())]
+            .map(|(name, value)| (name.to_string(), value))
+            .into()
+    }
+
+    /// What a saved state belongs to: besides, `items` is the digest of what is learned and how it is told.
+    pub(super) fn identity(&self, encoder: &str, data: &str, items: &str, config: &Config) -> BTreeMap<String, String> {
+        let mut identity = self.visual_identity(data);
+        let further = [
+            ("items", items.to_string()),
             ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
             ("visual_encoder", encoder.to_string()),
             ("sentence_encoder", config.sentence_encoder.digest.clone()),
             ("embedding", config.policy.embedding.to_string()),
-            ("seed", self.preset.seed.to_string()),
-        ]
-        .map(|(name, value)| (name.to_string(), value))
-        .into()
+        ];
+        identity.extend(further.map(|(name, value)| (name.to_string(), value)));
+        identity
     }
 
     /// The House encoder's size, where there is one.

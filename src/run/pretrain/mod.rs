@@ -18,6 +18,7 @@ use super::footage::Footage;
 use super::material::{Embed, Maps, Material, Pool, Rows, Told, joined};
 use super::presets::Preset;
 use super::progress::{Journal, Report, Scalars};
+use super::state::State;
 use super::trainer::Trainer;
 use super::trials::{self, Trials};
 use crate::agent::balance::Balance;
@@ -92,22 +93,27 @@ impl Pretraining {
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
         let mut report = Events::open(&training, &mut report)?;
-        if !self.train_visual(&networks, &footage, &mut report, stop)? {
-            return Ok(Trained::Stopped);
-        }
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
         let digest = digests.join("-");
+        if !self.train_visual(&networks, (&footage, &digest), &mut report, stop)? {
+            return Ok(Trained::Stopped);
+        }
         let encoder = networks.eyes.frozen()?;
         let Some(features) = encoding::features(&*encoder, &datasets, &footage, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
         let summaries = self.summaries()?;
-        let source = Source { trajectories: &footage.trajectories, held_out: &footage.held_out, summaries: &summaries };
-        let items = Items::of(&source, footage.labels()?, &self.preset.data, self.preset.hold_out)?;
+        let source = Source {
+            trajectories: &footage.trajectories,
+            apart: &footage.kept_apart(self.preset.hold_out),
+            held_out: &footage.held_out,
+            summaries: &summaries,
+        };
+        let items = Items::of(&source, footage.labels()?, &self.preset.data)?;
         anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
         let words = self.preset.policy.attention.as_ref().map(|attention| {
             let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
-            Vocabulary::of(texts, attention.words as usize)
+            Vocabulary::of(texts, attention.words)
         });
         let embed = |texts: &[&str]| -> anyhow::Result<Tensor> {
             let embedder = self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -125,12 +131,10 @@ impl Pretraining {
             let words = words.as_ref().map(|words| words.words().to_vec());
             Ok(Config { words, resnet18: resnet18.clone(), balance: Some(balance.clone()), ..config })
         };
-        let trainer = Trainer {
-            networks: &networks,
-            preset: &self.preset,
-            state: &training.join("state.safetensors"),
-            identity: &self.identity(encoder.digest(), &digest, &config(0)?),
-        };
+        let path = training.join("state.safetensors");
+        let identity = self.identity(encoder.digest(), &digest, &items.digest(), &config(0)?);
+        let trainer =
+            Trainer { networks: &networks, preset: &self.preset, state: State { path: &path, identity: &identity } };
         let batches = Batches::new(
             material,
             self.preset.policy.history,
