@@ -7,18 +7,32 @@
 # DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), EYES a checkpoint whose visual encoder
 # all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. CLONING (updates of cloning, which
 # methods that learn from the same words share), STEPS (updates after that), SEEDS (as "1 2 3"), PRECISION (mixed, for
-# processors that compute with bfloat16) and JOBS may be set; HOUSES may name further datasets to learn from.
+# processors that compute with bfloat16) and JOBS may be set; HOUSES may name further datasets to learn from, SPRINT another
+# program than target/release/sprint.
 set -euo pipefail
-if [ $# -lt 3 ]; then
-    sed -n '2,10s/^# \{0,1\}//p' "$0"
+complain() {
+    echo "$1" >&2
     exit 1
-fi
+}
+[ $# -ge 3 ] || complain "$(sed -n '2,11s/^# \{0,1\}//p' "$0")"
 data=$1 eyes=$2 out=$3
 shift 3
+known=(sprint iql-primitive l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
 methods=("$@")
-[ $# -gt 0 ] || methods=(sprint iql-primitive l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
+[ $# -gt 0 ] || methods=("${known[@]}")
+for method in "${methods[@]}"; do
+    [[ " ${known[*]} " == *" $method "* ]] || complain "there is no method $method: name some of ${known[*]}"
+done
 read -ra seeds <<<"${SEEDS:-1}"
+cloning=${CLONING:-15000} steps=${STEPS:-3000}
 sprint=${SPRINT:-target/release/sprint}
+command -v "$sprint" >/dev/null || complain "there is no $sprint: \`make build\` makes it, or SPRINT names another"
+
+# What was begun with other settings is not gone on with: tables would mix them.
+settings="data=$data eyes=$eyes cloning=$cloning steps=$steps precision=${PRECISION:-full} houses=${HOUSES:-}"
+mkdir -p "$out"
+[ -f "$out/settings" ] || echo "$settings" >"$out/settings"
+[ "$settings" = "$(cat "$out/settings")" ] || complain "$out was begun with $(cat "$out/settings"), not $settings: name another OUT"
 
 # pretrain SEED NAME METHOD STEPS [WHAT THE PRESET SAYS OTHERWISE] [OPTION ...]; valid_seen is what is held out.
 pretrain() {
@@ -35,7 +49,7 @@ train() {
     local method=$1 seed=$2 clone base=l-bc-agg otherwise=''
     case $method in
     et)
-        pretrain "$seed" et et $((${CLONING:-15000} + ${STEPS:-3000})) ''
+        pretrain "$seed" et et $((cloning + steps)) ''
         return
         ;;
     am) clone=clone-goals base=am otherwise=$'critic = false\niql = false\nchaining = false' ;;
@@ -43,8 +57,8 @@ train() {
     sprint-concat-agg) clone=clone-concat otherwise=$'[data]\ncomposites = "concat"' ;;
     *) clone=clone-agg ;;
     esac
-    pretrain "$seed" $clone $base "${CLONING:-15000}" "$otherwise"
-    pretrain "$seed" "$method" "$method" "${STEPS:-3000}" $'[training.schedule]\nlearning_rate = 3e-4' \
+    pretrain "$seed" $clone $base "$cloning" "$otherwise"
+    pretrain "$seed" "$method" "$method" "$steps" $'[training.schedule]\nlearning_rate = 3e-4' \
         --policy-from "$out/$seed/$clone"
 }
 

@@ -61,7 +61,9 @@ fn sampling_is_the_same_for_the_same_seed() {
     assert!(ended.stderr.contains("a.json") && ended.stderr.contains("--force"), "{}", ended.stderr);
     let shown = sprint.run("tasks show a.json#2");
     assert!(shown.stdout.contains("instruction") && shown.stdout.contains("subtask 0"), "{}", shown.stdout);
-    assert_eq!(sprint.run("tasks show a.json").stdout.lines().count(), 5);
+    let listed = sprint.run("tasks show a.json").stdout;
+    assert_eq!(listed.lines().count(), 5);
+    assert!(listed.lines().nth(1).unwrap().trim_start().starts_with("2 "), "counted as #2 counts: {listed}");
     assert_eq!(sprint.run("tasks show a.json#99").code, Some(1));
 }
 
@@ -75,6 +77,29 @@ fn a_missed_threshold_ends_with_2() {
     let ended = sprint.run("eval --tasks tasks.json --policy random --fail-below succes=1");
     assert_eq!(ended.code, Some(2), "bad usage");
     assert!(ended.stderr.contains("succes"), "{}", ended.stderr);
+}
+
+#[test]
+fn whoever_reads_may_leave_and_the_verdict_is_the_same() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 3, 2);
+    let unread = |line: &str| {
+        let (out, err) = (std::process::Stdio::piped(), std::process::Stdio::piped());
+        let mut child = sprint.command(line).stdout(out).stderr(err).spawn().unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        child.wait().unwrap().code()
+    };
+    let line = "eval --tasks tasks.json --policy random --fail-below success=0.99 --out";
+    assert_eq!(unread(&format!("{line} run")), Some(2));
+    assert_eq!(unread("compare run run --fail-below success=0.99"), Some(2));
+    assert_eq!(unread("verify run"), Some(0));
+    assert_eq!(unread("collect D --episodes 40 --lengths 1 --annotations 1"), Some(0));
+    assert!(sprint.path("D/dataset.json").exists());
+    let episodes = sprint.read("run/episodes.jsonl");
+    std::fs::write(sprint.path("run/episodes.jsonl"), episodes.lines().next().unwrap().to_owned() + "\n").unwrap();
+    assert_eq!(unread("verify run"), Some(3));
+    let said = sprint.run("verify run").stdout;
+    assert!(said.contains("the summary tells of 2, there are 1") && said.ends_with("different\n"), "{said}");
 }
 
 #[test]

@@ -157,6 +157,18 @@ fn without_a_terminal_it_says_what_to_do() {
 }
 
 #[test]
+fn a_script_is_told_that_its_agent_cannot_be_loaded() {
+    let script = |agent: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("sprint").unwrap();
+        command.args(["explore", "--plain", "--checkpoint", agent]).write_stdin("quit\n").output().unwrap()
+    };
+    let ended = script("nowhere");
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("nowhere holds no checkpoint"), "{said}");
+}
+
+#[test]
 fn plain_mode_takes_verbs_and_prints_a_line_a_step_without_escape_codes() {
     let verbs = "look\ncandidates\ninstruct find the quince\nstep 3\ndo RotateLeft\ndo 99\ndance\nreset\nquit\n";
     let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_sprint"))

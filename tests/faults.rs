@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::program::Sprint;
+use crate::program::{Sprint, wait_for};
 
 #[test]
 fn a_full_disk_is_one_clear_error_and_the_run_goes_on_when_there_is_room() {

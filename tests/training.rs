@@ -138,7 +138,7 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     assert!(sprint.read("lighter/config.json").contains("\"strength\": 0.2"), "{}", sprint.read("lighter/config.json"));
     assert!(sprint.read("lighter/README.md").contains("20 % of what is merely frequent"));
     let refused = sprint.run("average agent --balance 2 --out none").stderr;
-    assert!(refused.contains("agent/config.json: balance.strength is 2, which is not a share"), "{refused}");
+    assert!(refused.contains("--balance 2 for agent: balance.strength is 2, which is not a share"), "{refused}");
     done(&sprint, "average agent --weighing 2.5 --out wiser --appraise 1");
     assert!(sprint.read("wiser/config.json").contains("\"weighing\": 2.5"), "{}", sprint.read("wiser/config.json"));
     assert!(
@@ -147,7 +147,7 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
         sprint.read("wiser/README.md")
     );
     let refused = sprint.run("average agent --weighing=-1 --out none").stderr;
-    assert!(refused.contains("agent/config.json: weighing is -1, which is no weight"), "{refused}");
+    assert!(refused.contains("--weighing -1 for agent: weighing is -1, which is no weight"), "{refused}");
     let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
     let refused = sprint.run(&format!("average {first} --balance 0.2 --out none")).stderr;
     assert!(refused.contains("how often each action was shown was not noted"), "{refused}");
@@ -171,6 +171,14 @@ fn a_training_begins_with_the_networks_it_was_given() {
     std::fs::write(sprint.path("still.toml"), still).unwrap();
     let from = "--visual-from agent --policy-from agent --critic-from agent";
     done(&sprint, &format!("pretrain D --preset still.toml --steps 1 {from} --out still"));
+    let card = sprint.read("still/README.md");
+    let told = [
+        ": 1 steps of the policy, seed 1",
+        "the eyes of `agent` (2 steps)",
+        "policy began as that of `agent` (preset `sprint`, 6 steps of the policy)",
+        "critic began as that of `agent`",
+    ];
+    assert!(told.iter().all(|told| card.contains(told)), "{card}");
     let tensors = |folder: &str| weights::read(&sprint.path(folder).join("model.safetensors")).unwrap();
     let (begun, ended) = (tensors("agent"), tensors("still"));
     // Batch norm counts what it saw, even where nothing is learned.
@@ -210,7 +218,18 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     assert!(again.stderr.contains("holds a training already"), "{}", again.stderr);
     let other = sprint.run("pretrain D --preset tiny.toml --out agent --steps 4 --resume");
     assert_eq!(other.code, Some(1));
-    assert!(other.stderr.contains("begun with another preset"), "{}", other.stderr);
+    let said = "begun with another preset: steps = 2 there, steps = 4 here";
+    assert!(other.stderr.contains(said), "{}", other.stderr);
+    std::fs::remove_file(sprint.path("agent/training/state.safetensors")).unwrap();
+    std::fs::remove_file(sprint.path("agent/training/visual.safetensors")).unwrap();
+    let over = sprint.run("pretrain D --preset tiny.toml --out agent");
+    assert!(over.stderr.contains("agent holds a checkpoint already"), "{}", over.stderr);
+    std::fs::write(sprint.path("odd.toml"), TINY.replace("hold_out = 3", "hold_out = 1")).unwrap();
+    let nothing = sprint.run("pretrain D --preset odd.toml --out again");
+    assert!(nothing.stderr.contains("every trajectory is held out"), "{}", nothing.stderr);
+    done(&sprint, "pretrain D --preset tiny.toml --out again --steps 2");
+    let data = sprint.run("collect D --episodes 1");
+    assert!(data.stderr.contains("D holds a dataset already"), "{}", data.stderr);
     let seeing = sprint.run("pretrain D --preset l-bc --out other --visual-from agent");
     assert_eq!(seeing.code, Some(1));
     assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);

@@ -51,6 +51,18 @@ pub struct SentenceSpec {
     pub digest: String,
 }
 
+/// A checkpoint that another one began with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Beginning {
+    /// Its folder's name.
+    pub name: String,
+    /// The preset it was trained with.
+    pub preset: String,
+    /// Steps of its policy's training.
+    pub policy_steps: u64,
+}
+
 /// Where a checkpoint comes from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,6 +82,15 @@ pub struct Provenance {
     /// How wide the numbers were that the networks computed with while they learned.
     #[serde(default)]
     pub precision: Precision,
+    /// Whose eyes it has, where they were not trained with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visual_from: Option<Beginning>,
+    /// Whose policy its own began as.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy_from: Option<Beginning>,
+    /// Whose critic its own began as.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub critic_from: Option<Beginning>,
     /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u64>,
@@ -121,6 +142,7 @@ impl Config {
     /// # Errors
     /// When the file is missing or malformed, of another format version, or for other classes or actions.
     pub fn read(folder: &Path) -> anyhow::Result<Config> {
+        Config::check_there(folder)?;
         let path = folder.join("config.json");
         let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
         let value: serde_json::Value =
@@ -152,6 +174,19 @@ impl Config {
         );
         config.check().with_context(|| path.display().to_string())?;
         Ok(config)
+    }
+
+    /// Whether there is a checkpoint at all.
+    ///
+    /// # Errors
+    /// Says what would make one.
+    pub fn check_there(folder: &Path) -> anyhow::Result<()> {
+        ensure!(
+            folder.join("config.json").exists(),
+            "{} holds no checkpoint (config.json is missing); `sprint pretrain` makes one, and checkpoints/ holds some",
+            folder.display()
+        );
+        Ok(())
     }
 
     /// What the agent sees through: a House encoder with fresh weights, or ResNet-18 with the very weights it was trained on.
@@ -311,6 +346,9 @@ pub(super) mod tests {
                 visual_steps: 0,
                 policy_steps: 0,
                 precision: Precision::Full,
+                visual_from: None,
+                policy_from: None,
+                critic_from: None,
                 averaged: None,
             },
         }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::bar::Bars;
+use super::streams::say;
 use crate::agent::LearnedPolicy;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
@@ -16,7 +17,6 @@ use crate::run::presets::Appraisal;
 ///
 /// # Errors
 /// When it cannot be loaded, or the card not be written.
-#[allow(clippy::print_stderr)]
 pub fn appraised(
     folder: &Path,
     appraisal: &Appraisal,
@@ -28,7 +28,7 @@ pub fn appraised(
     bars.end();
     let text = card(&name(folder), &Config::read(folder)?, &findings);
     whole::write(&folder.join("README.md"), text.as_bytes())?;
-    eprint!("{text}");
+    say(text.trim_end());
     Ok(())
 }
 

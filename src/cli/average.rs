@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::Args;
 
 use super::Ending;
 use super::appraised::appraised;
 use super::bar::Bars;
 use crate::agent::average::average;
+use crate::data::vacant;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -45,23 +46,19 @@ impl Average {
     /// # Errors
     /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
     pub fn run(self) -> anyhow::Result<Ending> {
-        ensure!(
-            !self.out.join("config.json").exists(),
-            "{} holds a checkpoint already: name another folder",
-            self.out.display()
-        );
+        vacant::check(&self.out)?;
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;
-        let file = || self.checkpoints[0].join("config.json").display().to_string();
+        let first = self.checkpoints[0].display();
         if let Some(strength) = self.balance {
-            config.set_balance(strength).with_context(file)?;
+            config.set_balance(strength).with_context(|| format!("--balance {strength} for {first}"))?;
         }
         if let Some(weight) = self.weighing {
-            config.set_weighing(weight).with_context(file)?;
+            config.set_weighing(weight).with_context(|| format!("--weighing {weight} for {first}"))?;
         }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
-        std::fs::create_dir_all(&self.out)?;
+        std::fs::create_dir_all(&self.out).with_context(|| format!("cannot make {}", self.out.display()))?;
         networks.save(&self.out, &config)?;
         let tasks = self.appraise as usize;
         let swaps = if config.policy.goal.is_some() { 0 } else { tasks / 2 };

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::streams::say;
 use crate::run::progress::{Report, Scalars};
 
 /// Shows scalars as they come. Without a terminal, a line now and then.
@@ -44,7 +45,6 @@ impl Bars {
 }
 
 impl Report for Bars {
-    #[allow(clippy::print_stderr)]
     fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
         if self.stage != scalars.stage {
             self.begin(scalars);
@@ -60,7 +60,7 @@ impl Report for Bars {
             self.said = Instant::now();
             let done = (scalars.step - self.first).max(1) as f64;
             let left = self.begun.elapsed().as_secs_f64() / done * (scalars.of - scalars.step.min(scalars.of)) as f64;
-            eprintln!("{} {}/{}  {left:.0} s left  {numbers}", scalars.stage, scalars.step, scalars.of);
+            say(&format!("{} {}/{}  {left:.0} s left  {numbers}", scalars.stage, scalars.step, scalars.of));
         }
         Ok(())
     }

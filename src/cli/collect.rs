@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use super::Ending;
 use super::bar::Bars;
 use super::stop;
+use super::streams::say;
 use crate::data::taskset;
 use crate::house::expert::Pace;
 use crate::nets::device::best_device;
@@ -73,7 +74,6 @@ impl Collect {
     ///
     /// # Errors
     /// When the folder cannot be written to.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let Where::Generated = self.scenes;
         ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
@@ -105,11 +105,11 @@ impl Collect {
         let collected = collection.run(&mut bars, &stop)?;
         bars.end();
         let at = collection.out.display();
-        eprintln!(
+        say(&format!(
             "{}{} demonstrations in {at}",
             if collected.stopped { "stopped; the first " } else { "" },
             collected.trajectories
-        );
+        ));
         if collected.stopped {
             return Ok(Ending::Interrupted);
         }

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Ending;
+use super::streams::say;
+use super::{Ending, streams};
 use crate::data::json;
 use crate::run::comparison::Comparison;
 use crate::run::finished::FinishedRun;
@@ -36,14 +37,13 @@ impl Compare {
     ///
     /// # Errors
     /// When a folder holds no run, or two have no episode in common.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let runs: Vec<FinishedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
         let (comparison, summaries) = Comparison::of(&runs)?;
         if let Some(path) = &self.out {
             json::write_pretty(path, &comparison)?;
         }
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         if self.json {
             writeln!(out, "{}", serde_json::to_string(&comparison)?)?;
         } else {
@@ -52,13 +52,13 @@ impl Compare {
         out.flush()?;
         let mut ending = Ending::Ok;
         if let Some(most) = self.max_regressions.filter(|&most| comparison.regressions() > most) {
-            eprintln!("{} regressions, at most {most} are allowed", comparison.regressions());
+            say(&format!("{} regressions, at most {most} are allowed", comparison.regressions()));
             ending = Ending::BelowThreshold;
         }
         let last = summaries.last();
         for (threshold, summary) in self.fail_below.iter().filter_map(|threshold| Some((threshold, last?))) {
             if let Some(measured) = threshold.missed_by(summary)? {
-                eprintln!("{threshold} was missed: {measured:.4}");
+                say(&format!("{threshold} was missed: {measured:.4}"));
                 ending = Ending::BelowThreshold;
             }
         }

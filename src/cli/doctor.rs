@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use super::{Ending, logging, policies};
+use super::{Ending, logging, policies, streams};
 use crate::nets::{device, home, sentence};
 
 /// Prints what was found.
@@ -46,7 +46,7 @@ impl Doctor {
     pub fn run(self) -> anyhow::Result<Ending> {
         let findings =
             [libtorch(), computes_on(), encoder(), graphics(), threads(), cache(), checkpoints(), log_file()];
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         if self.json {
             let mut object = Map::new();
             object.insert("ok".into(), json!(findings.iter().all(|finding| finding.ok)));

@@ -7,6 +7,7 @@ use clap::Args;
 use super::Ending;
 use super::bar::Bars;
 use super::stop;
+use super::streams::say;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::Config;
 use crate::data::Dataset;
@@ -42,7 +43,6 @@ impl Encode {
     ///
     /// # Errors
     /// When the datasets or the encoder cannot be read, or a cache not be written.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let encoder = self.encoder.load()?;
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
@@ -53,12 +53,12 @@ impl Encode {
         let features = features(&*encoder, &datasets, &footage, &mut bars, &stop)?;
         bars.end();
         let Some(features) = features else {
-            eprintln!("stopped; the same command goes on from here");
+            say("stopped; the same command goes on from here");
             return Ok(Ending::Interrupted);
         };
         let size = (features.len() as f64 * features.width() as f64) / 1e9;
         let seconds = begun.elapsed().as_secs_f64();
-        eprintln!("{} frames, {size:.2} GB of features, in {seconds:.0} s", features.len());
+        say(&format!("{} frames, {size:.2} GB of features, in {seconds:.0} s", features.len()));
         Ok(Ending::Ok)
     }
 }

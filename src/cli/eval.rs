@@ -8,8 +8,9 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::Ending;
 use super::policies::PolicyChoice;
+use super::streams::say;
+use super::{Ending, streams};
 use crate::data::taskset;
 use crate::house::grading::Grading;
 use crate::run::evaluate::{Evaluation, Progress};
@@ -149,7 +150,7 @@ impl Eval {
 
 /// Prints what was measured to standard output: a page, or a JSON object in a line.
 pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = streams::out();
     if json {
         writeln!(out, "{}", serde_json::to_string(summary)?)?;
     } else {
@@ -209,9 +210,4 @@ impl Meter {
             bar.finish_and_clear();
         }
     }
-}
-
-#[allow(clippy::print_stderr)]
-fn say(text: &str) {
-    eprintln!("{text}");
 }

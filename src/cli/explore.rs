@@ -40,7 +40,7 @@ struct Origin {
     /// Start where a demonstration of this scene of the dataset began
     #[arg(long, value_name = "NAME", conflicts_with = "task")]
     scene: Option<String>,
-    /// Start at task N (from 1) of a task file
+    /// Start at a task of a file: its id, or its number from 1
     #[arg(long, value_name = "FILE#N")]
     task: Option<String>,
     /// The dataset folder that --scene looks in
@@ -164,7 +164,15 @@ impl Explore {
             PolicyName::Random => PolicyKind::Random,
         };
         let Explore { display, from, .. } = self;
-        display.show(kind, manual, move || from.engine(kind))
+        // The screen shows what is wrong with an agent; a script is told by the exit code.
+        let needed = display.plain && from.checkpoint.is_some() && kind == PolicyKind::Agent;
+        display.show(kind, manual, move || {
+            let mut engine = from.engine(kind)?;
+            if needed {
+                engine.choose(kind)?;
+            }
+            Ok(engine)
+        })
     }
 }
 
@@ -178,16 +186,12 @@ impl Origin {
 
     fn start(&self) -> anyhow::Result<(Start, Scenes)> {
         if let Some(task) = &self.task {
-            let (file, number) = task.rsplit_once('#').unwrap_or((task, "1"));
-            let number: usize = number.parse().with_context(|| format!("--task {task}: {number:?} is not a number"))?;
-            let path = PathBuf::from(file);
+            let (path, wanted) = taskset::split_reference(task);
             let set = taskset::read(&path)?.value;
             let scenes = Scenes::of(&path, &set);
-            let count = set.tasks.len();
-            if !(1..=count).contains(&number) {
-                bail!("{file}: there is no task {number}; the set has tasks 1 to {count}");
-            }
-            return Ok((Start::Tasks { tasks: set.tasks, index: number - 1 }, scenes));
+            let picked = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
+            let index = set.tasks.iter().position(|task| task.id == picked.id).unwrap_or(0);
+            return Ok((Start::Tasks { tasks: set.tasks, index }, scenes));
         }
         let none = Scenes::in_folder(None);
         if let Some(name) = &self.scene {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, open::Reference};
+use super::{Ending, open::Reference, streams};
 use crate::run::export;
 use crate::run::recording::Recording;
 
@@ -33,7 +33,7 @@ impl Export {
         let episode = &recorded.episodes[reference.episode];
         let (_, task, setting) = recorded.setting(episode)?;
         let recording = Recording::of(&setting, task, episode)?;
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         for path in &self.out {
             let size = export::write(&recording, reference.step.unwrap_or(0), path)?;
             writeln!(out, "{}: {:.1} kB", path.display(), size as f64 / 1000.0)?;

@@ -6,6 +6,7 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Ending;
+use super::streams::say;
 use crate::data::alfred::{self, Progress};
 
 /// Makes a dataset folder.
@@ -45,7 +46,6 @@ impl Import {
 }
 
 impl Alfred {
-    #[allow(clippy::print_stderr)]
     fn run(self) -> anyhow::Result<Ending> {
         let bar = ProgressBar::new(0).with_style(style());
         let show = |progress: Progress| {
@@ -66,26 +66,26 @@ impl Alfred {
         let summary = summary?;
         let manifest = &summary.manifest;
         for skip in &manifest.skipped {
-            eprintln!("skipped: {}: {}", skip.file, skip.reason);
+            say(&format!("skipped: {}: {}", skip.file, skip.reason));
         }
         for (split, counts) in &manifest.counts {
-            eprintln!(
+            say(&format!(
                 "{split}: {} trajectories, {} annotated skills ({} aligned), {} longer spans ({} to train on)",
                 counts.trajectories,
                 counts.annotated_primitives,
                 counts.aligned_primitives,
                 counts.spans,
                 counts.spans_after_holdout
-            );
+            ));
         }
         for set in &summary.sets {
             match &set.tasks {
-                Ok(tasks) => eprintln!("{}: {tasks} tasks", set.name),
-                Err(reason) => eprintln!("{}: left out: {reason}", set.name),
+                Ok(tasks) => say(&format!("{}: {tasks} tasks", set.name)),
+                Err(reason) => say(&format!("{}: left out: {reason}", set.name)),
             }
         }
         let skipped = manifest.skipped.len();
-        eprintln!("{} scenes in {}; {skipped} files skipped", manifest.scenes, self.out.display());
+        say(&format!("{} scenes in {}; {skipped} files skipped", manifest.scenes, self.out.display()));
         Ok(if skipped == 0 { Ending::Ok } else { Ending::SomeFailed })
     }
 }

@@ -29,6 +29,7 @@ mod rooms;
 mod schema;
 mod shell;
 mod stop;
+mod streams;
 mod tasks;
 mod verify;
 
@@ -155,7 +156,7 @@ fn run(command: Command) -> anyhow::Result<Ending> {
     }
 }
 
-/// Whether all that went wrong is that whoever reads the output (`| head`) has seen enough.
+/// Whether all that went wrong is that whoever reads a command's answers as they come (`| head`) has seen enough.
 fn reader_left(error: &anyhow::Error) -> bool {
     let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
     kind == Some(std::io::ErrorKind::BrokenPipe)
@@ -167,7 +168,6 @@ fn threads(asked: Option<u16>) -> usize {
 }
 
 /// The one place that prints an error: its chain, outermost first.
-#[allow(clippy::print_stderr)]
 fn complain(error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    streams::say(&format!("error: {error:#}"));
 }

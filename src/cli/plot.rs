@@ -1,10 +1,11 @@
 //! `sprint plot`: draws the curves of trainings.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Ending;
+use super::{Ending, streams};
 use crate::data::whole;
 use crate::run::curves;
 
@@ -27,7 +28,6 @@ impl PlotCurves {
     ///
     /// # Errors
     /// When a training's progress cannot be read, or the picture not be written.
-    #[allow(clippy::print_stdout)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let read = |folder: &PathBuf| Ok((folder.display().to_string(), curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
@@ -37,11 +37,12 @@ impl PlotCurves {
             "svg" | "png" => vec![self.out.clone()],
             _ => ["svg", "png"].map(|kind| PathBuf::from(format!("{}.{kind}", self.out.display()))).to_vec(),
         };
+        let mut out = streams::out();
         for file in files {
             let is_svg = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
             let bytes = if is_svg { plot.svg().into_bytes() } else { plot.png()? };
             whole::write(&file, &bytes)?;
-            println!("{}", file.display());
+            writeln!(out, "{}", file.display())?;
         }
         Ok(Ending::Ok)
     }

@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
+use crate::agent::config::Config;
 use crate::agent::{ExpertPolicy, LearnedPolicy, LearnedTeam, Policy, RandomPolicy, Solo, Team};
 use crate::data::json;
 use crate::nets::device;
@@ -79,6 +80,7 @@ fn unchanged(folder: &Path, chosen: &str) -> anyhow::Result<()> {
 
 /// SHA-256 over a checkpoint's configuration and weights.
 fn hash(folder: &Path) -> anyhow::Result<String> {
+    Config::check_there(folder)?;
     let mut digest = Sha256::new();
     for file in ["config.json", "model.safetensors"] {
         let path = folder.join(file);

@@ -9,6 +9,7 @@ use super::Ending;
 use super::appraised::{appraised, name};
 use super::bar::Bars;
 use super::stop;
+use super::streams::say;
 use crate::agent::learned::SharedEmbedder;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
@@ -70,7 +71,6 @@ impl Pretrain {
     ///
     /// # Errors
     /// When data or an earlier state cannot be read, or the checkpoint not be written.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
@@ -99,7 +99,7 @@ impl Pretrain {
         let mut bars = Bars::new();
         if pretraining.run(&mut bars, &stop)? == Trained::Stopped {
             bars.end();
-            eprintln!("stopped; --resume goes on from here");
+            say("stopped; --resume goes on from here");
             return Ok(Ending::Interrupted);
         }
         appraised(&pretraining.out, &pretraining.preset.appraisal, sentences, bars)?;

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::Ending;
 use super::bar::Bars;
 use super::stop;
+use super::streams::say;
 use crate::language::passage::{Concatenation, Summarizer};
 use crate::language::rules::Rules;
 use crate::run::relabel::relabel;
@@ -34,7 +35,6 @@ impl Relabel {
     ///
     /// # Errors
     /// When the dataset cannot be read or its folder not be written to.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let summarizer: &dyn Summarizer = match self.with {
             With::Rules => &Rules,
@@ -45,17 +45,17 @@ impl Relabel {
         let found = relabel(&self.data, summarizer, &mut bars, &stop)?;
         bars.end();
         if found.stopped {
-            eprintln!("stopped; the same command goes on from here");
+            say("stopped; the same command goes on from here");
             return Ok(Ending::Interrupted);
         }
         let (source, version) = (summarizer.source(), summarizer.version());
-        eprintln!(
+        say(&format!(
             "{}: {} spans, {} labelled before, {} texts written by {source} {version}",
             self.data.join("labels.jsonl").display(),
             found.spans,
             found.known,
             found.asked
-        );
+        ));
         Ok(Ending::Ok)
     }
 }

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::{Ending, import};
+use super::streams::say;
+use super::{Ending, import, streams};
 use crate::data::Dataset;
 use crate::run::replay::{Options, Report, replay};
 
@@ -39,9 +40,8 @@ impl Replay {
         let counts = &dataset.manifest().counts;
         let of = |split: &String| counts.get(split).map_or(0, |counts| counts.trajectories);
         let total = self.split.as_ref().map_or_else(|| counts.keys().map(of).sum(), of);
-        if let Some(split) = self.split.as_ref().filter(|split| of(split) == 0) {
-            let known: Vec<&str> = counts.keys().map(String::as_str).collect();
-            anyhow::bail!("{} holds no split {split:?}; it holds {}", self.data.display(), known.join(", "));
+        if let Some(split) = &self.split {
+            dataset.check_split(split)?;
         }
         let bar = ProgressBar::new(total).with_style(import::style()).with_message("replaying");
         let options = Options { split: self.split, boxes: self.boxes };
@@ -49,7 +49,7 @@ impl Replay {
         bar.finish_and_clear();
         let report = report?;
         list_failures(&report);
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         if self.json {
             writeln!(out, "{}", serde_json::to_string(&report)?)?;
         } else {
@@ -59,14 +59,13 @@ impl Replay {
     }
 }
 
-#[allow(clippy::print_stderr)]
 fn list_failures(report: &Report) {
     for (what, count) in &report.failures {
         for failure in report.failed.iter().filter(|failure| failure.what == *what).take(LISTED) {
-            eprintln!("{what}: {}: {}", failure.id, failure.reason);
+            say(&format!("{what}: {}: {}", failure.id, failure.reason));
         }
         if *count > LISTED {
-            eprintln!("{what}: ... and {} more", count - LISTED);
+            say(&format!("{what}: ... and {} more", count - LISTED));
         }
     }
 }

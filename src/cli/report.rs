@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 
 use super::Ending;
+use super::streams::say;
 use crate::data::{json, whole};
 use crate::run::finished::FinishedRun;
 use crate::run::folder::RunFolder;
@@ -30,7 +31,6 @@ impl Report {
     ///
     /// # Errors
     /// When the folder holds none, or cannot be written to.
-    #[allow(clippy::print_stderr)]
     pub fn run(self) -> anyhow::Result<Ending> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
         if self.folder.join(RunFolder::MANIFEST).exists() {
@@ -42,7 +42,7 @@ impl Report {
             let page = out.join("report.html");
             whole::write(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
             plot::write(out, plot::PROGRESS, &plot::progress_by_length(&[&summary]))?;
-            eprintln!("wrote {}", page.display());
+            say(&format!("wrote {}", page.display()));
         } else {
             bail!(
                 "{} holds no run (manifest.json is missing); the curves of a training are drawn by `sprint plot`",

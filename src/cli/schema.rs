@@ -4,7 +4,7 @@ use std::io::Write;
 
 use clap::Args;
 
-use super::Ending;
+use super::{Ending, streams};
 use crate::data::schema;
 
 /// Prints a JSON Schema.
@@ -21,7 +21,7 @@ impl Schema {
     /// # Errors
     /// When standard output is closed.
     pub fn run(self) -> anyhow::Result<Ending> {
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         write!(out, "{}", schema::text(&self.name).unwrap_or_default())?;
         out.flush()?;
         Ok(Ending::Ok)

@@ -9,8 +9,8 @@ use anyhow::{Context, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::ProgressBar;
 
-use super::Ending;
 use super::rooms::RoomName;
+use super::{Ending, streams};
 use crate::agent::{ExpertPolicy, Solo, Team};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
@@ -117,7 +117,7 @@ struct Check {
 /// Shows a task.
 #[derive(Args)]
 struct Show {
-    /// The task file, with the task's number from 0 or its id: FILE#N; all tasks in a line each without
+    /// The task file, with the task's id or its number from 1: FILE#N; all tasks in a line each without
     #[arg(value_name = "FILE[#N]")]
     task: String,
 }
@@ -171,7 +171,7 @@ impl Sample {
 impl Check {
     fn run(self) -> anyhow::Result<Ending> {
         let mistakes = taskcheck::mistakes(&self.file)?;
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         for mistake in &mistakes {
             writeln!(out, "{}:{mistake}", self.file.display())?;
         }
@@ -207,10 +207,10 @@ impl Show {
     fn run(self) -> anyhow::Result<Ending> {
         let (file, wanted) = taskset::split_reference(&self.task);
         let set = taskset::read(&file)?.value;
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         match wanted {
             None => {
-                for (number, task) in set.tasks.iter().enumerate() {
+                for (number, task) in (1..).zip(&set.tasks) {
                     writeln!(out, "{number:>4}  {}  [{}]", told(task, false), task.id)?;
                 }
             }
@@ -236,7 +236,11 @@ fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()
     writeln!(out, "start        x {x} m, z {z} m, facing {heading}, looking down {} degrees", pose.horizon)?;
     let held = world.held.and_then(|held| world.object(held)).map_or("nothing", |object| object.class.spoken());
     writeln!(out, "in the hand  {held}")?;
-    writeln!(out, "steps        the expert takes {}, the episode ends after {}", task.expert_steps, task.horizon)?;
+    let expert = match task.expert_steps {
+        0 => "an unknown number".to_string(),
+        steps => steps.to_string(),
+    };
+    writeln!(out, "steps        the expert takes {expert}, the episode ends after {}", task.horizon)?;
     if let Some((trajectory, first)) = &task.source {
         writeln!(out, "cut from     {trajectory}, from skill {first}")?;
     }

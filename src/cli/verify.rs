@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, policies};
+use super::{Ending, policies, streams};
 use crate::agent::Policy;
 use crate::run::episode::Author;
 use crate::run::verify::{self, Recorded};
@@ -54,7 +54,7 @@ impl Verify {
         let bar = indicatif::ProgressBar::new(run.episodes.len() as u64);
         let verdict = verify::verify(&run, &mut summon, &mut |done| bar.set_position(done as u64))?;
         bar.finish_and_clear();
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::out();
         if self.json {
             writeln!(out, "{}", serde_json::to_string(&verdict)?)?;
         } else {
@@ -67,8 +67,12 @@ impl Verify {
                 let (number, task, step, what) = (d.episode, &d.task, d.step, d.what);
                 writeln!(out, "episode {number} ({task}), step {step}: {what} was {}, is {}", d.recorded, d.found)?;
             }
-            writeln!(out, "{}", if verdict.differences.is_empty() { "equal" } else { "different" })?;
+            let (played, told) = (verdict.episodes, verdict.summarised.unwrap_or(verdict.episodes));
+            if told != played {
+                writeln!(out, "episodes: the summary tells of {told}, there are {played}")?;
+            }
+            writeln!(out, "{}", if verdict.is_equal() { "equal" } else { "different" })?;
         }
-        Ok(if verdict.differences.is_empty() { Ending::Ok } else { Ending::SomeFailed })
+        Ok(if verdict.is_equal() { Ending::Ok } else { Ending::SomeFailed })
     }
 }

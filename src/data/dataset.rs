@@ -79,13 +79,29 @@ impl Dataset {
     /// When `dataset.json` is absent, malformed, or of another version.
     pub fn open(folder: &Path) -> anyhow::Result<Dataset> {
         let path = folder.join("dataset.json");
-        let read = json::read(&path, Manifest::FORMAT);
-        let manifest: Manifest = read
-            .with_context(|| {
-                format!("{} is no dataset; `sprint import` or `sprint collect` makes one", folder.display())
-            })?
-            .value;
+        anyhow::ensure!(
+            path.exists(),
+            "{} is no dataset (dataset.json is missing); `sprint import` or `sprint collect` makes one",
+            folder.display()
+        );
+        let manifest = json::read::<Manifest>(&path, Manifest::FORMAT)?.value;
         Ok(Dataset { folder: folder.to_owned(), manifest })
+    }
+
+    /// Whether it holds trajectories of that split.
+    ///
+    /// # Errors
+    /// Names the splits that it holds.
+    pub fn check_split(&self, split: &str) -> anyhow::Result<()> {
+        let known = || self.manifest.counts.iter().filter(|(_, counts)| counts.trajectories > 0).map(|(name, _)| name);
+        let listed = || known().map(String::as_str).collect::<Vec<_>>().join(", ");
+        anyhow::ensure!(
+            known().any(|name| name == split),
+            "{} holds no split {split:?}; it holds {}",
+            self.folder.display(),
+            listed()
+        );
+        Ok(())
     }
 
     /// What `dataset.json` says.

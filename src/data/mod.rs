@@ -10,6 +10,7 @@ pub mod schema;
 pub mod selection;
 pub mod summaries;
 pub mod taskset;
+pub mod vacant;
 pub mod whole;
 
 pub use dataset::Dataset;

@@ -43,14 +43,14 @@ pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
     }
 }
 
-/// The task of that number, from 0, or of that id.
+/// The task of that id, or of that number from 1.
 ///
 /// # Errors
 /// When there is none; says what there is.
 pub fn pick<'a>(set: &'a TaskSet, wanted: &str) -> anyhow::Result<&'a Task> {
-    let numbered = wanted.parse().ok().and_then(|number: usize| set.tasks.get(number));
-    let found = numbered.or_else(|| set.tasks.iter().find(|task| task.id == wanted));
-    found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 0 to {}", set.tasks.len() - 1))
+    let numbered = || wanted.parse::<usize>().ok().and_then(|number| set.tasks.get(number.checked_sub(1)?));
+    let found = set.tasks.iter().find(|task| task.id == wanted).or_else(numbered);
+    found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 1 to {}", set.tasks.len()))
 }
 
 /// Checks what the types alone do not: texts, indices and classes. Whether a task fits its scene is seen when that is loaded.
@@ -268,9 +268,11 @@ pub(crate) mod tests {
         let set = sample_set();
         assert_eq!(split_reference("a/b.json#1"), (PathBuf::from("a/b.json"), Some("1")));
         assert_eq!(split_reference("a/b.json"), (PathBuf::from("a/b.json"), None));
-        assert_eq!(pick(&set, "1").unwrap().id, "second");
+        assert_eq!(pick(&set, "2").unwrap().id, "second");
         assert_eq!(pick(&set, "first").unwrap().id, "first");
-        assert!(pick(&set, "2").unwrap_err().to_string().contains("0 to 1"));
+        for none in ["0", "3"] {
+            assert!(pick(&set, none).unwrap_err().to_string().contains("1 to 2"));
+        }
     }
 
     proptest! {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::appraise::Findings;
-use crate::agent::config::{Config, Provenance};
+use crate::agent::config::{Beginning, Config, Provenance};
 use crate::nets::precision::Precision;
 
 /// The method in words.
@@ -58,18 +58,18 @@ fn deciding(config: &Config) -> String {
 
 /// What it learned from, in words.
 fn origin(config: &Config) -> String {
-    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, precision, averaged } =
+    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, precision, averaged, .. } =
         &config.provenance;
     let method = method(config);
     let width = match precision {
         Precision::Full => "",
         Precision::Mixed => " in mixed precision",
     };
-    let seen = match config.visual {
-        Some(_) => format!("{visual_steps} steps of the visual encoder, "),
-        None => String::new(),
+    let seen = match (&config.visual, &config.provenance.visual_from) {
+        (Some(_), None) => format!("{visual_steps} steps of the visual encoder, "),
+        _ => String::new(),
     };
-    match averaged {
+    let trained = match averaged {
         None => format!(
             "Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets `{dataset}`): \
              {seen}{policy_steps} steps of the policy{width}, seed {seed}."
@@ -79,7 +79,22 @@ fn origin(config: &Config) -> String {
              one's, which had ({method}) {seen}{policy_steps} steps of the policy{width} on {trajectories} demonstrations, \
              seed {seed}."
         ),
-    }
+    };
+    trained + &beginnings(&config.provenance)
+}
+
+/// Whose networks it began with, in words.
+fn beginnings(provenance: &Provenance) -> String {
+    let whose = |beginning: &Beginning| {
+        let Beginning { name, preset, policy_steps } = beginning;
+        format!("`{name}` (preset `{preset}`, {policy_steps} steps of the policy)")
+    };
+    let eyes = provenance.visual_from.as_ref();
+    let eyes =
+        eyes.map(|eyes| format!(" It sees through the eyes of `{}` ({} steps).", eyes.name, provenance.visual_steps));
+    let policy = provenance.policy_from.as_ref().map(|from| format!(" Its policy began as that of {}.", whose(from)));
+    let critic = provenance.critic_from.as_ref().map(|from| format!(" Its critic began as that of {}.", whose(from)));
+    [eyes, policy, critic].into_iter().flatten().collect()
 }
 
 /// The card's text.

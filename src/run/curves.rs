@@ -25,6 +25,11 @@ pub type Curves = BTreeMap<String, BTreeMap<u64, f64>>;
 /// When the file cannot be read, or another line of it is malformed.
 pub fn read(folder: &Path) -> anyhow::Result<Curves> {
     let path = folder.join("training/progress.jsonl");
+    anyhow::ensure!(
+        path.exists(),
+        "{} keeps no training's curves (training/progress.jsonl is missing); `sprint pretrain` writes them",
+        folder.display()
+    );
     let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
     let mut curves = Curves::new();
     let lines: Vec<&str> = text.lines().collect();

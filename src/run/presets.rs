@@ -137,7 +137,7 @@ impl Preset {
                 shipped(&Preset::SIZES, size, "size")?.parse().with_context(|| format!("the size {size}"))?;
             resize(&mut table, size);
         }
-        Preset::parse(&toml::to_string(&table)?).with_context(|| format!("the preset {name}"))
+        Preset::of(table).with_context(|| format!("the preset {name}"))
     }
 
     /// A preset's text with what it extends.
@@ -154,8 +154,9 @@ impl Preset {
         }
     }
 
-    fn parse(text: &str) -> anyhow::Result<Preset> {
-        let preset: Preset = toml::from_str(text)?;
+    /// What is wrong is told by the field: a line of what was joined would be none of the file's.
+    fn of(table: toml::Table) -> anyhow::Result<Preset> {
+        let preset: Preset = table.try_into().map_err(|error| anyhow::anyhow!("{}", error.to_string().trim_end()))?;
         anyhow::ensure!(
             preset.format_version == Preset::FORMAT,
             "format_version is {}, this program reads {}",
@@ -242,8 +243,12 @@ fn shipped(texts: &[(&'static str, &'static str)], name: &str, what: &str) -> an
         return Ok((*text).to_string());
     }
     let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
-    std::fs::read_to_string(Path::new(name))
-        .with_context(|| format!("there is no {what} {name:?}: use {} or a file", names.join(", ")))
+    match std::fs::read_to_string(Path::new(name)) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            anyhow::bail!("there is no {what} {name:?}, nor a file of that name: use {} or a file", names.join(", "))
+        }
+        read => read.with_context(|| format!("{name} cannot be read")),
+    }
 }
 
 /// Puts `over` over `table`, section by section; `false` takes a section away.
@@ -298,9 +303,21 @@ mod tests {
     }
 
     #[test]
+    fn every_recipe_is_a_preset() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/recipes");
+        let recipes: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(!recipes.is_empty());
+        for recipe in recipes {
+            Preset::named(recipe.to_str().unwrap()).unwrap();
+        }
+    }
+
+    #[test]
     fn an_unknown_hyper_parameter_is_named() {
-        let text = format!("surprise = 1\n{}", Preset::SHIPPED[0].1);
-        assert!(format!("{:#}", Preset::parse(&text).unwrap_err()).contains("surprise"));
+        let mut table = Preset::table("sprint").unwrap();
+        extend(&mut table, "[iql]\ngamma = 1".parse().unwrap());
+        let error = format!("{:#}", Preset::of(table).unwrap_err());
+        assert!(error.contains("gamma") && error.contains("iql") && !error.contains("line"), "{error}");
     }
 
     #[test]
@@ -308,7 +325,7 @@ mod tests {
         let refused = |over: &str, what: &str| {
             let mut table = Preset::table("sprint").unwrap();
             extend(&mut table, over.parse().unwrap());
-            let error = format!("{:#}", Preset::parse(&toml::to_string(&table).unwrap()).unwrap_err());
+            let error = format!("{:#}", Preset::of(table).unwrap_err());
             assert!(error.contains(what), "{error}");
         };
         refused("critic = false", "critic and iql");

@@ -144,6 +144,9 @@ pub fn sample_dataset(
     phrasing: Phrasing,
     set_folder: &Path,
 ) -> anyhow::Result<TaskSet> {
+    if let Some(split) = split {
+        dataset.check_split(split)?;
+    }
     let scenes = dataset.scenes()?;
     let fits = |trajectory: &Trajectory| match &trajectory.scene {
         SceneRef::Named(name) => scenes.get(name).is_some_and(|scene| wish.rooms.contains(&scene.room)),

@@ -9,8 +9,9 @@ use serde::Serialize;
 use super::booking::policy_seed;
 use super::branches::{FRAMES, Moment, look_back};
 use super::episode::{Author, Episode, Step};
-use super::folder::read_episodes;
+use super::folder::{RunFolder, read_episodes};
 use super::manifest::Manifest;
+use super::report::Summary;
 use super::rollout::Rollout;
 use super::scenes::{Scenes, Setting};
 use crate::agent::{Carried, Policy};
@@ -33,6 +34,15 @@ pub struct Verdict {
     pub differences: Vec<Difference>,
     /// Policies that were not at hand, so that only what their actions came to was compared.
     pub missing: Vec<String>,
+    /// How many episodes the run's summary tells of, where there is one.
+    pub summarised: Option<usize>,
+}
+
+impl Verdict {
+    /// Whether everything came out the same, and nothing is gone.
+    pub fn is_equal(&self) -> bool {
+        self.differences.is_empty() && self.summarised.is_none_or(|count| count == self.episodes)
+    }
 }
 
 /// The first difference of an episode.
@@ -62,18 +72,23 @@ pub struct Recorded {
     pub scenes: Scenes,
     /// Its episodes.
     pub episodes: Vec<Episode>,
+    /// How many episodes its summary tells of, where there is one.
+    pub summarised: Option<usize>,
 }
 
 impl Recorded {
     /// Reads a run folder. Its tasks are in it, or in `tasks`.
     ///
     /// # Errors
-    /// When it is no run, or its tasks are not at hand.
+    /// When it is no run, its summary is malformed, or its tasks are not at hand.
     pub fn open(run: &Path, tasks: Option<&Path>) -> anyhow::Result<Recorded> {
         let manifest = json::read::<Manifest>(&run.join("manifest.json"), Manifest::FORMAT)?.value;
         let (tasks, scenes) = super::explored::tasks_of(run, &manifest, tasks)?;
         let (episodes, _) = read_episodes(&run.join("episodes.jsonl"))?;
-        Ok(Recorded { manifest, tasks, scenes, episodes })
+        let summary = run.join(RunFolder::SUMMARY);
+        let summarised = summary.exists().then(|| json::read::<Summary>(&summary, Summary::FORMAT)).transpose()?;
+        let summarised = summarised.map(|summary| summary.value.episodes);
+        Ok(Recorded { manifest, tasks, scenes, episodes, summarised })
     }
 
     /// The task of an episode, with its place in the set, and where it starts.
@@ -105,7 +120,7 @@ pub type Summon<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<Box<dyn Policy
 /// # Errors
 /// When a task does not fit its scene, or a policy cannot be made. What differs is in the verdict.
 pub fn verify(run: &Recorded, summon: &mut Summon<'_>, progress: &mut dyn FnMut(usize)) -> anyhow::Result<Verdict> {
-    let mut verdict = Verdict::default();
+    let mut verdict = Verdict { summarised: run.summarised, ..Verdict::default() };
     for (number, episode) in (1..).zip(&run.episodes) {
         let (at, task, setting) = run.setting(episode).with_context(|| format!("episode {number}"))?;
         let author = run.author(at, episode);

@@ -20,6 +20,7 @@ use super::progress::{Report, Scalars};
 use super::scenes::{Scenes, Setting};
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
 use crate::data::dataset::{Counts, Manifest, Writer};
+use crate::data::vacant;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Task, Trajectory};
 use crate::house::generate;
@@ -80,12 +81,13 @@ impl Collection {
     /// demonstrator cannot do gives no trajectory.
     ///
     /// # Errors
-    /// When a given task does not fit its scene, which is found before anything is written; when the folder cannot be written to,
-    /// or the learner not be loaded.
+    /// When a given task does not fit its scene, or the folder holds something already, which is found before anything is written;
+    /// when the folder cannot be written to, or the learner not be loaded.
     pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Collected> {
         if let Source::Tasks { tasks, scenes } = &self.source {
             scenes.check(tasks)?;
         }
+        vacant::check(&self.out)?;
         let mut writer = Writer::new(&self.out)?;
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();

@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use tch::nn::VarStore;
 
 use super::Pretraining;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::Config;
+use crate::data::vacant;
 use crate::nets::eyes::Eyes;
 use crate::nets::visual::VisualEncoder;
 use crate::nets::weights;
@@ -34,6 +35,27 @@ impl Pretraining {
             self.judge_as(folder, &networks)?;
         }
         Ok(networks)
+    }
+
+    /// A folder that holds a training's state is taken up when that is asked for, and no other folder that holds anything. Of a
+    /// training that ended before it saved a state nothing is worth keeping.
+    pub(super) fn check_out(&self, training: &Path) -> anyhow::Result<()> {
+        let begun = ["visual.safetensors", "state.safetensors"].iter().any(|state| training.join(state).exists());
+        match (begun, self.resume) {
+            (true, true) => Ok(()),
+            (true, false) => {
+                bail!("{} holds a training already: use --resume, or another folder", self.out.display())
+            }
+            (false, resumed) => {
+                if !(resumed && training.exists()) {
+                    vacant::check(&self.out)?;
+                }
+                match std::fs::remove_dir_all(training) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+                    _ => Ok(()),
+                }
+            }
+        }
     }
 
     /// An episodic transformer embeds words by itself; all others are told what the sentence encoder makes of a text.

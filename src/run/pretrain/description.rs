@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::path::Path;
 
 use super::Pretraining;
-use crate::agent::config::{Config, Ontology, Provenance, SentenceSpec};
+use crate::agent::config::{Beginning, Config, Ontology, Provenance, SentenceSpec};
 use crate::data::whole;
 use crate::nets::visual::VisualSpec;
 use crate::run::presets::Sight;
@@ -21,6 +22,15 @@ pub(super) fn each_once(digests: &[String], parts: &[Range<usize>], learned_from
         distinct.extend(within.map(|&trajectory| (digest, trajectory as usize - part.start)));
     }
     (named.join("-"), distinct.len() as u64)
+}
+
+/// A checkpoint that was begun with.
+fn beginning(folder: Option<&Path>) -> anyhow::Result<Option<Beginning>> {
+    let Some(folder) = folder else { return Ok(None) };
+    let Provenance { preset, policy_steps, .. } = Config::read(folder)?.provenance;
+    let name = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+    let name = name.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    Ok(Some(Beginning { name, preset, policy_steps }))
 }
 
 impl Pretraining {
@@ -54,6 +64,9 @@ impl Pretraining {
                 },
                 policy_steps,
                 precision: self.preset.precision,
+                visual_from: beginning(self.visual_from.as_deref())?,
+                policy_from: beginning(self.policy_from.as_deref())?,
+                critic_from: beginning(self.critic_from.as_deref())?,
                 averaged: None,
             },
         })
@@ -91,7 +104,17 @@ impl Pretraining {
         let text = toml::to_string(&self.preset)?;
         match std::fs::read_to_string(&path) {
             Ok(begun) if begun == text => Ok(()),
-            Ok(_) => anyhow::bail!("{}: the training was begun with another preset", path.display()),
+            Ok(begun) => {
+                let (own, other) = begun
+                    .lines()
+                    .zip(text.lines())
+                    .find(|(begun, own)| begun != own)
+                    .unwrap_or(("another number of lines", "this one"));
+                anyhow::bail!(
+                    "{}: the training was begun with another preset: {own} there, {other} here",
+                    path.display()
+                )
+            }
             Err(_) => whole::write(&path, text.as_bytes()),
         }
     }

@@ -75,14 +75,10 @@ impl Pretraining {
     /// policy on.
     ///
     /// # Errors
-    /// When data or an earlier state cannot be read, the folder not be written, or there is a training in `out` already.
+    /// When data or an earlier state cannot be read, the folder not be written, or `out` holds something else already.
     pub fn run(&self, report: &mut dyn Report, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
         let training = self.out.join("training");
-        anyhow::ensure!(
-            self.resume || !training.exists(),
-            "{} holds a training already: use --resume, or another folder",
-            self.out.display()
-        );
+        self.check_out(&training)?;
         // What can be refused is refused before the folder is touched.
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let footage = Footage::open(&datasets)?;
@@ -110,7 +106,11 @@ impl Pretraining {
             summaries: &summaries,
         };
         let items = Items::of(&source, footage.labels()?, &self.preset.data)?;
-        anyhow::ensure!(!items.training.is_empty(), "there is nothing to learn from: no span has a text");
+        anyhow::ensure!(
+            !items.training.is_empty(),
+            "there is nothing to learn from: no span has a text, or every one is held out (hold_out is {})",
+            self.preset.hold_out
+        );
         let words = self.preset.policy.attention.as_ref().map(|attention| {
             let texts = items.training.iter().map(|span| items.texts[span.text as usize].as_str());
             Vocabulary::of(texts, attention.words)

@@ -80,7 +80,7 @@ impl Engine {
         let (task, scene) = self.as_task()?;
         let steps = task.expert_steps;
         let (id, many) = explored::add_task(path, task, &scene)?;
-        Ok(format!("{id} is task {} of {} (expert: {steps} steps)", many - 1, path.display()))
+        Ok(format!("{id} is task {} of {} (expert: {steps} steps)", many, path.display()))
     }
 
     /// Writes the branch in hand in the form that the file's ending asks for.
@@ -129,7 +129,7 @@ mod tests {
         engine.switch(0).unwrap();
         engine.seek(4);
         engine.keep_task(&tasks).unwrap();
-        assert!(engine.keep_task(&tasks).unwrap().contains("is task 1"));
+        assert!(engine.keep_task(&tasks).unwrap().contains("is task 2"));
         let set = taskset::read(&tasks).unwrap().value;
         assert_eq!(set.tasks.len(), 2);
         assert!(set.tasks[0].expert_steps > 0 && set.tasks[0].start.is_some());
