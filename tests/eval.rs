@@ -80,6 +80,34 @@ fn a_missed_threshold_ends_with_2() {
 }
 
 #[test]
+fn every_kind_of_run_is_verified_opened_by_its_number_and_exported() {
+    let sprint = Sprint::new();
+    sprint.sample("sampled.json", 2, 3);
+    let set: Value = serde_json::from_str(&sprint.read("sampled.json")).unwrap();
+    std::fs::write(sprint.path("typed.json"), serde_json::to_string(&set).unwrap()).unwrap();
+    for (number, options) in [
+        "--policy expert",
+        "--policy random --limit 2",
+        "--policy random --seeds 2 --language",
+        "--policy random --from-subtask all",
+        "--policy expert --step-by-step",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let run = format!("run{number}");
+        assert_eq!(sprint.run(&format!("eval --tasks typed.json --out {run} {options}")).code, Some(0), "{options}");
+        let verified = sprint.run(&format!("verify {run}"));
+        assert_eq!(verified.code, Some(0), "{options}: {}{}", verified.stdout, verified.stderr);
+        let last = sprint.read(&format!("{run}/episodes.jsonl")).lines().count();
+        let exported = sprint.run(&format!("export {run}#{last} {run}.txt"));
+        assert_eq!(exported.code, Some(0), "{options}: {}", exported.stderr);
+    }
+    let other = sprint.run("verify run0 --tasks sampled.json");
+    assert!(other.stderr.contains("is not what run0 was made from"), "{}", other.stderr);
+}
+
+#[test]
 fn whoever_reads_may_leave_and_the_verdict_is_the_same() {
     let sprint = Sprint::new();
     sprint.sample("tasks.json", 3, 2);

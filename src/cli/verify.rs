@@ -67,9 +67,8 @@ impl Verify {
                 let (number, task, step, what) = (d.episode, &d.task, d.step, d.what);
                 writeln!(out, "episode {number} ({task}), step {step}: {what} was {}, is {}", d.recorded, d.found)?;
             }
-            let (played, told) = (verdict.episodes, verdict.summarised.unwrap_or(verdict.episodes));
-            if told != played {
-                writeln!(out, "episodes: the summary tells of {told}, there are {played}")?;
+            if let Some(told) = verdict.summarised.filter(|&told| told != verdict.plain) {
+                writeln!(out, "episodes: the summary tells of {told}, there are {}", verdict.plain)?;
             }
             writeln!(out, "{}", if verdict.is_equal() { "equal" } else { "different" })?;
         }

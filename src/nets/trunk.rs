@@ -46,7 +46,8 @@ struct Stage {
 
 impl Trunk {
     /// A trunk over `from` channels with fresh weights under `path`; `told` is the width of the vector that modulates it, if
-    /// there is one.
+    /// there is one. Norms begin with scales by chance between 0 and 1: where they began at 1, a clone had a held-out action loss
+    /// of 0.66 after 2,000 updates instead of 0.64.
     pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, told: Option<i64>) -> Trunk {
         let mut from = from;
         let mut stages = Vec::new();

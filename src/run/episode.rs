@@ -82,6 +82,11 @@ impl Episode {
         Key { task: self.task.clone(), seed: self.seed, wording: self.wording, from: self.from }
     }
 
+    /// Whether it was played as the task asks: from its start, in its own words.
+    pub fn is_plain(&self) -> bool {
+        self.wording.is_own() && self.from == 0
+    }
+
     /// 1 for a success, else 0.
     pub fn succeeded(&self) -> f64 {
         f64::from(u8::from(self.success))

@@ -167,33 +167,3 @@ pub fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(S
     taskset::write(path, &set)?;
     Ok((id, set.tasks.len()))
 }
-
-/// The tasks of a run: those in its folder, or the file that the run was made from.
-///
-/// # Errors
-/// When neither is there, or the file is another one than the run was made from.
-pub fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(Vec<Task>, Scenes)> {
-    let own = run.join(RunFolder::TASKS);
-    let path = match file {
-        Some(path) => path,
-        None if own.exists() => &own,
-        None => anyhow::bail!(
-            "{} does not hold its tasks; name the file that it was made from with --tasks (the set {:?})",
-            run.display(),
-            manifest.task_set
-        ),
-    };
-    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
-    ensure!(
-        document.digest == manifest.task_set_hash,
-        "{} is not what {} was made from: its SHA-256 is {:.12}, the run's {:.12}",
-        path.display(),
-        run.display(),
-        document.digest,
-        manifest.task_set_hash
-    );
-    let scenes = Scenes::of(path, &document.value);
-    let mut tasks = document.value.tasks;
-    tasks.truncate(manifest.tasks);
-    Ok((tasks, scenes))
-}

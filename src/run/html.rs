@@ -56,14 +56,21 @@ pub fn page(run: &FinishedRun, summary: &Summary, frames: usize) -> anyhow::Resu
         }))
     };
     let rows: Vec<serde_json::Value> = run.episodes.par_iter().enumerate().map(row).collect::<anyhow::Result<_>>()?;
-    // Inside a script element nothing may look like its end.
-    let data = serde_json::to_string(&rows)?.replace("</", "<\\/");
+    let data = in_script(&rows)?;
     let title = format!("{} on {}", summary.policy, summary.task_set);
     Ok(PAGE
         .replace("{{title}}", &escape(&title))
         .replace("{{plot}}", &plot::progress_by_length(&[summary]).svg())
         .replace("{{summary}}", &escape(&summary.markdown()))
         .replace("{{episodes}}", &data))
+}
+
+/// A value as JSON that stands inside a script element: without a `<` nothing can end it, or begin a comment.
+///
+/// # Errors
+/// Never for values that JSON has.
+pub fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }
 
 /// Frames of an episode: the start, what each completed subtask left, the end; each with the step it follows, as a PNG.
@@ -99,4 +106,17 @@ fn picture(rollout: &mut Rollout) -> anyhow::Result<String> {
     let mut bytes = Cursor::new(Vec::new());
     small.write_to(&mut bytes, ImageFormat::Png).context("a frame cannot be encoded")?;
     Ok(STANDARD.encode(bytes.into_inner()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_in_a_script_ends_it_or_begins_a_comment() {
+        let said = "put it </script> <!-- <script> there";
+        let text = in_script(&said).unwrap();
+        assert!(!text.contains('<'), "{text}");
+        assert_eq!(serde_json::from_str::<String>(&text).unwrap(), said);
+    }
 }

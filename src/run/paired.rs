@@ -50,7 +50,7 @@ pub struct Paired {
     pub first: String,
     /// The second run's folder.
     pub second: String,
-    /// Pairs of episodes: same task, seed, words and start.
+    /// Pairs of episodes: same task, seed and start, told the task's own words.
     pub pairs: usize,
     /// Episodes of either run without a counterpart.
     pub unpaired: usize,
@@ -80,13 +80,17 @@ impl Paired {
     /// # Errors
     /// When they have no episode in common.
     pub fn of(first: &FinishedRun, second: &FinishedRun) -> anyhow::Result<Paired> {
-        let mut others: BTreeMap<Key, &Episode> =
-            second.episodes.iter().map(|episode| (episode.key(), episode)).collect();
+        let mut others: BTreeMap<Key, &Episode> = second
+            .episodes
+            .iter()
+            .filter(|episode| episode.is_plain())
+            .map(|episode| (episode.key(), episode))
+            .collect();
         // By task, in the first run's order.
         let mut groups: Vec<Vec<(&Episode, &Episode)>> = Vec::new();
         let mut places: BTreeMap<&str, usize> = BTreeMap::new();
         let (mut unpaired, mut other_starts) = (0, 0);
-        for episode in &first.episodes {
+        for episode in first.episodes.iter().filter(|episode| episode.is_plain()) {
             match others.remove(&episode.key()) {
                 // An episode that failed before it had a start is no success from any start.
                 Some(other) if episode.start_hash == other.start_hash => {
@@ -167,6 +171,7 @@ pub(crate) mod tests {
     use crate::run::manifest::Manifest;
     use crate::run::manifest::tests::manifest;
     use crate::run::scenes::Scenes;
+    use crate::run::wording::Wording;
 
     /// A run of the sample set in which these seeds of the first task succeeded.
     pub(crate) fn run(name: &str, outcomes: &[bool]) -> FinishedRun {
@@ -198,6 +203,17 @@ pub(crate) mod tests {
         assert_eq!(paired.fixes[0].completed, [1, 2, 2]);
         assert_eq!(paired.mcnemar_p, 1.0);
         assert_eq!(paired.success.difference, 0.0);
+    }
+
+    #[test]
+    fn other_words_and_other_starts_are_not_compared() {
+        let [a, b] = [("a", [true, true, true]), ("b", [true, false, false])].map(|(name, outcomes)| {
+            let mut run = run(name, &outcomes);
+            (run.episodes[1].wording, run.episodes[2].from) = (Wording::Swapped, 1);
+            run
+        });
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired, paired.regressions.len()), (1, 0, 0));
     }
 
     #[test]

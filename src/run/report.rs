@@ -131,7 +131,7 @@ impl Summary {
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
     pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
         let every = Grouped::of(tasks, episodes);
-        let main = every.only(|episode| episode.wording.is_own() && episode.from == 0);
+        let main = every.only(|episode| episode.is_plain());
         let all = main.pairs();
         let lengths: BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
         let by_length = |value: fn(&Episode) -> f64| -> BTreeMap<u32, f64> {

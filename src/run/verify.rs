@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use serde::Serialize;
 
 use super::booking::policy_seed;
@@ -16,7 +16,7 @@ use super::rollout::Rollout;
 use super::scenes::{Scenes, Setting};
 use crate::agent::{Carried, Policy};
 use crate::data::json;
-use crate::domain::{Action, Task};
+use crate::domain::{Action, Task, TaskSet};
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
@@ -34,14 +34,16 @@ pub struct Verdict {
     pub differences: Vec<Difference>,
     /// Policies that were not at hand, so that only what their actions came to was compared.
     pub missing: Vec<String>,
-    /// How many episodes the run's summary tells of, where there is one.
+    /// How many of the episodes were played as the tasks ask: from the start, in the task's own words.
+    pub plain: usize,
+    /// How many such episodes the run's summary tells of, where there is one.
     pub summarised: Option<usize>,
 }
 
 impl Verdict {
     /// Whether everything came out the same, and nothing is gone.
     pub fn is_equal(&self) -> bool {
-        self.differences.is_empty() && self.summarised.is_none_or(|count| count == self.episodes)
+        self.differences.is_empty() && self.summarised.is_none_or(|count| count == self.plain)
     }
 }
 
@@ -77,17 +79,17 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads a run folder. Its tasks are in it, or in `tasks`.
+    /// Reads a run folder. Its tasks are in it, or in `tasks`, the file that the run was made from.
     ///
     /// # Errors
-    /// When it is no run, its summary is malformed, or its tasks are not at hand.
+    /// When it is no run, its summary is malformed, its tasks are not at hand, or `tasks` is another file.
     pub fn open(run: &Path, tasks: Option<&Path>) -> anyhow::Result<Recorded> {
-        let manifest = json::read::<Manifest>(&run.join("manifest.json"), Manifest::FORMAT)?.value;
-        let (tasks, scenes) = super::explored::tasks_of(run, &manifest, tasks)?;
-        let (episodes, _) = read_episodes(&run.join("episodes.jsonl"))?;
         let summary = run.join(RunFolder::SUMMARY);
         let summarised = summary.exists().then(|| json::read::<Summary>(&summary, Summary::FORMAT)).transpose()?;
         let summarised = summarised.map(|summary| summary.value.episodes);
+        let manifest = json::read::<Manifest>(&run.join(RunFolder::MANIFEST), Manifest::FORMAT)?.value;
+        let (tasks, scenes) = tasks_of(run, &manifest, tasks)?;
+        let (episodes, _) = read_episodes(&run.join(RunFolder::EPISODES))?;
         Ok(Recorded { manifest, tasks, scenes, episodes, summarised })
     }
 
@@ -107,9 +109,34 @@ impl Recorded {
             policy: self.manifest.policy.clone(),
             checkpoint: self.manifest.checkpoint_hash.clone(),
             seed: policy_seed(task, episode.seed),
-            samples: false,
+            samples: self.manifest.sampling,
         }
     }
+}
+
+/// The tasks of a run: those in its folder, which are what it played of the file that it was made from, or of that file.
+fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(Vec<Task>, Scenes)> {
+    let own = run.join(RunFolder::TASKS);
+    ensure!(
+        file.is_some() || own.exists(),
+        "{} does not hold its tasks; name the file that it was made from with --tasks (the set {:?})",
+        run.display(),
+        manifest.task_set
+    );
+    let path = file.unwrap_or(&own);
+    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    ensure!(
+        file.is_none() || document.digest == manifest.task_set_hash,
+        "{} is not what {} was made from: its SHA-256 is {:.12}, the run's {:.12}",
+        path.display(),
+        run.display(),
+        document.digest,
+        manifest.task_set_hash
+    );
+    let scenes = Scenes::of(path, &document.value);
+    let mut tasks = document.value.tasks;
+    tasks.truncate(manifest.tasks);
+    Ok((tasks, scenes))
 }
 
 /// Makes the policy of an author; `None` where it is not at hand.
@@ -130,6 +157,7 @@ pub fn verify(run: &Recorded, summon: &mut Summon<'_>, progress: &mut dyn FnMut(
             verdict.differences.push(Difference { episode: number, task, step, what, recorded, found });
         }
         verdict.episodes += 1;
+        verdict.plain += usize::from(episode.is_plain());
         progress(number);
     }
     Ok(verdict)
@@ -172,6 +200,13 @@ impl Again<'_> {
         };
         let mut past: VecDeque<Moment> = VecDeque::new();
         for (number, recorded) in (1..).zip(&episode.trace) {
+            if number <= episode.prefix {
+                // The expert led here, unseen by the run's policy.
+                if let Some(found) = self.act(&mut rollout, number, recorded) {
+                    return Ok(Some(found));
+                }
+                continue;
+            }
             if let Some(told) = &recorded.told {
                 let own = instruction::normalise(&task.instruction) == instruction::normalise(told);
                 rollout.instruction.clone_from(told);
@@ -209,22 +244,30 @@ impl Again<'_> {
             }
             past.push_front(Moment::of(&rollout, &author, Carried::Nothing));
             past.truncate(FRAMES - 1);
-            let tick = rollout.act(action);
-            let found = Step { told: recorded.told.clone(), by: recorded.by.clone(), ..Step::of(&tick, &rollout) };
-            if found != *recorded {
-                let field = if found.outcome != recorded.outcome { "outcome" } else { "subtask" };
-                let text =
-                    |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
-                return Ok(Some((number, field, text(recorded), text(&found))));
+            if let Some(found) = self.act(&mut rollout, number, recorded) {
+                return Ok(Some(found));
             }
-            self.verdict.steps += 1;
         }
-        let completed = episode.trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let (steps, success) = (episode.trace.len() as u32, episode.of > 0 && completed == episode.of);
+        let own = episode.trace.get(episode.prefix as usize..).unwrap_or_default();
+        let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
+        let (steps, success) = (own.len() as u32, episode.of > 0 && completed == episode.of);
         let counted = |completed, steps, success| format!("{completed} subtasks, {steps} steps, success {success}");
         let recorded = counted(episode.completed, episode.steps, episode.success);
         let found = counted(completed, steps, success);
         Ok((recorded != found).then_some((0, "result", recorded, found)))
+    }
+
+    /// Takes a recorded step; what it comes to now, where that is something else.
+    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &Step) -> Option<Found> {
+        let tick = rollout.act(Action { kind: recorded.kind, target: recorded.target });
+        let found = Step { told: recorded.told.clone(), by: recorded.by.clone(), ..Step::of(&tick, rollout) };
+        if found != *recorded {
+            let field = if found.outcome != recorded.outcome { "outcome" } else { "subtask" };
+            let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
+            return Some((number, field, text(recorded), text(&found)));
+        }
+        self.verdict.steps += 1;
+        None
     }
 }
 

@@ -65,6 +65,8 @@ pub struct App {
     pub now: Option<Box<Snapshot>>,
     /// Two instructions in one state.
     pub contrast: Option<Contrast>,
+    /// In which state that was: the branch and the step.
+    pub contrast_at: Option<(usize, u32)>,
     /// Values are painted on the map.
     pub paints_values: bool,
     /// The values, and the step of the house that they are for.
@@ -156,6 +158,7 @@ impl App {
             breaks: Vec::new(),
             divergence: None,
             contrast: None,
+            contrast_at: None,
             paints_values: false,
             landscape: None,
             heading: None,

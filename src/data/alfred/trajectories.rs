@@ -1,6 +1,7 @@
 //! A recording resolved against its scene: names become instances, skills get their roles.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use super::fixtures::Inventory;
 use super::names::{Name, Part};
@@ -21,7 +22,7 @@ pub fn resolve(
     parents: &[Parent],
 ) -> Result<Trajectory, String> {
     let start = start(recording, scene, parents);
-    let mut slices: BTreeMap<u16, u16> = BTreeMap::new();
+    let mut slices: BTreeMap<u16, Slices> = BTreeMap::new();
     let mut count = start.objects.len() as u16;
     let mut actions = Vec::with_capacity(recording.steps.len());
     let mut boxes = Vec::new();
@@ -35,8 +36,11 @@ pub fn resolve(
             }
         };
         if let (ActionType::Slice, Some(Instance::Object(whole))) = (step.kind, target) {
-            slices.entry(whole).or_insert(count);
-            count += u16::from(scene_slices(&start, whole));
+            if let Entry::Vacant(cut) = slices.entry(whole) {
+                let parts = scene_slices(&start, whole);
+                cut.insert(Slices { first: count, parts });
+                count = count.saturating_add(parts.into());
+            }
         }
         if step.kind.is_interaction() {
             boxes.push(step.bounds.unwrap_or_default());
@@ -102,13 +106,20 @@ fn original(recording: &Recording, inventory: &Inventory, name: Name) -> Option<
     Some(Original { instance, slice })
 }
 
-/// The instance that an original is once the slices of `cut` objects exist, each from the number given.
-fn present(original: Original, cut: &BTreeMap<u16, u16>) -> Option<Instance> {
+/// The slices of an object: the first one's number, and how many there are.
+struct Slices {
+    first: u16,
+    parts: u8,
+}
+
+/// The instance that an original is once objects are cut. A recording may name a later slice than the class falls into here;
+/// slices are alike, and the last one stands for it.
+fn present(original: Original, cut: &BTreeMap<u16, Slices>) -> Option<Instance> {
     match (original.instance, original.slice) {
         (instance, None) => Some(instance),
         (Instance::Object(whole), Some(slice)) => {
-            let first = cut.get(&whole)?;
-            Some(Instance::Object(first + u16::from(slice).checked_sub(1)?))
+            let Slices { first, parts } = cut.get(&whole)?;
+            Some(Instance::Object(first.checked_add(slice.min(*parts).checked_sub(1)?.into())?))
         }
         (Instance::Fixture(_), Some(_)) => None,
     }
@@ -165,4 +176,17 @@ fn subtask(
             last_target: steps.last().and_then(|step| step.target).and_then(find),
         }),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slice_is_one_of_its_own_whole_however_it_is_numbered() {
+        let cut = BTreeMap::from([(3, Slices { first: 40, parts: 2 })]);
+        let slice = |whole, number| present(Original { instance: Instance::Object(whole), slice: Some(number) }, &cut);
+        assert_eq!([1, 2, 3].map(|number| slice(3, number)), [40, 41, 41].map(|i| Some(Instance::Object(i))));
+        assert_eq!((slice(3, 0), slice(4, 1)), (None, None), "it begins with 1; what is whole has none");
+    }
 }

@@ -53,9 +53,17 @@ impl Trials {
         }
     }
 
-    /// The link that breaks the chain: the one that is done least often from where the agent itself begins it (where it never
+    /// Whether every link was played.
+    pub fn is_complete(&self) -> bool {
+        self.expert.iter().all(|rate| rate.of > 0)
+    }
+
+    /// The link that breaks the chain, once every link was played: the one that is done least often from where the agent itself begins it (where it never
     /// gets there: from where the expert does).
     pub fn weakest(&self) -> Option<usize> {
+        if !self.is_complete() {
+            return None;
+        }
         let share = |rate: &Rate| (rate.of > 0).then(|| f64::from(rate.done) / f64::from(rate.of));
         let both = self.expert.iter().zip(&self.own).map(|(e, o)| (share(e), share(o)));
         let worst = both.map(|(e, o)| o.or(e).unwrap_or(1.0)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -155,6 +163,9 @@ mod tests {
         let rate = |done| Rate { done, of: 4 };
         let trials = Trials { expert: vec![rate(4), rate(4), rate(3)], own: vec![rate(4), rate(1), rate(3)] };
         assert_eq!(trials.weakest(), Some(1));
+        let mut some = trials.clone();
+        (some.expert[0], some.own[0]) = (Rate::default(), Rate::default());
+        assert_eq!((some.is_complete(), some.weakest()), (false, None), "the first link may break, too");
         let perfect = Trials { expert: vec![rate(4)], own: vec![rate(4)] };
         assert_eq!(perfect.weakest(), None);
     }

@@ -102,7 +102,7 @@ fn completed_by_folder(run: &FinishedRun) -> Vec<f64> {
         return Vec::new();
     }
     let mean = |episodes: &[Episode]| {
-        let counted = episodes.iter().filter(|episode| episode.wording.is_own() && episode.from == 0);
+        let counted = episodes.iter().filter(|episode| episode.is_plain());
         stats::mean(counted.map(|episode| f64::from(episode.completed)))
     };
     run.by_folder().map(|(_, episodes)| mean(episodes)).collect()

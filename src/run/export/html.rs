@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::canvas::Canvas;
+use crate::run::html::in_script;
 use crate::run::recording::Recording;
 
 #[derive(Serialize)]
@@ -44,8 +45,7 @@ pub fn write(recording: &Recording) -> anyhow::Result<String> {
         });
     }
     let page = Page { title: &recording.title, subtasks: &recording.subtasks, steps };
-    // Inside a script element only `<` could end it.
-    let data = serde_json::to_string(&page)?.replace('<', "\\u003c");
+    let data = in_script(&page)?;
     Ok(TEMPLATE.replace("\"DATA\"", &data))
 }
 

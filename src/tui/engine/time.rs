@@ -122,7 +122,10 @@ impl Engine {
     /// # Errors
     /// When a step does not come to what was recorded.
     pub fn retrace(&mut self, episode: &Episode, author: &Author, thinks: bool) -> anyhow::Result<Option<u32>> {
-        self.instruct(&episode.instruction)?;
+        // The task is graded whatever the agent is told of it, until that changes on the way.
+        self.rollout.instruction.clone_from(&episode.instruction);
+        self.rollout.horizon = self.rollout.horizon.map(|horizon| horizon + episode.prefix);
+        self.decision = None;
         self.plant();
         let mut author = author.clone();
         let mut parted = None;
@@ -134,7 +137,7 @@ impl Engine {
                 author = by.clone();
             }
             let action = Action { kind: recorded.kind, target: recorded.target };
-            if thinks {
+            if thinks && number > episode.prefix {
                 let would = self.think().map(|(decision, _)| decision.action);
                 if !author.is_hand() && author == self.author && would.ok() != Some(action) {
                     parted = parted.or(Some(number));

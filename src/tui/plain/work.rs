@@ -93,7 +93,7 @@ pub(super) fn chain(followed: &[Chained], out: &mut impl Write) -> anyhow::Resul
         writeln!(out)?;
     }
     for known in followed {
-        match known.trials.as_ref().map(Trials::weakest) {
+        match known.trials.as_ref().filter(|trials| trials.is_complete()).map(Trials::weakest) {
             Some(Some(at)) => writeln!(out, "{}: link {} breaks the chain", known.who.name, at + 1)?,
             Some(None) => writeln!(out, "{}: no link breaks", known.who.name)?,
             None => {}

@@ -116,6 +116,7 @@ pub fn hear(app: &mut App, report: Report) -> Vec<Effect> {
         }
         Report::Compared(contrast) => {
             app.contrast = Some(*contrast);
+            app.contrast_at = app.now.as_ref().map(|now| (now.time.branch, now.step));
             turn_to(app, Page::Compare)
         }
         Report::Surveyed(landscape, step) => {

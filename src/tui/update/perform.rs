@@ -12,13 +12,14 @@ use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
 use crate::tui::policies::PolicyKind;
 use crate::tui::verb::{self, Page, TIMES, Verb};
-use crate::tui::worker::{Command, Pace};
+use crate::tui::worker::{Command, Going, Pace};
 
 /// Does what a person asked for.
 pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
     match verb {
         Verb::ToggleRun | Verb::Continue => go_on(app, verb == Verb::Continue),
-        Verb::Step(count) => (0..count.max(1)).map(|_| Effect::Send(Command::Step)).collect(),
+        Verb::Step(count @ 2..) => send(Command::Go(Some(Going::Steps(count)))),
+        Verb::Step(_) => send(Command::Step),
         Verb::Faster => pace(app, app.pace.faster()),
         Verb::Slower => pace(app, app.pace.slower()),
         Verb::Reset => send(Command::Reset),
@@ -176,7 +177,7 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
         Verb::ValueMap => {
             app.paints_values = !app.paints_values;
             app.landscape = None;
-            send(if app.paints_values { Command::Survey } else { Command::Stop })
+            send(if app.paints_values { Command::Survey } else { Command::StopSurvey })
         }
         Verb::Facing(heading) => {
             app.heading = heading;

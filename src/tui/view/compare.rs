@@ -29,13 +29,24 @@ impl Widget for Compare<'_> {
             }
             return;
         };
-        head(contrast, Rect { height: HEAD, ..area }, buf);
+        head(contrast, &when(self.0), Rect { height: HEAD, ..area }, buf);
         table(contrast, self.0.selected, Rect { y: area.y + HEAD, height: area.height - HEAD, ..area }, buf);
     }
 }
 
-fn head(contrast: &Contrast, area: Rect, buf: &mut Buffer) {
-    let inner = panel(buf, area, "Two instructions", "in the same state");
+/// In which state they were compared.
+fn when(app: &App) -> String {
+    match (&app.now, app.contrast_at) {
+        (Some(now), Some((branch, step))) if (now.time.branch, now.step) != (branch, step) => {
+            let name = now.time.branches.get(branch).map_or("", |branch| branch.name.as_str());
+            format!("as of step {step} on {name}")
+        }
+        _ => "in the same state".into(),
+    }
+}
+
+fn head(contrast: &Contrast, when: &str, area: Rect, buf: &mut Buffer) {
+    let inner = panel(buf, area, "Two instructions", when);
     let width = usize::from(inner.width);
     for (row, (name, side)) in [0, 2].into_iter().zip(["A", "B"].into_iter().zip(&contrast.sides)) {
         let line = Line::from(vec![

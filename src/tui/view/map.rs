@@ -73,18 +73,20 @@ fn legend(values: &Landscape, heading: Option<Heading>, other_step: Option<u32>,
     let far = values.heights.len() < values.of;
     let far = if far { format!(", {}/{}", values.heights.len(), values.of) } else { String::new() };
     let step = other_step.map_or(String::new(), |step| format!(", as of step {step}"));
+    let mark = other_step.map_or(String::new(), |step| format!(" @{step}"));
     let (words, letter, short) =
         (values.measure.words(), values.measure.letter(), heading.map_or("best", Heading::name));
     let brief = |x: f32| format!("{x:.2}").replacen("0.", ".", 1);
     let forms = [
         format!("{words}, {facing}: {low:.2} to {high:.2}{far}{step}"),
-        format!("{words}, {short}: {low:.2} to {high:.2}"),
-        format!("{letter}, {facing}: {low:.2} to {high:.2}"),
-        format!("{letter} {short} {low:.2} to {high:.2}"),
-        format!("{short} {} to {}", brief(low), brief(high)),
+        format!("{words}, {short}: {low:.2} to {high:.2}{step}"),
+        format!("{letter}, {facing}: {low:.2} to {high:.2}{step}"),
+        format!("{letter} {short} {low:.2} to {high:.2}{mark}"),
+        format!("{letter} {short} {} to {}{mark}", brief(low), brief(high)),
+        format!("{letter} {} to {}{mark}", brief(low), brief(high)),
     ];
     let fits = forms.iter().find(|form| form.width() <= room);
-    fits.unwrap_or(&forms[4]).clone()
+    fits.unwrap_or(&forms[5]).clone()
 }
 
 /// What lies under a place of the panel: a thing that is in view, furniture, or a cell of the floor.

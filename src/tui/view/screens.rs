@@ -129,7 +129,7 @@ fn values_are_painted_for_one_heading_or_the_best() {
         assert!(screen(&mut app).contains("best heading: 0."), "{}", screen(&mut app));
         perform(&mut app, Verb::NextHeading);
         check(&format!("values-{width}x{height}"), &screen(&mut app));
-        assert_eq!(perform(&mut app, Verb::ValueMap), [Effect::Send(Command::Stop)]);
+        assert_eq!(perform(&mut app, Verb::ValueMap), [Effect::Send(Command::StopSurvey)]);
         update(&mut app, Msg::Report(Report::Surveyed(Arc::new(landscape), 0)));
         assert!(app.landscape.is_none(), "what was cancelled and still arrives is not shown");
     }
@@ -193,6 +193,17 @@ fn forked(width: u16, height: u16) -> (App, Engine) {
     engine.act(turn(ActionType::LookUp));
     update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
     (app, engine)
+}
+
+#[test]
+fn the_first_row_holds_whatever_keeps_the_worker_busy() {
+    for width in [1, 7, 20, 80] {
+        let (mut app, _) = forked(width, 24);
+        for length in 0..usize::from(width) + 3 {
+            app.busy = Some("é".repeat(length));
+            assert_eq!(screen(&mut app).lines().next().map(str::is_empty), Some(false), "{length} of {width}");
+        }
+    }
 }
 
 #[test]

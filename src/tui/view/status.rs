@@ -42,24 +42,28 @@ impl Widget for Header<'_> {
         let (state, style) = match (&app.busy, app.going) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
             (None, Some(Going::Policy)) => (format!("running {}", app.pace.name()), THEME.good),
+            (None, Some(Going::Steps(left))) => (format!("{left} steps to go"), THEME.good),
             (None, Some(Going::Replay)) => (format!("replaying {}", app.pace.name()), THEME.good),
             (None, None) if app.working.is_some() => (app.working.clone().unwrap_or_default(), THEME.note),
             (None, None) => (format!("paused ({})", app.pace.name()), THEME.quiet),
         };
-        let left = format!("SPRINT  {}", words.join(" · "));
-        let room = usize::from(area.width).saturating_sub(state.width() + 2);
-        let left = fit(&left, room);
-        let gap = usize::from(area.width).saturating_sub(left.width() + state.width());
-        let (name, rest) = left.split_at(6.min(left.len()));
+        let width = usize::from(area.width);
+        let state = fit(&state, width.saturating_sub(NAME.len() + 2));
+        let room = width.saturating_sub(NAME.len() + state.width() + 2);
+        let words = fit(&format!("  {}", words.join(" · ")), room);
+        let gap = width.saturating_sub(NAME.len() + words.width() + state.width());
         Line::from(vec![
-            Span::styled(name.to_string(), THEME.title),
-            Span::raw(rest.to_string()),
+            Span::styled(NAME, THEME.title),
+            Span::raw(words),
             Span::raw(" ".repeat(gap)),
             Span::styled(state, style),
         ])
         .render(area, buf);
     }
 }
+
+/// The program's name, which the line begins with.
+const NAME: &str = "SPRINT";
 
 /// For whoever has never been here.
 const WELCOME: &str = "New here? space: it acts, waits · i: tell it something · h l: in time · ?: keys";

@@ -25,6 +25,17 @@ pub(super) type Followed = Arc<Mutex<HashMap<Who, Chained>>>;
 #[derive(Default)]
 pub(super) struct Background {
     turn: Turn,
+    /// What was started last.
+    work: Option<Work>,
+}
+
+/// What is worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Work {
+    /// A value map.
+    Survey,
+    /// A chain.
+    Chain,
 }
 
 /// The permission to go on working, and to be heard. What is stopped says nothing any more.
@@ -49,16 +60,26 @@ impl Turn {
 
 impl Background {
     /// Stops what is under way and starts something else.
-    pub(super) fn start(&mut self, work: impl FnOnce(&Turn) + Send + 'static) {
+    pub(super) fn start(&mut self, work: Work, run: impl FnOnce(&Turn) + Send + 'static) {
         self.stop();
+        self.work = Some(work);
         let turn = self.turn.clone();
         // Without a thread left nothing is computed; the screen stays as it is.
-        let _ = std::thread::Builder::new().name("background".into()).spawn(move || work(&turn));
+        let _ = std::thread::Builder::new().name("background".into()).spawn(move || run(&turn));
     }
 
     pub(super) fn stop(&mut self) {
         self.turn.stop();
-        self.turn = Turn::default();
+        (self.turn, self.work) = (Turn::default(), None);
+    }
+
+    /// Stops what is under way if it is that; whether it was.
+    pub(super) fn stop_if(&mut self, work: Work) -> bool {
+        let is = self.work == Some(work);
+        if is {
+            self.stop();
+        }
+        is
     }
 }
 
@@ -77,14 +98,16 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         let key = (self.engine.who(), told.clone(), without_agent(&scene, &world).digest());
         let known = self.surveys.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
         if let Some(known) = known {
-            return (self.tell)(Report::Surveyed(known, step));
+            // One that is under way is of other words, or of another house.
+            let stopped = self.background.stop_if(Work::Survey);
+            return (!stopped || (self.tell)(Report::Working(None))) && (self.tell)(Report::Surveyed(known, step));
         }
         let policy = match self.spare_policy() {
             Ok(policy) => policy,
             Err(error) => return self.refuse(&error),
         };
         let (tell, surveys, spare) = (self.tell.clone(), self.surveys.clone(), self.spare.clone());
-        self.background.start(move |turn| {
+        self.background.start(Work::Survey, move |turn| {
             let mut policy = policy;
             let mut visit = |found: &Landscape| {
                 let far = format!("values {}/{}", found.heights.len(), found.of);
@@ -147,7 +170,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
             }
         }
         let (tell, spare, followed) = (self.tell.clone(), self.spare.clone(), self.followed.clone());
-        self.background.start(move |turn| {
+        self.background.start(Work::Chain, move |turn| {
             let say = |report: Report| turn.say(|| tell(report));
             for (who, mut policy) in runs {
                 let known = followed.lock().unwrap_or_else(PoisonError::into_inner).get(&who).cloned();

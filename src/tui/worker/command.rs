@@ -15,6 +15,8 @@ pub enum Command {
     Go(Option<Going>),
     /// One step by the policy's choice.
     Step,
+    /// No value map is computed any more; other work in the background goes on.
+    StopSurvey,
     /// One step that a person chose.
     Act(Action),
     /// Tell the agent something else.
@@ -81,4 +83,6 @@ pub enum Going {
     Replay,
     /// As the policy chooses.
     Policy,
+    /// As the policy chooses, so many steps at full speed.
+    Steps(u32),
 }

@@ -1,6 +1,6 @@
 //! Going on by itself, step after step, until something stops it.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::{Going, Report, Worker};
 use crate::tui::breakpoints::Facts;
@@ -19,10 +19,10 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 self.go(is_there.then_some(Going::Replay))
             }
             // Without a policy there is nothing to run; that it is missing was told.
-            Some(Going::Policy) if !self.engine.has_policy() => true,
-            Some(Going::Policy) => {
+            Some(Going::Policy | Going::Steps(_)) if !self.engine.has_policy() => true,
+            Some(Going::Policy | Going::Steps(_)) => {
                 let over = self.over();
-                self.go((!over).then_some(Going::Policy))
+                self.go(going.filter(|_| !over))
             }
         }
     }
@@ -45,8 +45,25 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 let over = self.engine.tree().next().is_none();
                 self.show() && self.think() && self.stop_at(&before) && (!over || self.go(None))
             }
+            Some(Going::Steps(left)) => {
+                self.step()
+                    && match self.going {
+                        None => true,
+                        Some(_) if left <= 1 => self.go(None),
+                        Some(_) => self.go(Some(Going::Steps(left - 1))),
+                    }
+            }
             _ => self.step(),
         }
+    }
+
+    /// When the next step is due: a counted number of steps is taken as fast as can be.
+    pub(super) fn next_due(&self) -> Instant {
+        let between = match self.going {
+            Some(Going::Steps(_)) => Duration::ZERO,
+            _ => self.pace.between_steps(),
+        };
+        Instant::now() + between
     }
 
     pub(super) fn step(&mut self) -> bool {

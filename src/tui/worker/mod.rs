@@ -95,7 +95,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
             let heard = match command {
                 Some(command) => self.obey(command),
                 None => {
-                    self.due = Instant::now() + self.pace.between_steps();
+                    self.due = self.next_due();
                     self.go_on()
                 }
             };
@@ -163,6 +163,7 @@ mod tests {
 
     use super::*;
     use crate::domain::{Action, ActionType};
+    use crate::run::chain::Draws;
     use crate::tui::testing;
 
     /// A worker in the kitchen, and what it tells.
@@ -202,6 +203,30 @@ mod tests {
         commands.send(Command::Act(Action::navigate(ActionType::RotateLeft))).unwrap();
         let report = wait(&reports, |report| matches!(report, Report::Stepped(_)));
         assert!(matches!(report, Report::Stepped(event) if event.by_hand && event.step == 1));
+    }
+
+    #[test]
+    fn it_takes_so_many_steps_at_full_speed_unless_told_to_stop() {
+        let (commands, reports) = start();
+        commands.send(Command::Go(Some(Going::Steps(3)))).unwrap();
+        wait(&reports, |report| matches!(report, Report::Stepped(event) if event.step == 3));
+        wait(&reports, |report| matches!(report, Report::Going(None)));
+        commands.send(Command::Go(Some(Going::Steps(u32::MAX)))).unwrap();
+        wait(&reports, |report| matches!(report, Report::Stepped(event) if event.step == 4));
+        commands.send(Command::Go(None)).unwrap();
+        wait(&reports, |report| matches!(report, Report::Going(None)));
+    }
+
+    #[test]
+    fn a_chain_belongs_to_the_house_that_it_was_asked_in() {
+        let (commands, reports) = start();
+        commands.send(Command::Chain("take the mug; open the fridge".into())).unwrap();
+        wait(&reports, |report| matches!(report, Report::Chained(_)));
+        commands.send(Command::Next).unwrap();
+        wait(&reports, |report| matches!(report, Report::Working(None)));
+        commands.send(Command::WhichLink(Draws { times: 1, only: None })).unwrap();
+        let refused = wait(&reports, |report| matches!(report, Report::Refused(_)));
+        assert!(matches!(refused, Report::Refused(why) if why.contains("there is no chain yet")));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::background::Followed;
+use super::background::{Followed, Work};
 use super::{Command, Going, Report, Worker};
 
 impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
@@ -47,7 +47,12 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                     _ => self.engine.next_episode(),
                 };
                 match opened {
-                    Ok(()) => self.show() && self.think(),
+                    // What is known of the chain is of the house before.
+                    Ok(()) => {
+                        self.background.stop();
+                        (self.chain, self.followed) = (None, Followed::default());
+                        (self.tell)(Report::Working(None)) && self.show() && self.think()
+                    }
                     Err(error) => self.refuse(&error),
                 }
             }
@@ -129,6 +134,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                     Err(error) => self.refuse(&error),
                 }
             }
+            Command::StopSurvey => !self.background.stop_if(Work::Survey) || (self.tell)(Report::Working(None)),
             Command::Stop => {
                 self.background.stop();
                 (self.tell)(Report::Working(None))

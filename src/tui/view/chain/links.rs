@@ -69,8 +69,8 @@ impl Widget for Links<'_> {
         }
         let (note, style) = match (weakest, &own.trials) {
             (Some(at), _) => (format!("link {} breaks the chain", at + 1), THEME.bad),
-            (None, Some(_)) => ("no link breaks".into(), THEME.good),
-            (None, None) => (about(own.by_link.as_ref(), columns.values).to_string(), THEME.quiet),
+            (None, Some(trials)) if trials.is_complete() => ("no link breaks".into(), THEME.good),
+            (None, _) => (about(own.by_link.as_ref(), columns.values).to_string(), THEME.quiet),
         };
         put(buf, inner, inner.height.saturating_sub(1), note, style);
     }
