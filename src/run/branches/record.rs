@@ -1,14 +1,28 @@
 //! A branch as it is written down: as an episode of a run.
 
+use super::Moment;
 use super::tree::Tree;
 use crate::run::episode::{Author, Episode};
 
 impl Tree {
+    /// The start as a branch left it: since the tree began, a reset may have begun to grade what is told there.
+    pub fn beginning(&self, branch: usize) -> Moment {
+        let mut start = self.start().clone();
+        if let Some((next, Some(taken))) = self.story(branch).get(1)
+            && start.grader.is_none()
+            && next.grader.is_some()
+        {
+            start.instruction = taken.instruction.to_string();
+            start.grader.clone_from(&next.grader);
+        }
+        start
+    }
+
     /// A branch as an episode of a run. Who chose is written where it changes, and at its first step.
     pub fn episode(&self, branch: usize, task: &str) -> Episode {
         let story = self.story(branch);
-        let start = story.first().map(|(moment, _)| *moment);
-        let mut told = start.map_or("", |start| start.instruction.as_str());
+        let start = self.beginning(branch);
+        let mut told = start.instruction.as_str();
         let mut by: Option<&Author> = None;
         let mut trace = Vec::new();
         for taken in story.iter().filter_map(|(_, taken)| *taken) {
@@ -19,12 +33,12 @@ impl Tree {
             trace.push(step);
         }
         let completed = trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let of = start.and_then(|start| start.grader.as_ref()).map_or(0, |grader| grader.total() as u32);
+        let of = start.grader.as_ref().map_or(0, |grader| grader.total() as u32);
         Episode {
             task: task.into(),
             seed: 0,
-            start_hash: start.map_or_else(String::new, |start| start.world.digest()),
-            instruction: start.map_or_else(String::new, |start| start.instruction.clone()),
+            start_hash: start.world.digest(),
+            instruction: start.instruction.clone(),
             completed,
             of,
             success: of > 0 && completed == of,

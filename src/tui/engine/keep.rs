@@ -15,12 +15,12 @@ use crate::run::{explored, export, folder};
 impl Engine {
     /// Everything that was tried as a run's tasks and episodes, a branch each.
     pub fn explored(&self) -> Explored {
-        let tasks = self.tree.branches().iter().map(|branch| self.task_at(self.tree.start(), &branch.name)).collect();
-        let episodes = self.tree.branches().iter().enumerate();
+        let branches = || self.tree.branches().iter().enumerate();
+        let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
         Explored {
             scene: self.rollout.house.scene().clone(),
             tasks,
-            episodes: episodes.map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
+            episodes: branches().map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
         }
     }
 
@@ -29,7 +29,7 @@ impl Engine {
     /// # Errors
     /// Never for what the simulator itself did.
     pub fn recording(&self) -> anyhow::Result<Recording> {
-        let start = self.tree.start();
+        let start = &self.tree.beginning(self.tree.branch());
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
         let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
         Recording::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
@@ -146,5 +146,25 @@ mod tests {
         let text = std::fs::read_to_string(folder.path().join("a.txt")).unwrap();
         assert!(text.contains("1  RotateLeft"), "{text}");
         assert!(engine.export(&folder.path().join("a.mov")).is_err());
+    }
+
+    #[test]
+    fn what_is_asked_after_a_reset_is_graded_in_its_own_branch() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Expert).unwrap();
+        let own = engine.instruction().to_string();
+        engine.instruct("look around").unwrap();
+        engine.plant();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.instruct(&own).unwrap();
+        engine.reset();
+        while engine.end().is_none() {
+            engine.step().unwrap();
+        }
+        let explored = engine.explored();
+        let graded: Vec<_> = explored.episodes.iter().map(|episode| (episode.of > 0, episode.success)).collect();
+        assert_eq!(graded, [(false, false), (true, true)]);
+        let subtasks: Vec<_> = explored.tasks.iter().map(|task| task.subtasks.is_empty()).collect();
+        assert_eq!(subtasks, [true, false]);
     }
 }

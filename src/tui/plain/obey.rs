@@ -75,7 +75,7 @@ impl Plain {
                 writeln!(out, "actions are drawn with seed {seed} from here on")?;
             }
             Verb::Greedy => {
-                self.engine.reseed(0, false);
+                self.engine.reseed(self.engine.author().seed, false);
                 writeln!(out, "the likeliest actions from here on")?;
             }
             Verb::Back(count) => self.obey(Verb::Seek(self.engine.tree().at().saturating_sub(count)), out)?,

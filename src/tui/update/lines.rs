@@ -26,7 +26,6 @@ pub(super) fn obey_line(app: &mut App) -> Vec<Effect> {
     match verb::parse(&line) {
         Ok(verb) => {
             app.mode = app.under;
-            app.palette.remember(&line);
             let mut effects = uncover(app);
             effects.extend(perform(app, verb));
             effects

@@ -46,9 +46,10 @@ pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
             vec![Effect::Encode]
         }
         Verb::ToggleManual => {
+            let mut effects = turn_to(app, Page::Main);
             app.mode = if app.mode == Mode::Manual { Mode::Watch } else { Mode::Manual };
-            app.page = Page::Main;
-            if app.going.is_some() { send(Command::Go(None)) } else { vec![] }
+            effects.extend(app.going.map(|_| Effect::Send(Command::Go(None))));
+            effects
         }
         Verb::Instruct(text) => send(Command::Instruct(text)),
         Verb::Back(_)
