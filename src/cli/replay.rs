@@ -25,6 +25,9 @@ pub struct Replay {
     /// Compare where targets are projected with where they were recorded
     #[arg(long)]
     boxes: bool,
+    /// Ask whether an agent there would have seen and reached what was acted on
+    #[arg(long)]
+    sight: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -44,7 +47,7 @@ impl Replay {
             dataset.check_split(split)?;
         }
         let bar = ProgressBar::new(total).with_style(import::style()).with_message("replaying");
-        let options = Options { split: self.split, boxes: self.boxes };
+        let options = Options { split: self.split, boxes: self.boxes, sight: self.sight };
         let report = replay(&dataset, &options, &|done| bar.inc(done));
         bar.finish_and_clear();
         let report = report?;
@@ -79,6 +82,9 @@ fn print(report: &Report, out: &mut impl Write) -> std::io::Result<()> {
         ("skills, strict", report.skills_strict),
     ] {
         writeln!(out, "{what:<20}{:.2} %", share * 100.0)?;
+    }
+    if let Some(seen) = report.seen {
+        writeln!(out, "seen and reached    {:.2} %", seen * 100.0)?;
     }
     for (name, set) in &report.task_sets {
         writeln!(out, "{name:<20}{} tasks, {} by class, {} strict", set.tasks, set.class, set.strict)?;

@@ -15,7 +15,7 @@ use crate::domain::{ActionType, Scene, Task, Trajectory, World};
 use crate::house::camera::projected_bounds;
 use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
-use crate::house::{Outcome, rules};
+use crate::house::{House, Outcome, rules};
 
 /// What to replay.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +24,8 @@ pub struct Options {
     pub split: Option<String>,
     /// Compare projected with recorded boxes.
     pub boxes: bool,
+    /// Ask whether an agent there would have seen and reached what was acted on.
+    pub sight: bool,
 }
 
 /// What a replay came to. Shares are of trajectories, from 0 to 1.
@@ -31,8 +33,11 @@ pub struct Options {
 pub struct Report {
     /// How many trajectories.
     pub trajectories: usize,
-    /// Share whose every action is possible.
+    /// Share whose every action is possible, sight and reach apart.
     pub legal: f64,
+    /// Share in which everything acted on was in view and in reach then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seen: Option<f64>,
     /// Share that meets ALFRED's goal at the end.
     pub goals: f64,
     /// Share that completes every skill, graded by class.
@@ -55,7 +60,7 @@ pub struct Report {
 /// One failure.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Failure {
-    /// `legal`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
+    /// `legal`, `seen`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
     pub what: &'static str,
     /// The trajectory or task.
     pub id: String,
@@ -119,14 +124,17 @@ pub fn replay(dataset: &Dataset, options: &Options, progress: &(dyn Fn(u64) + Sy
                 return Ok(None);
             }
             let scene = scene_of(&scenes, &trajectory.scene).with_context(|| trajectory.id.clone())?;
-            let done = replay_one(scene, &trajectory, options.boxes);
+            let mut done = replay_one(scene, &trajectory, options.boxes);
+            if options.sight {
+                done.failures.extend(unseen(scene, &trajectory).map(|reason| ("seen", reason)));
+            }
             progress(1);
             Ok(Some((trajectory.id, done)))
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
     let mut replayed: Vec<(String, Replayed)> = replayed.into_iter().flatten().collect();
     replayed.sort_by(|a, b| a.0.cmp(&b.0));
-    let mut report = summarise(&replayed, options.boxes);
+    let mut report = summarise(&replayed, options);
     for name in ["eval_100", "eval_chain", "eval_unseen"] {
         if dataset.folder().join("tasks").join(format!("{name}.json")).is_file() && options.split.is_none() {
             let set = dataset.tasks(name)?;
@@ -139,9 +147,9 @@ pub fn replay(dataset: &Dataset, options: &Options, progress: &(dyn Fn(u64) + Sy
     Ok(report)
 }
 
-fn scene_of<'a>(scenes: &'a BTreeMap<String, Arc<Scene>>, reference: &SceneRef) -> anyhow::Result<&'a Scene> {
+fn scene_of<'a>(scenes: &'a BTreeMap<String, Arc<Scene>>, reference: &SceneRef) -> anyhow::Result<&'a Arc<Scene>> {
     match reference {
-        SceneRef::Named(name) => scenes.get(name).map(|scene| &**scene).with_context(|| format!("no scene {name:?}")),
+        SceneRef::Named(name) => scenes.get(name).with_context(|| format!("no scene {name:?}")),
         SceneRef::Generated { .. } => anyhow::bail!("generated scenes hold no recordings to replay"),
     }
 }
@@ -201,6 +209,18 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     replayed
 }
 
+/// The first action that an agent could not have taken because its target was out of view or reach, if there is one.
+fn unseen(scene: &Arc<Scene>, trajectory: &Trajectory) -> Option<String> {
+    let mut house = House::new(scene.clone(), trajectory.start.clone());
+    for (number, &action) in trajectory.actions.iter().enumerate() {
+        let possible = rules::apply(scene, &mut house.world().clone(), action).is_done();
+        if let (true, Outcome::Impossible(reason)) = (possible, house.step(action)) {
+            return Some(format!("action {number}, {}: {reason}", action.kind));
+        }
+    }
+    None
+}
+
 /// Marks an object and all it carries as moved.
 fn note_moved(world: &World, index: u16, moved: &mut [bool]) {
     let carried: Vec<u16> = world.contents(Instance::Object(index)).collect();
@@ -241,9 +261,10 @@ pub fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
     if all > 0.0 { shared / all } else { 0.0 }
 }
 
-fn summarise(replayed: &[(String, Replayed)], boxes: bool) -> Report {
+fn summarise(replayed: &[(String, Replayed)], options: &Options) -> Report {
     let mut failures: BTreeMap<&'static str, usize> =
         ["legal", "goals", "skills_class", "skills_strict"].map(|what| (what, 0)).into();
+    failures.extend(options.sight.then_some(("seen", 0)));
     let mut failed = Vec::new();
     for (id, one) in replayed {
         for (what, reason) in &one.failures {
@@ -258,10 +279,11 @@ fn summarise(replayed: &[(String, Replayed)], boxes: bool) -> Report {
     Report {
         trajectories: replayed.len(),
         legal: share("legal"),
+        seen: options.sight.then(|| share("seen")),
         goals: share("goals"),
         skills_class: share("skills_class"),
         skills_strict: share("skills_strict"),
-        boxes: boxes.then(|| box_report(replayed)),
+        boxes: options.boxes.then(|| box_report(replayed)),
         task_sets: BTreeMap::new(),
         failures,
         failed,
@@ -376,7 +398,7 @@ mod tests {
         let dataset = Dataset::open(out.path()).unwrap();
         let set = dataset.tasks("eval_100").unwrap();
         assert_eq!(set.tasks.iter().filter(|task| task.reworded).count(), 25);
-        let report = replay(&dataset, &Options { split: None, boxes: true }, &|_| {}).unwrap();
+        let report = replay(&dataset, &Options { boxes: true, ..Options::default() }, &|_| {}).unwrap();
         assert_eq!(report.trajectories, 6825);
         assert!(report.legal >= 0.999, "{}", report.legal);
         assert!(report.goals >= 0.995, "{}", report.goals);
@@ -386,6 +408,9 @@ mod tests {
         let boxes = report.boxes.unwrap();
         assert!(boxes.pickup_median_iou >= 0.78, "{}", boxes.pickup_median_iou);
         assert!(boxes.put_median_iou >= 0.80, "{}", boxes.put_median_iou);
+        let looking = Options { split: Some("valid_seen".into()), sight: true, ..Options::default() };
+        let seen = replay(&dataset, &looking, &|_| {}).unwrap().seen.unwrap();
+        assert!(seen >= 0.87, "{seen}");
     }
 
     #[test]

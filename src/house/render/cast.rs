@@ -13,6 +13,8 @@ use crate::house::bounds::Extent;
 
 /// How high the strip along the foot of walls is, in millimetres.
 const SKIRTING: i32 = 90;
+/// Furniture of at least this radius, in metres, lies in nothing else.
+const SMALL: f32 = 0.3;
 
 /// An instance's bodies and a ball around them.
 #[derive(Clone, Debug, Default)]
@@ -125,7 +127,10 @@ impl Cast {
                     })
             };
             if first || changed(index) || around() {
-                self.fixtures[index] = Figure::of(furniture::build(scene, index as u16, states));
+                let figure = Figure::of(furniture::build(scene, index as u16, states));
+                // A burner comes out of the slab that it lies in; the slab itself must not come before what lies on it.
+                let forward = if figure.radius < SMALL { figure.forward } else { 0.0 };
+                self.fixtures[index] = Figure { forward, ..figure };
             }
         }
         self.states = states.to_vec();
