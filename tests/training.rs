@@ -272,7 +272,7 @@ fn a_training_that_is_stopped_and_killed_on_the_way_ends_with_the_same_bytes() {
     for file in ["model.safetensors", "config.json", "README.md"] {
         let [whole, parts] = ["whole", "parts"].map(|folder| std::fs::read(sprint.path(folder).join(file)).unwrap());
         let named = |bytes: Vec<u8>, folder| String::from_utf8_lossy(&bytes).replace(folder, "agent");
-        assert_eq!(named(whole, "whole") == named(parts, "parts"), true, "{file} is another");
+        assert!(named(whole, "whole") == named(parts, "parts"), "{file} is another");
     }
 }
 

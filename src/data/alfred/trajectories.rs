@@ -35,12 +35,12 @@ pub fn resolve(
                 Some(present(original, &slices).ok_or_else(|| missing(name))?)
             }
         };
-        if let (ActionType::Slice, Some(Instance::Object(whole))) = (step.kind, target) {
-            if let Entry::Vacant(cut) = slices.entry(whole) {
-                let parts = scene_slices(&start, whole);
-                cut.insert(Slices { first: count, parts });
-                count = count.saturating_add(parts.into());
-            }
+        if let (ActionType::Slice, Some(Instance::Object(whole))) = (step.kind, target)
+            && let Entry::Vacant(cut) = slices.entry(whole)
+        {
+            let parts = scene_slices(&start, whole);
+            cut.insert(Slices { first: count, parts });
+            count = count.saturating_add(parts.into());
         }
         if step.kind.is_interaction() {
             boxes.push(step.bounds.unwrap_or_default());
