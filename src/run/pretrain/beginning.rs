@@ -37,8 +37,8 @@ impl Pretraining {
         Ok(networks)
     }
 
-    /// A folder that holds a training's state is taken up when that is asked for, and no other folder that holds anything. Of a
-    /// training that ended before it saved a state nothing is worth keeping.
+    /// A folder that holds a training's state is taken up when that is asked for, and no other folder that holds anything. A
+    /// training that ended before it saved a state is begun anew: what it said of itself is taken back.
     pub(super) fn check_out(&self, training: &Path) -> anyhow::Result<()> {
         let begun = ["visual.safetensors", "state.safetensors"].iter().any(|state| training.join(state).exists());
         match (begun, self.resume) {
@@ -50,10 +50,11 @@ impl Pretraining {
                 if !(resumed && training.exists()) {
                     vacant::check(&self.out)?;
                 }
-                match std::fs::remove_dir_all(training) {
-                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
-                    _ => Ok(()),
+                let said = ["preset.toml", "progress.jsonl"].map(|file| training.join(file));
+                for file in said.iter().filter(|file| file.exists()) {
+                    std::fs::remove_file(file).with_context(|| file.display().to_string())?;
                 }
+                Ok(())
             }
         }
     }
