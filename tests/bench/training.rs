@@ -18,6 +18,7 @@ use sprint_explorer::nets::eyes::Eyes;
 use sprint_explorer::run::batches::Batches;
 use sprint_explorer::run::material::{Maps, Material, Pool, Rows, Told, joined};
 use sprint_explorer::run::presets::Preset;
+use sprint_explorer::run::state::State;
 use sprint_explorer::run::trainer::Trainer;
 use tch::{Device, Kind, Tensor};
 
@@ -76,7 +77,8 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
     let (judged, batch) = (networks.critic.is_some(), preset.training.batch);
     let batches =
         Batches::new(material, preset.policy.history, judged, preset.chaining.as_ref(), (preset.seed, batch), device);
-    let trainer = Trainer { networks: &networks, preset, state: Path::new(""), identity: &BTreeMap::new() };
+    let state = State { path: Path::new(""), identity: &BTreeMap::new() };
+    let trainer = Trainer { networks: &networks, preset, state };
     let mut update = trainer.update()?;
     let (mut gathering, mut updating) = (Vec::new(), Vec::new());
     for step in 0..WARM + STEPS {
@@ -135,6 +137,7 @@ fn items() -> Items {
         training: (0..FRAMES / SPAN - 1).map(span).collect(),
         held_out: Vec::new(),
         firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
+        withheld: Default::default(),
         past: Past::Trajectory,
         named: Named::Ahead,
     }
