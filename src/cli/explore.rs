@@ -40,7 +40,7 @@ struct Origin {
     /// Start where a demonstration of this scene of the dataset began
     #[arg(long, value_name = "NAME", conflicts_with = "task")]
     scene: Option<String>,
-    /// Start at a task of a file: its id, or its number from 1
+    /// Start at a task of a file: its number from 1, or its id
     #[arg(long, value_name = "FILE#N")]
     task: Option<String>,
     /// The dataset folder that --scene looks in

@@ -47,8 +47,9 @@ impl Reference {
         let recorded = Recorded::open(&run, tasks)?;
         let place = |name: &str| {
             let numbered = name.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-            let by_id = recorded.episodes.iter().position(|episode| episode.task == name);
-            by_id.or(numbered).filter(|&at| at < recorded.episodes.len())
+            let by_id = || recorded.episodes.iter().position(|episode| episode.task == name);
+            // A task may have a number for its id; what reports print are places.
+            numbered.filter(|&at| at < recorded.episodes.len()).or_else(by_id)
         };
         // An id may hold a colon itself.
         let (name, step) = match (place(rest), rest.rsplit_once(':')) {

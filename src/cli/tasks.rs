@@ -117,7 +117,7 @@ struct Check {
 /// Shows a task.
 #[derive(Args)]
 struct Show {
-    /// The task file, with the task's id or its number from 1: FILE#N; all tasks in a line each without
+    /// The task file, with the task's number from 1 or its id: FILE#N; all tasks in a line each without
     #[arg(value_name = "FILE[#N]")]
     task: String,
 }

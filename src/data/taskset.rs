@@ -43,13 +43,13 @@ pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
     }
 }
 
-/// The task of that id, or of that number from 1.
+/// The task of that number from 1, or of that id.
 ///
 /// # Errors
 /// When there is none; says what there is.
 pub fn pick<'a>(set: &'a TaskSet, wanted: &str) -> anyhow::Result<&'a Task> {
-    let numbered = || wanted.parse::<usize>().ok().and_then(|number| set.tasks.get(number.checked_sub(1)?));
-    let found = set.tasks.iter().find(|task| task.id == wanted).or_else(numbered);
+    let numbered = wanted.parse::<usize>().ok().and_then(|number| set.tasks.get(number.checked_sub(1)?));
+    let found = numbered.or_else(|| set.tasks.iter().find(|task| task.id == wanted));
     found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 1 to {}", set.tasks.len()))
 }
 
@@ -273,6 +273,9 @@ pub(crate) mod tests {
         for none in ["0", "3"] {
             assert!(pick(&set, none).unwrap_err().to_string().contains("1 to 2"));
         }
+        let mut numbered = set.clone();
+        numbered.tasks[0].id = "2".into();
+        assert_eq!(pick(&numbered, "2").unwrap().id, "second", "a number is a place, whatever a task is called");
     }
 
     proptest! {

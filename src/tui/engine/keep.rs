@@ -113,6 +113,8 @@ mod tests {
         engine.act(Action::navigate(ActionType::RotateLeft));
         engine.instruct("dance").unwrap();
         engine.step().unwrap();
+        engine.rename(1, "1").unwrap();
+        assert_eq!([engine.branch("1").unwrap(), engine.branch("2").unwrap()], [0, 1], "a number is a place");
         let path = folder.path().join("run");
         assert!(engine.keep(Some(path.clone())).unwrap().contains("2 branches"));
         assert!(engine.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));

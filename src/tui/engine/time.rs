@@ -29,15 +29,15 @@ impl Engine {
         Ok(())
     }
 
-    /// The branch of that name, or of that number from 1.
+    /// The branch of that number from 1, or of that name: places are how the screen names them.
     ///
     /// # Errors
     /// When there is none; says which there are.
     pub fn branch(&self, wanted: &str) -> anyhow::Result<usize> {
         let branches = self.tree.branches();
-        let numbered = || wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-        let found = branches.iter().position(|branch| branch.name == wanted).or_else(numbered);
-        found.filter(|&at| at < branches.len()).ok_or_else(|| {
+        let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let named = || branches.iter().position(|branch| branch.name == wanted);
+        numbered.filter(|&at| at < branches.len()).or_else(named).ok_or_else(|| {
             let names: Vec<&str> = branches.iter().map(|branch| branch.name.as_str()).collect();
             anyhow::anyhow!("there is no branch {wanted:?}; there are: {}", names.join(", "))
         })
