@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::faults::encoders;
 use crate::program::Sprint;
 
 #[test]
@@ -102,6 +103,16 @@ fn every_kind_of_run_is_verified_opened_by_its_number_and_exported() {
         let last = sprint.read(&format!("{run}/episodes.jsonl")).lines().count();
         let exported = sprint.run(&format!("export {run}#{last} {run}.txt"));
         assert_eq!(exported.code, Some(0), "{options}: {}", exported.stderr);
+    }
+    if let Some(home) = encoders() {
+        let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+        for line in [
+            format!("eval --tasks typed.json --checkpoint {shipped} --sample --limit 1 --out drawn"),
+            format!("verify drawn --checkpoint {shipped}"),
+        ] {
+            let ended = sprint.command(&line).env("SPRINT_HOME", &home).output().unwrap();
+            assert_eq!(ended.status.code(), Some(0), "{line}: {ended:?}");
+        }
     }
     let other = sprint.run("verify run0 --tasks sampled.json");
     assert!(other.stderr.contains("is not what run0 was made from"), "{}", other.stderr);

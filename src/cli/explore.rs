@@ -189,8 +189,7 @@ impl Origin {
             let (path, wanted) = taskset::split_reference(task);
             let set = taskset::read(&path)?.value;
             let scenes = Scenes::of(&path, &set);
-            let picked = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
-            let index = set.tasks.iter().position(|task| task.id == picked.id).unwrap_or(0);
+            let index = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
             return Ok((Start::Tasks { tasks: set.tasks, index }, scenes));
         }
         let none = Scenes::in_folder(None);

@@ -215,8 +215,8 @@ impl Show {
                 }
             }
             Some(wanted) => {
-                let task = taskset::pick(&set, wanted).with_context(|| file.display().to_string())?;
-                show(&mut out, task, &Scenes::of(&file, &set)).with_context(|| self.task.clone())?;
+                let at = taskset::pick(&set, wanted).with_context(|| file.display().to_string())?;
+                show(&mut out, &set.tasks[at], &Scenes::of(&file, &set)).with_context(|| self.task.clone())?;
             }
         }
         Ok(Ending::Ok)

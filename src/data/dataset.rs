@@ -93,13 +93,13 @@ impl Dataset {
     /// # Errors
     /// Names the splits that it holds.
     pub fn check_split(&self, split: &str) -> anyhow::Result<()> {
-        let known = || self.manifest.counts.iter().filter(|(_, counts)| counts.trajectories > 0).map(|(name, _)| name);
-        let listed = || known().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let counts = self.manifest.counts.iter().filter(|(_, counts)| counts.trajectories > 0);
+        let known: Vec<&str> = counts.map(|(name, _)| name.as_str()).collect();
         anyhow::ensure!(
-            known().any(|name| name == split),
+            known.contains(&split),
             "{} holds no split {split:?}; it holds {}",
             self.folder.display(),
-            listed()
+            known.join(", ")
         );
         Ok(())
     }

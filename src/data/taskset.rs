@@ -43,13 +43,14 @@ pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
     }
 }
 
-/// The task of that number from 1, or of that id.
+/// The position of the task of that number from 1, or of that id.
 ///
 /// # Errors
 /// When there is none; says what there is.
-pub fn pick<'a>(set: &'a TaskSet, wanted: &str) -> anyhow::Result<&'a Task> {
-    let numbered = wanted.parse::<usize>().ok().and_then(|number| set.tasks.get(number.checked_sub(1)?));
-    let found = numbered.or_else(|| set.tasks.iter().find(|task| task.id == wanted));
+pub fn pick(set: &TaskSet, wanted: &str) -> anyhow::Result<usize> {
+    let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+    let named = || set.tasks.iter().position(|task| task.id == wanted);
+    let found = numbered.filter(|&at| at < set.tasks.len()).or_else(named);
     found.with_context(|| format!("there is no task {wanted:?}; the tasks are numbered 1 to {}", set.tasks.len()))
 }
 
@@ -268,14 +269,13 @@ pub(crate) mod tests {
         let set = sample_set();
         assert_eq!(split_reference("a/b.json#1"), (PathBuf::from("a/b.json"), Some("1")));
         assert_eq!(split_reference("a/b.json"), (PathBuf::from("a/b.json"), None));
-        assert_eq!(pick(&set, "2").unwrap().id, "second");
-        assert_eq!(pick(&set, "first").unwrap().id, "first");
+        assert_eq!([pick(&set, "2").unwrap(), pick(&set, "first").unwrap()], [1, 0]);
         for none in ["0", "3"] {
             assert!(pick(&set, none).unwrap_err().to_string().contains("1 to 2"));
         }
         let mut numbered = set.clone();
         numbered.tasks[0].id = "2".into();
-        assert_eq!(pick(&numbered, "2").unwrap().id, "second", "a number is a place, whatever a task is called");
+        assert_eq!(pick(&numbered, "2").unwrap(), 1, "a number is a place, whatever a task is called");
     }
 
     proptest! {

@@ -4,7 +4,6 @@
 
 use std::collections::BTreeSet;
 
-use super::view::code;
 use crate::domain::place::Rect;
 use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Class, Point, Pose, Scene};
@@ -181,7 +180,7 @@ fn object(scene: &Scene, world: &World, index: usize, object: &Object) -> Result
 /// Says which one does not; the field is the caller's.
 pub fn instance(scene: &Scene, world: &World, instance: Instance, field: &str) -> Result<(), Misfit> {
     let known = world.class_of(scene, instance).is_some();
-    require(known, || field.into(), || format!("there is no such thing in the scene (number {:#x})", code(instance)))
+    require(known, || field.into(), || format!("there is no such thing in the scene: {instance:?}"))
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub struct Frame {
 /// The number of an instance in [`Frame::ids`]; 0 is structure (walls, floor, nothing).
 pub fn code(instance: Instance) -> u16 {
     match instance {
-        Instance::Fixture(i) => i.saturating_add(1),
+        Instance::Fixture(i) => 1 + i,
         Instance::Object(i) => 0x8000 | i,
     }
 }

@@ -29,7 +29,8 @@ pub fn threads() -> usize {
     usize::try_from(tch::get_num_threads()).unwrap_or(1)
 }
 
-/// Sets how many threads libtorch computes with, on the calling thread.
+/// Sets how many threads libtorch computes with, on the calling thread and on those that compute for the first time
+/// after it.
 pub fn set_threads(count: usize) {
     tch::set_num_threads(i32::try_from(count.max(1)).unwrap_or(i32::MAX));
 }

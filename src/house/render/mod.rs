@@ -203,6 +203,24 @@ mod tests {
     }
 
     #[test]
+    fn a_slab_hides_nothing_that_lies_on_it_wherever_its_middle_is() {
+        // Its middle is a hand's breadth before the agent, the knife a metre ahead.
+        let slab = fixture("CounterTop", [-1500, 850, -1200], [1500, 900, 1500]);
+        let scene = scene(vec![slab]);
+        let knife = Object { parent: Parent::In(Instance::Fixture(0)), ..object("Knife", [0, 905, 1000]) };
+        let mut world = world(&scene, vec![knife]);
+        world.agent.horizon = 30;
+        let alone = World { objects: world.objects.clone(), ..World::new(&self::scene(vec![]), world.agent, vec![]) };
+        let pixels = |scene: &Scene, world: &World| {
+            let mut renderer = Renderer::new(300);
+            let shown = view::code(Instance::Object(0));
+            renderer.draw(scene, world).ids.iter().filter(|&&id| id == shown).count()
+        };
+        let (on, free) = (pixels(&scene, &world), pixels(&self::scene(vec![]), &alone));
+        assert!(free > 50 && on > free / 2, "{on} of {free} pixels");
+    }
+
+    #[test]
     fn an_open_drawer_is_drawn_nearer() {
         let scene = scene(vec![fixture("Drawer", [-200, 1300, 1000], [200, 1450, 1320])]);
         let mut world = world(&scene, vec![]);

@@ -37,26 +37,28 @@ impl Pretraining {
         Ok(networks)
     }
 
-    /// A folder that holds a training's state is taken up when that is asked for, and no other folder that holds anything. A
-    /// training that ended before it saved a state is begun anew: what it said of itself is taken back.
-    pub(super) fn check_out(&self, training: &Path) -> anyhow::Result<()> {
+    /// Whether `out` holds a training that can be taken up. That is done when it is asked for, and no other folder that holds
+    /// anything is trained into.
+    pub(super) fn check_out(&self, training: &Path) -> anyhow::Result<bool> {
         let begun = ["visual.safetensors", "state.safetensors"].iter().any(|state| training.join(state).exists());
-        match (begun, self.resume) {
-            (true, true) => Ok(()),
-            (true, false) => {
-                bail!("{} holds a training already: use --resume, or another folder", self.out.display())
-            }
-            (false, resumed) => {
-                if !(resumed && training.exists()) {
-                    vacant::check(&self.out)?;
-                }
-                let said = ["preset.toml", "progress.jsonl"].map(|file| training.join(file));
-                for file in said.iter().filter(|file| file.exists()) {
-                    std::fs::remove_file(file).with_context(|| file.display().to_string())?;
-                }
-                Ok(())
-            }
+        if begun && !self.resume {
+            bail!("{} holds a training already: use --resume, or another folder", self.out.display());
         }
+        // A training that is resumed may have kept a checkpoint before its first state.
+        let resumed = self.resume && training.exists();
+        if !(begun || resumed) {
+            vacant::check(&self.out)?;
+        }
+        Ok(begun)
+    }
+
+    /// A training that ended before it saved a state is begun anew: what it said of itself is taken back.
+    pub(super) fn take_back(training: &Path) -> anyhow::Result<()> {
+        let said = ["preset.toml", "progress.jsonl"].map(|file| training.join(file));
+        for file in said.iter().filter(|file| file.exists()) {
+            std::fs::remove_file(file).with_context(|| file.display().to_string())?;
+        }
+        Ok(())
     }
 
     /// An episodic transformer embeds words by itself; all others are told what the sentence encoder makes of a text.

@@ -78,7 +78,7 @@ impl Pretraining {
     /// When data or an earlier state cannot be read, the folder not be written, or `out` holds something else already.
     pub fn run(&self, report: &mut dyn Report, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
         let training = self.out.join("training");
-        self.check_out(&training)?;
+        let begun = self.check_out(&training)?;
         // What can be refused is refused before the folder is touched.
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let footage = Footage::open(&datasets)?;
@@ -86,6 +86,9 @@ impl Pretraining {
         let trials =
             self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
         std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
+        if !begun {
+            Pretraining::take_back(&training)?;
+        }
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
         let mut report = Events::open(&training, &mut report)?;

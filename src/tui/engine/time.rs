@@ -156,3 +156,24 @@ impl Engine {
         Ok(parted)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::tui::policies::PolicyKind;
+    use crate::tui::testing;
+
+    #[test]
+    fn an_episode_that_was_told_other_words_or_none_is_graded_as_it_was() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Random).unwrap();
+        (0..3).for_each(|_| drop(engine.step().unwrap()));
+        let episode = engine.explored().episodes.remove(0);
+        for told in ["Dance.", ""] {
+            let mut again = testing::engine();
+            let other = crate::run::episode::Episode { instruction: told.into(), ..episode.clone() };
+            again.retrace(&other, engine.author(), false).unwrap();
+            assert_eq!((again.instruction(), again.tree().at()), (told, 3));
+            assert!(again.rollout().grader.is_some());
+        }
+    }
+}

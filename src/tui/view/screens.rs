@@ -129,6 +129,10 @@ fn values_are_painted_for_one_heading_or_the_best() {
         assert!(screen(&mut app).contains("best heading: 0."), "{}", screen(&mut app));
         perform(&mut app, Verb::NextHeading);
         check(&format!("values-{width}x{height}"), &screen(&mut app));
+        let values = app.landscape.take().map(|(values, _)| (values, 7));
+        app.landscape = values;
+        let text = screen(&mut app);
+        assert!(text.contains("as of step 7") || text.contains(" @7"), "{text}");
         assert_eq!(perform(&mut app, Verb::ValueMap), [Effect::Send(Command::StopSurvey)]);
         update(&mut app, Msg::Report(Report::Surveyed(Arc::new(landscape), 0)));
         assert!(app.landscape.is_none(), "what was cancelled and still arrives is not shown");
@@ -196,6 +200,14 @@ fn forked(width: u16, height: u16) -> (App, Engine) {
 }
 
 #[test]
+fn whoever_takes_over_sees_the_main_page_drawn_anew() {
+    let (mut app, _) = forked(80, 24);
+    perform(&mut app, Verb::Show(Page::Mind));
+    let effects = perform(&mut app, Verb::ToggleManual);
+    assert_eq!((app.page, effects), (Page::Main, vec![Effect::Encode, Effect::Repaint]));
+}
+
+#[test]
 fn the_first_row_holds_whatever_keeps_the_worker_busy() {
     for width in [1, 7, 20, 80] {
         let (mut app, _) = forked(width, 24);
@@ -247,6 +259,10 @@ fn two_instructions_are_compared_and_swapped() {
         let contrast = engine.contrast("open the fridge").unwrap();
         update(&mut app, Msg::Report(Report::Compared(Box::new(contrast))));
         check(name, &screen(&mut app));
+        let at = engine.tree().at();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        update(&mut app, Msg::Report(Report::Seen(Box::new(snapshot(&mut engine)))));
+        assert!(screen(&mut app).contains(&format!("as of step {at} on ")), "{}", screen(&mut app));
         let effects = perform(&mut app, Verb::Swap);
         assert_eq!(effects[0], Effect::Send(Command::Instruct("Open the fridge.".into())));
     }

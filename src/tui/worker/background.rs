@@ -199,3 +199,18 @@ fn without_agent(scene: &Scene, world: &World) -> World {
     world.agent.heading = Heading::North;
     world
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_work_that_is_meant_is_stopped() {
+        let mut background = Background::default();
+        background.start(Work::Chain, |_| ());
+        let turn = background.turn.clone();
+        assert!(!background.stop_if(Work::Survey) && !turn.stop.load(Ordering::Relaxed));
+        assert!(background.stop_if(Work::Chain) && turn.stop.load(Ordering::Relaxed));
+        assert!(!background.stop_if(Work::Chain), "nothing is left to stop");
+    }
+}
