@@ -11,8 +11,14 @@
 //! | [`nets`] | visual encoders, policy and critic, sentence encoders, strict weights files |
 //! | [`algo`] | behaviour cloning, IQL, chaining; the update, optimiser, learner |
 //! | [`agent`] | what decides the next action: trained, expert, chance |
-//! | [`run`] | the one loop that steps an environment, and the runs that use it |
-//! | [`tui`] | the explorer |
+//! | [`episode`] | the one loop that steps an environment, records, scenes, branches, failures |
+//! | [`run_dir`] | run folders: manifest, episodes in order, reader, writer, shards |
+//! | [`report`] | summaries, statistics, comparisons, pages, charts, films |
+//! | [`eval`] | evaluation on workers, task sets, verification, replay |
+//! | [`train`] | presets, data, batches, the trainer; relabelling, collection, pretraining |
+//! | [`analysis`] | chains link by link, two instructions in one state, the value of every cell |
+//! | [`explore`] | an explorer session without a screen, and the plain mode |
+//! | [`tui`] | the explorer's screen |
 //! | [`cli`] | the command line |
 
 pub mod domain;
@@ -22,6 +28,12 @@ pub mod data;
 pub mod nets;
 pub mod algo;
 pub mod agent;
-pub mod run;
+pub mod episode;
+pub mod run_dir;
+pub mod report;
+pub mod eval;
+pub mod train;
+pub mod analysis;
+pub mod explore;
 pub mod tui;
 pub mod cli;

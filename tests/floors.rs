@@ -3,11 +3,14 @@
 use std::path::{Path, PathBuf};
 
 /// Ground floor first.
-const FLOORS: [&str; 10] = ["domain", "language", "house", "data", "nets", "algo", "agent", "run", "tui", "cli"];
+const FLOORS: [&str; 16] = [
+    "domain", "language", "house", "data", "nets", "algo", "agent", "episode", "run_dir", "report", "eval", "train",
+    "analysis", "explore", "tui", "cli",
+];
 
 /// Libraries, and the floors that may use them.
 const LIBRARIES: [(&str, &[&str]); 4] =
-    [("tch", &["nets", "algo", "agent", "run"]), ("ratatui", &["tui"]), ("crossterm", &["tui"]), ("clap", &["cli"])];
+    [("tch", &["nets", "algo", "agent", "train"]), ("ratatui", &["tui"]), ("crossterm", &["tui"]), ("clap", &["cli"])];
 
 /// A source file: its floor and its lines that are code.
 struct Source {

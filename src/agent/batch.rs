@@ -6,13 +6,13 @@
 use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
+use super::conditioning;
 use super::config::Config;
+use super::frame_history::{Memory, SharedEmbedder};
 use super::learned::LearnedPolicy;
-use super::memory::{Memory, SharedEmbedder};
 use super::policy::Situation;
 use super::select::Heads;
 use super::team::{Decisions, Team};
-use super::told;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::visual::SIDE;
 
@@ -81,12 +81,12 @@ impl Team for LearnedTeam {
             match situation {
                 Some(here) => {
                     observations.push(memory.observe(maps.narrow(0, seat, 1), here.step, history as usize));
-                    let hear = || told::told(here, &self.config, &*self.sight, &self.sentences, self.device);
+                    let hear = || conditioning::told(here, &self.config, &*self.sight, &self.sentences, self.device);
                     told.push(memory.told(here.instruction, hear)?);
                 }
                 None => {
                     observations.push(Tensor::zeros([1, history * features, SIDE, SIDE], floats));
-                    told.push(told::nothing(&self.config, self.device));
+                    told.push(conditioning::nothing(&self.config, self.device));
                 }
             }
         }
@@ -125,7 +125,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::agent::balance::Balance;
+    use crate::agent::logit_adjustment::Balance;
     use crate::agent::{Mind, Policy};
     use crate::domain::{ActionType, Heading};
     use crate::house::House;

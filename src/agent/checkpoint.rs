@@ -6,12 +6,12 @@ use std::path::Path;
 use tch::{Device, Tensor, nn};
 
 use super::config::Config;
-use super::values::Values;
+use super::value_estimates::Values;
 use crate::data::json;
 use crate::house::view::Candidate;
 use crate::nets::critic::{Critic, CriticSpec, Senses};
-use crate::nets::eyes::Eyes;
 use crate::nets::policy::{PolicyNet, PolicySpec};
+use crate::nets::visual_encoder::Eyes;
 use crate::nets::weights::{self, Form};
 
 /// A policy's networks with the stores that own their weights.

@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tch::Device;
 
-use super::balance::Balance;
-use super::values::{Values, Weighing};
+use super::logit_adjustment::Balance;
+use super::value_estimates::{Values, Weighing};
 use crate::domain::{ActionType, Class};
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::critic::CriticSpec;
-use crate::nets::eyes::Eyes;
 use crate::nets::policy::PolicySpec;
 use crate::nets::precision::Precision;
 use crate::nets::resnet18;
 use crate::nets::sentence::SentenceEncoder;
 use crate::nets::visual::VisualSpec;
+use crate::nets::visual_encoder::Eyes;
 
 /// The classes and actions that a policy's heads stand for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,13 +6,13 @@ use anyhow::Context;
 use tch::{Device, Tensor};
 
 use super::checkpoint::Networks;
+use super::conditioning;
 use super::config::Config;
-use super::memory::Memory;
-pub use super::memory::SharedEmbedder;
+use super::frame_history::Memory;
+pub use super::frame_history::SharedEmbedder;
 use super::policy::{Carried, Decision, Policy, Reading, Situation};
 use super::select::Heads;
-use super::told;
-use super::values::Values;
+use super::value_estimates::Values;
 use crate::nets::frozen::FrameEncoder;
 
 /// A policy from a checkpoint.
@@ -71,7 +71,7 @@ impl LearnedPolicy {
         let map = self.memory.map_of(&image).unwrap_or_else(|| self.sight.encode(std::slice::from_ref(&image)));
         self.memory.look(&image, situation.step);
         let observation = self.memory.observe(map, situation.step, self.config.policy.history as usize);
-        let hear = || told::told(situation, &self.config, &*self.sight, &self.sentences, self.device);
+        let hear = || conditioning::told(situation, &self.config, &*self.sight, &self.sentences, self.device);
         Ok((observation, self.memory.told(situation.instruction, hear)?))
     }
 }
@@ -112,7 +112,7 @@ impl Policy for LearnedPolicy {
     }
 
     fn reading(&self, instruction: &str) -> Option<Reading> {
-        told::reading(instruction, &self.config, &self.sentences)
+        conditioning::reading(instruction, &self.config, &self.sentences)
     }
 
     fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {

@@ -2,8 +2,8 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::memory::Memory;
-use super::values::Values;
+use super::frame_history::Memory;
+use super::value_estimates::Values;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::expert::Plan;
 use crate::house::grading::Grader;

@@ -7,7 +7,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::policy::{Decision, Mind};
-use super::values::Weighing;
+use super::value_estimates::Weighing;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
 
@@ -195,7 +195,7 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
-    use crate::agent::values::{ChoiceValue, Values};
+    use crate::agent::value_estimates::{ChoiceValue, Values};
     use crate::domain::Instance;
 
     fn candidate(kind: ActionType, class: &str, index: u16, distance: f32) -> Candidate {

@@ -7,11 +7,11 @@ use super::streams::say;
 use crate::agent::LearnedPolicy;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
-use crate::data::whole;
+use crate::data::atomic_file;
 use crate::nets::device::best_device;
-use crate::run::appraise::appraise;
-use crate::run::card::card;
-use crate::run::presets::Appraisal;
+use crate::train::model_card::card;
+use crate::train::preset::Appraisal;
+use crate::train::validation::appraise;
 
 /// Measures the checkpoint in `folder` and writes its card.
 ///
@@ -27,7 +27,7 @@ pub fn appraised(
     let findings = appraise(&mut policy, appraisal, &mut bars)?;
     bars.end();
     let text = card(&name(folder), &Config::read(folder)?, &findings);
-    whole::write(&folder.join("README.md"), text.as_bytes())?;
+    atomic_file::write(&folder.join("README.md"), text.as_bytes())?;
     say(text.trim_end());
     Ok(())
 }

@@ -10,11 +10,11 @@ use super::Ending;
 use super::appraised::appraised;
 use super::bar::Bars;
 use crate::agent::average::average;
-use crate::data::vacant;
+use crate::data::ensure_free;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::presets::{Appraisal, Preset};
+use crate::train::preset::{Appraisal, Preset};
 
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
 /// checkpoint it makes another that decides otherwise.
@@ -46,7 +46,7 @@ impl Average {
     /// # Errors
     /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
     pub fn run(self) -> anyhow::Result<Ending> {
-        vacant::check(&self.out)?;
+        ensure_free::check(&self.out)?;
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;
         let first = self.checkpoints[0].display();

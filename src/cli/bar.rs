@@ -5,7 +5,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::streams::say;
-use crate::run::progress::{Report, Scalars};
+use crate::train::metrics::{Report, Scalars};
 
 /// Shows scalars as they come. Without a terminal, a line now and then.
 pub struct Bars {

@@ -11,12 +11,12 @@ use super::bar::Bars;
 use super::stop;
 use super::streams::say;
 use crate::data::taskset;
+use crate::episode::scenes::Scenes;
 use crate::house::expert::Pace;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::collect::{Collection, Demonstrator, Manner, Source};
-use crate::run::scenes::Scenes;
+use crate::train::collect::{Collection, Demonstrator, Manner, Source};
 
 /// Collects demonstrations.
 #[derive(Args)]

@@ -8,9 +8,9 @@ use clap::Args;
 use super::streams::say;
 use super::{Ending, streams};
 use crate::data::json;
-use crate::run::comparison::Comparison;
-use crate::run::finished::FinishedRun;
-use crate::run::threshold::Threshold;
+use crate::report::compare::Comparison;
+use crate::report::threshold::Threshold;
+use crate::run_dir::reader::FinishedRun;
 
 /// Compares runs, episode by episode.
 #[derive(Args)]

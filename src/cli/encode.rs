@@ -14,8 +14,8 @@ use crate::data::Dataset;
 use crate::nets::device::best_device;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::resnet18::ResNet18;
-use crate::run::encoding::features;
-use crate::run::footage::Footage;
+use crate::train::feature_cache::features;
+use crate::train::frame_store::Footage;
 
 /// Encodes datasets.
 #[derive(Args)]

@@ -12,15 +12,16 @@ use super::policies::PolicyChoice;
 use super::streams::say;
 use super::{Ending, streams};
 use crate::data::taskset;
+use crate::episode::scenes::Scenes;
+use crate::eval::evaluation::{Evaluation, Progress};
+use crate::eval::options::Options;
+use crate::eval::tasks::sample;
 use crate::house::grading::Grading;
-use crate::run::evaluate::{Evaluation, Progress};
-use crate::run::folder::{self, RunFolder};
-use crate::run::options::Options;
-use crate::run::report::Summary;
-use crate::run::scenes::Scenes;
-use crate::run::shard::Shard;
-use crate::run::tasks;
-use crate::run::threshold::Threshold;
+use crate::report::summary::Summary;
+use crate::report::threshold::Threshold;
+use crate::run_dir::shard::Shard;
+use crate::run_dir::writer;
+use crate::run_dir::writer::RunFolder;
 
 /// Plays a task set and writes a run folder.
 #[derive(Args)]
@@ -95,11 +96,12 @@ impl Eval {
                 .with_context(|| format!("{}", self.tasks.display()))?;
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunFolder::open(&path, evaluation.manifest())?;
-        run.write_tasks(&tasks::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
+        run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
         let stop = super::stop::on_signals()?;
         let mut meter = Meter::new(self.json);
-        let summary =
-            crate::run::evaluate(&evaluation, &chosen.team, &mut run, &stop, &mut |progress| meter.show(progress))?;
+        let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.team, &mut run, &stop, &mut |progress| {
+            meter.show(progress)
+        })?;
         meter.finish();
         print(&summary, self.json)?;
         say(&format!("wrote {}", path.display()));
@@ -127,7 +129,7 @@ impl Eval {
     fn folder(&self, set: &str, policy: &str) -> PathBuf {
         let run = self.out.clone().unwrap_or_else(|| {
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-            folder::default_path(&format!("{set}-{policy}"), now.as_secs(), &|path| path.exists())
+            writer::default_path(&format!("{set}-{policy}"), now.as_secs(), &|path| path.exists())
         });
         self.shard.map_or_else(|| run.clone(), |shard| run.join(shard.folder()))
     }

@@ -9,15 +9,16 @@ use etcetera::BaseStrategy;
 
 use super::rooms::RoomName;
 use super::{Ending, logging, policies};
+use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
-use crate::run::scenes::Scenes;
+use crate::episode::scenes::Scenes;
+use crate::explore::episode_source::{Openings, Start};
+use crate::explore::plain;
+use crate::explore::session::Engine;
 use crate::tui::config::Config;
-use crate::tui::engine::Engine;
 use crate::tui::graphics::Protocol;
-use crate::tui::openings::{Openings, Start};
-use crate::tui::policies::{Policies, PolicyKind};
+use crate::tui::screen;
 use crate::tui::update::Farewell;
-use crate::tui::{plain, screen};
 
 /// Where the explorer starts, and who acts.
 #[derive(Args)]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Ending, open::Reference, streams};
-use crate::run::export;
-use crate::run::recording::Recording;
+use crate::episode::frames::Recording;
+use crate::report::export;
 
 /// Which episode, and into which files.
 #[derive(Args)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Ending;
-use crate::run::merge;
+use crate::eval::merge;
 
 /// Joins the shares that `sprint eval --shard` wrote into one run.
 #[derive(Args)]

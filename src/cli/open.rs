@@ -6,11 +6,11 @@ use anyhow::{Context, ensure};
 use clap::Args;
 
 use super::{Ending, explore::Display, policies};
-use crate::run::episode::Author;
-use crate::run::verify::Recorded;
-use crate::tui::engine::Engine;
-use crate::tui::openings::{Openings, Start};
-use crate::tui::policies::{Policies, PolicyKind};
+use crate::agent::registry::{Policies, PolicyKind};
+use crate::episode::record::Author;
+use crate::eval::verify::Recorded;
+use crate::explore::episode_source::{Openings, Start};
+use crate::explore::session::Engine;
 
 /// Which episode, and how to show it.
 #[derive(Args)]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Ending, streams};
-use crate::data::whole;
-use crate::run::curves;
+use crate::data::atomic_file;
+use crate::report::charts::training_curves;
 
 /// Draws the curves of trainings.
 #[derive(Args)]
@@ -29,9 +29,9 @@ impl PlotCurves {
     /// # Errors
     /// When a training's progress cannot be read, or the picture not be written.
     pub fn run(self) -> anyhow::Result<Ending> {
-        let read = |folder: &PathBuf| Ok((folder.display().to_string(), curves::read(folder)?));
+        let read = |folder: &PathBuf| Ok((folder.display().to_string(), training_curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
-        let plot = curves::draw(&trainings, &self.only)?;
+        let plot = training_curves::draw(&trainings, &self.only)?;
         let extension = self.out.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_lowercase();
         let files = match extension.as_str() {
             "svg" | "png" => vec![self.out.clone()],
@@ -41,7 +41,7 @@ impl PlotCurves {
         for file in files {
             let is_svg = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
             let bytes = if is_svg { plot.svg().into_bytes() } else { plot.png()? };
-            whole::write(&file, &bytes)?;
+            atomic_file::write(&file, &bytes)?;
             writeln!(out, "{}", file.display())?;
         }
         Ok(Ending::Ok)

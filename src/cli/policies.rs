@@ -9,13 +9,13 @@ use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
 use crate::agent::config::Config;
+use crate::agent::registry::{Agent, Loaded};
 use crate::agent::{ExpertPolicy, LearnedPolicy, LearnedTeam, Policy, RandomPolicy, Solo, Team};
 use crate::data::json;
+use crate::eval::executor::MakeTeam;
 use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::player::MakeTeam;
-use crate::tui::policies::{Agent, Loaded};
 
 /// Makes a policy.
 pub type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Sync;

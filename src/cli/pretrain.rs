@@ -14,9 +14,9 @@ use crate::agent::learned::SharedEmbedder;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::run::presets::Preset;
-use crate::run::pretrain::{Pretraining, Trained};
-use crate::run::trials::Trials;
+use crate::train::in_training_eval::Trials;
+use crate::train::preset::Preset;
+use crate::train::pretrain::{Pretraining, Trained};
 
 /// Trains an agent.
 #[derive(Args)]

@@ -10,7 +10,7 @@ use super::stop;
 use super::streams::say;
 use crate::language::passage::{Concatenation, Summarizer};
 use crate::language::rules::Rules;
-use crate::run::relabel::relabel;
+use crate::train::relabel::relabel;
 
 /// Labels runs of skills.
 #[derive(Args)]

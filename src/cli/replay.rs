@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use super::streams::say;
 use super::{Ending, import, streams};
 use crate::data::Dataset;
-use crate::run::replay::{Options, Report, replay};
+use crate::eval::replay::{Options, Report, replay};
 
 /// How many failures of each kind are listed.
 const LISTED: usize = 500;

@@ -7,11 +7,12 @@ use clap::Args;
 
 use super::Ending;
 use super::streams::say;
-use crate::data::{json, whole};
-use crate::run::finished::FinishedRun;
-use crate::run::folder::RunFolder;
-use crate::run::report::Summary;
-use crate::run::{html, plot};
+use crate::data::{atomic_file, json};
+use crate::report::charts::progress_by_length;
+use crate::report::html;
+use crate::report::summary::Summary;
+use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::writer::RunFolder;
 
 /// Draws a run: its plots and its page.
 #[derive(Args)]
@@ -40,8 +41,12 @@ impl Report {
                 .context("the same eval command writes the summary")?
                 .value;
             let page = out.join("report.html");
-            whole::write(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
-            plot::write(out, plot::PROGRESS, &plot::progress_by_length(&[&summary]))?;
+            atomic_file::write(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
+            progress_by_length::write(
+                out,
+                progress_by_length::PROGRESS,
+                &progress_by_length::progress_by_length(&[&summary]),
+            )?;
             say(&format!("wrote {}", page.display()));
         } else {
             bail!(

@@ -14,14 +14,15 @@ use super::{Ending, streams};
 use crate::agent::{ExpertPolicy, Solo, Team};
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
+use crate::episode::instruction_variant::told;
+use crate::episode::scenes::Scenes;
+use crate::eval::evaluation::Evaluation;
+use crate::eval::executor::MakeTeam;
+use crate::eval::options::Options;
+use crate::eval::tasks::check;
+use crate::eval::tasks::sample;
+use crate::eval::tasks::sample::{Phrasing, Wish};
 use crate::house::grading::{Grading, describe};
-use crate::run::evaluate::Evaluation;
-use crate::run::options::Options;
-use crate::run::player::MakeTeam;
-use crate::run::scenes::Scenes;
-use crate::run::taskcheck;
-use crate::run::tasks::{self, Phrasing, Wish};
-use crate::run::wording::told;
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
@@ -149,7 +150,7 @@ impl Sample {
         let set = if self.scenes == Path::new("generated") {
             let bar =
                 ProgressBar::new(u64::from(self.count)).with_style(super::import::style()).with_message("sampling");
-            let set = tasks::balanced(&wish, &lengths, &|wish| tasks::sample_generated(wish, &|| bar.inc(1)));
+            let set = sample::balanced(&wish, &lengths, &|wish| sample::sample_generated(wish, &|| bar.inc(1)));
             bar.finish_and_clear();
             set?
         } else {
@@ -161,7 +162,7 @@ impl Sample {
                 PhrasingName::Annotators => Phrasing::Annotators,
             };
             let split = self.split.as_deref();
-            tasks::balanced(&wish, &lengths, &|wish| tasks::sample_dataset(wish, &dataset, split, phrasing, folder))?
+            sample::balanced(&wish, &lengths, &|wish| sample::sample_dataset(wish, &dataset, split, phrasing, folder))?
         };
         taskset::write(&self.out, &set)?;
         Ok(Ending::Ok)
@@ -170,12 +171,12 @@ impl Sample {
 
 impl Check {
     fn run(self) -> anyhow::Result<Ending> {
-        let mistakes = taskcheck::mistakes(&self.file)?;
+        let mistakes = check::mistakes(&self.file)?;
         let mut out = streams::out();
         for mistake in &mistakes {
             writeln!(out, "{}:{mistake}", self.file.display())?;
         }
-        taskcheck::none(&mistakes, &self.file)?;
+        check::none(&mistakes, &self.file)?;
         let set = taskset::read(&self.file)?;
         let scenes = Scenes::of(&self.file, &set.value);
         let options = Options { jobs: super::threads(self.jobs), ..Options::plain(Grading::Class) };

@@ -7,9 +7,10 @@ use clap::Args;
 
 use super::{Ending, policies, streams};
 use crate::agent::Policy;
-use crate::run::episode::Author;
-use crate::run::verify::{self, Recorded};
-use crate::tui::policies::{Policies, PolicyKind};
+use crate::agent::registry::{Policies, PolicyKind};
+use crate::episode::record::Author;
+use crate::eval::verify;
+use crate::eval::verify::Recorded;
 
 /// Which run.
 #[derive(Args)]

@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{json, taskset, whole};
+use super::{atomic_file, json, taskset};
 use crate::domain::{Scene, TaskSet, Trajectory};
 use crate::house::validate;
 
@@ -218,7 +218,7 @@ impl Writer {
         if old.exists() {
             std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
         }
-        let file = whole::begin(&folder.join(TRAJECTORIES)).with_context(|| folder.display().to_string())?;
+        let file = atomic_file::begin(&folder.join(TRAJECTORIES)).with_context(|| folder.display().to_string())?;
         Ok(Writer { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
     }
 
@@ -255,7 +255,7 @@ impl Writer {
     pub fn finish(self, manifest: &Manifest) -> anyhow::Result<()> {
         let path = self.folder.join(TRAJECTORIES);
         let file = self.trajectories.finish()?;
-        whole::keep(file, &path).with_context(|| path.display().to_string())?;
+        atomic_file::keep(file, &path).with_context(|| path.display().to_string())?;
         json::write(&self.folder.join("dataset.json"), manifest)
     }
 }

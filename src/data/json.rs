@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
-use super::whole;
+use super::atomic_file;
 
 /// No file of ours comes near this many bytes; a larger one (or an endless device) is refused before it fills the memory.
 const LARGEST: u64 = 1 << 30;
@@ -99,7 +99,7 @@ pub fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> 
 fn write_line(path: &Path, text: serde_json::Result<Vec<u8>>) -> anyhow::Result<()> {
     let mut text = text.with_context(|| format!("cannot write {}", path.display()))?;
     text.push(b'\n');
-    whole::write(path, &text)
+    atomic_file::write(path, &text)
 }
 
 /// Bytes in hexadecimal.

@@ -1,5 +1,8 @@
 //! Networks: weights files, sentence encoders, the visual encoder, policy and critic, and where they compute.
 
+pub mod visual_encoder;
+pub mod perception_heads;
+pub mod resize;
 pub mod device;
 pub mod home;
 pub mod weights;
@@ -9,14 +12,11 @@ pub mod sentence;
 
 pub mod critic;
 pub mod episodic;
-pub mod eyes;
 pub mod film;
 pub mod frozen;
 pub mod policy;
 pub mod precision;
 pub mod resnet18;
-pub mod shrink;
-pub mod sight_heads;
 pub mod trunk;
 pub mod value;
 pub mod visual;

@@ -7,7 +7,7 @@ use anyhow::Context;
 use tch::{Device, Kind, Tensor};
 
 use super::frozen::{Folded, FrameEncoder, Norm, stacked};
-use super::shrink::shrink_bilinear;
+use super::resize::shrink_bilinear;
 use super::weights::{self, Form, Tensors};
 use crate::house::view::Frame;
 

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::bounds;
 use super::frozen::{Folded, FrameEncoder, Norm, stacked};
 use super::precision::{self, Precision};
-use super::shrink::shrink;
+use super::resize::shrink;
 use super::weights;
 use crate::house::view::Frame;
 

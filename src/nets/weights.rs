@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tch::{Kind, Tensor, nn};
 
-use crate::data::whole;
+use crate::data::atomic_file;
 
 /// Tensors by name.
 pub type Tensors = BTreeMap<String, Tensor>;
@@ -243,9 +243,9 @@ pub fn under(prefix: &str, tensors: &Tensors) -> Tensors {
 pub fn write(path: &Path, tensors: &Tensors, metadata: &BTreeMap<String, String>) -> Result<(), WeightsError> {
     let bytes = encode(tensors, metadata);
     let written = bytes.and_then(|bytes| {
-        let mut file = whole::begin(path)?;
+        let mut file = atomic_file::begin(path)?;
         file.write_all(&bytes)?;
-        whole::keep(file, path)
+        atomic_file::keep(file, path)
     });
     written.map_err(|source| WeightsError::Unwritable { path: path.into(), source })
 }

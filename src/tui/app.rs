@@ -4,12 +4,8 @@ use std::sync::Arc;
 
 use ratatui::layout::{Rect, Size};
 
-use super::breakpoints::Condition;
-use super::chained::Chained;
-use super::choices::Sort;
 use super::config::Config;
 use super::editor::Editor;
-use super::engine::Snapshot;
 use super::graphics::classes::{Letters, Names};
 use super::graphics::labels::Label;
 use super::graphics::overlay::Overlay;
@@ -17,16 +13,20 @@ use super::graphics::{Job, Picture, Protocol};
 use super::keys::Mode;
 use super::layout::Layout;
 use super::log::{Entry, Log, Tone};
-use super::policies::PolicyKind;
 use super::theme::Ability;
-use super::timeline::Divergence;
-use super::verb::Page;
-use super::worker::{Going, Pace};
+use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
+use crate::analysis::instruction_ab::Contrast;
+use crate::analysis::value_map::Landscape;
 use crate::domain::Heading;
+use crate::explore::breakpoints::Condition;
+use crate::explore::chained::Chained;
+use crate::explore::choices::Sort;
+use crate::explore::session::Snapshot;
+use crate::explore::timeline::Divergence;
+use crate::explore::verb::Page;
+use crate::explore::worker::{Going, Pace};
 use crate::house::view::Candidate;
-use crate::run::contrast::Contrast;
-use crate::run::landscape::Landscape;
 
 /// Columns that a picture needs so that its labels have names.
 const NAMED: u16 = 60;

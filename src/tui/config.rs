@@ -6,7 +6,8 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use serde::Deserialize;
 
 use super::theme::Scheme;
-use super::verb::{self, Verb};
+use crate::explore::verb;
+use crate::explore::verb::Verb;
 
 /// The file's content.
 #[derive(Debug, Deserialize)]
@@ -102,7 +103,7 @@ fn key(name: &str) -> Option<(KeyCode, KeyModifiers)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tui::policies::PolicyKind;
+    use crate::agent::registry::PolicyKind;
 
     #[test]
     fn keys_and_colours_are_read() {

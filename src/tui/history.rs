@@ -36,7 +36,7 @@ pub fn read(path: &Path) -> Remembered {
     let instructions = found.split_off(many.saturating_sub(MOST));
     if many > 2 * MOST {
         let kept = format!("{HEAD}\n{}\n", instructions.join("\n"));
-        if let Err(error) = crate::data::whole::write(path, kept.as_bytes()) {
+        if let Err(error) = crate::data::atomic_file::write(path, kept.as_bytes()) {
             tracing::info!("{error:#}");
         }
     }

@@ -2,10 +2,10 @@
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::policies::PolicyKind;
-use super::verb::{Page, TIMES, Verb};
+use crate::agent::registry::PolicyKind;
+use crate::analysis::chain::Draws;
 use crate::domain::ActionType;
-use crate::run::chain::Draws;
+use crate::explore::verb::{Page, TIMES, Verb};
 
 /// What the keys mean at the moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,29 +4,18 @@
 //! worker thread owns house and policy; a second one encodes pictures. [`view`] draws the state and nothing else.
 
 pub mod app;
-pub mod breakpoints;
-pub mod chained;
-pub mod choices;
 mod completion;
 pub mod config;
 pub mod editor;
-pub mod engine;
 pub mod graphics;
 pub mod history;
-pub mod inspect;
 pub mod keys;
 pub mod layout;
 pub mod log;
-pub mod openings;
-pub mod plain;
-pub mod policies;
 pub mod screen;
 pub mod terminal;
 #[cfg(test)]
 mod testing;
 pub mod theme;
-pub mod timeline;
 pub mod update;
-pub mod verb;
 pub mod view;
-pub mod worker;

@@ -19,16 +19,17 @@ use termprofile::TermProfile;
 
 use super::app::{App, Graphics};
 use super::config::Config;
-use super::engine::Engine;
 use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::Encoder;
 use super::graphics::{Protocol, detect, inline};
 use super::history;
-use super::policies::PolicyKind;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
 use super::update::{Effect, Farewell, Msg, update};
-use super::worker::{self, Command, Going};
+use crate::agent::registry::PolicyKind;
+use crate::explore::session::Engine;
+use crate::explore::worker;
+use crate::explore::worker::{Command, Going};
 
 /// What the screen is started with.
 pub struct Screen {
@@ -90,10 +91,11 @@ pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send 
 
     let reports = tell.clone();
     let gone = Gone(tell.clone());
-    let commands = worker::start(open, move |report| {
+    let report = move |report| {
         let _ = &gone;
         reports.send(Msg::Report(report)).is_ok()
-    })?;
+    };
+    let commands = worker::start(open, report, terminal::say_last_words)?;
     let pictures = tell.clone();
     if screen.runs && !screen.manual {
         commands.send(Command::Go(Some(Going::Policy)))?;

@@ -13,21 +13,22 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::{Rect, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
+use sprint_explorer::agent::registry::{Policies, PolicyKind};
 use sprint_explorer::domain::scene::Room;
-use sprint_explorer::run::scenes::Scenes;
+use sprint_explorer::episode::scenes::Scenes;
+use sprint_explorer::explore::episode_source::{Openings, Start};
+use sprint_explorer::explore::session::Engine;
+use sprint_explorer::explore::worker;
+use sprint_explorer::explore::worker::{Command, Going, Pace};
 use sprint_explorer::tui::app::{App, Graphics};
-use sprint_explorer::tui::engine::Engine;
 use sprint_explorer::tui::graphics::classes::{self, Letters};
 use sprint_explorer::tui::graphics::encoder::Encoder;
 use sprint_explorer::tui::graphics::overlay::Overlay;
 use sprint_explorer::tui::graphics::{Job, Picture, Protocol};
-use sprint_explorer::tui::openings::{Openings, Start};
-use sprint_explorer::tui::policies::{Policies, PolicyKind};
 use sprint_explorer::tui::screen::Conversation;
 use sprint_explorer::tui::terminal::{Counted, WRITTEN};
 use sprint_explorer::tui::theme::Ability;
 use sprint_explorer::tui::update::Msg;
-use sprint_explorer::tui::worker::{self, Command, Going, Pace};
 
 const KEYS: usize = 600;
 const BETWEEN: Duration = Duration::from_millis(11);
@@ -128,7 +129,11 @@ fn main() -> anyhow::Result<()> {
         let policies = Policies::new(Vec::new());
         Engine::new(openings, policies, PolicyKind::Random, Some("look around"))
     };
-    let commands = worker::start(open, move |report| reports.send((None, Msg::Report(report))).is_ok())?;
+    let commands = worker::start(
+        open,
+        move |report| reports.send((None, Msg::Report(report))).is_ok(),
+        |error| panic!("{error}"),
+    )?;
     let pictures = tell.clone();
     let encoder = Encoder::start(move |picture| pictures.send((None, Msg::Picture(picture))).is_ok())?;
     let size = Size { width: 120, height: 36 };

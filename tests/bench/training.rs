@@ -14,12 +14,12 @@ use sprint_explorer::data::features::{Features, Header, Writer};
 use sprint_explorer::data::items::{Items, Label, Span};
 use sprint_explorer::data::selection::{Named, Past};
 use sprint_explorer::nets::device::best_device;
-use sprint_explorer::nets::eyes::Eyes;
-use sprint_explorer::run::batches::Batches;
-use sprint_explorer::run::material::{Maps, Material, Pool, Rows, Told, joined};
-use sprint_explorer::run::presets::Preset;
-use sprint_explorer::run::state::State;
-use sprint_explorer::run::trainer::Trainer;
+use sprint_explorer::nets::visual_encoder::Eyes;
+use sprint_explorer::train::batches::Batches;
+use sprint_explorer::train::preset::Preset;
+use sprint_explorer::train::trainer::Trainer;
+use sprint_explorer::train::training_data::{Maps, Material, Pool, Rows, Told, joined};
+use sprint_explorer::train::training_state::State;
 use tch::{Device, Kind, Tensor};
 
 const FRAMES: u32 = 6000;

@@ -14,24 +14,27 @@ use sprint_explorer::data::summaries::{Ledger, Summaries, Summary};
 use sprint_explorer::data::{Dataset, alfred::layout::Layout, dataset, json, taskset};
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Room, TaskSet};
+use sprint_explorer::episode::scenes::Scenes;
+use sprint_explorer::eval::evaluation::Evaluation;
+use sprint_explorer::eval::evaluation::evaluate;
+use sprint_explorer::eval::executor::MakeTeam;
+use sprint_explorer::eval::options::Options;
+use sprint_explorer::eval::tasks::check;
+use sprint_explorer::eval::tasks::sample;
+use sprint_explorer::eval::tasks::sample::Wish;
+use sprint_explorer::eval::verify::{Recorded, verify};
 use sprint_explorer::house::expert::Pace;
 use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
 use sprint_explorer::nets::embedding_cache::EmbeddingCache;
 use sprint_explorer::nets::weights;
-use sprint_explorer::run::collect::{Collection, Demonstrator, Manner, Source};
-use sprint_explorer::run::comparison::Comparison;
-use sprint_explorer::run::evaluate::Evaluation;
-use sprint_explorer::run::finished::FinishedRun;
-use sprint_explorer::run::folder::RunFolder;
-use sprint_explorer::run::options::Options;
-use sprint_explorer::run::player::MakeTeam;
-use sprint_explorer::run::presets::Preset;
-use sprint_explorer::run::progress::{Report, Scalars};
-use sprint_explorer::run::scenes::Scenes;
-use sprint_explorer::run::tasks::{self, Wish};
-use sprint_explorer::run::verify::{Recorded, verify};
-use sprint_explorer::run::{curves, evaluate, taskcheck};
+use sprint_explorer::report::charts::training_curves;
+use sprint_explorer::report::compare::Comparison;
+use sprint_explorer::run_dir::reader::FinishedRun;
+use sprint_explorer::run_dir::writer::RunFolder;
+use sprint_explorer::train::collect::{Collection, Demonstrator, Manner, Source};
+use sprint_explorer::train::metrics::{Report, Scalars};
+use sprint_explorer::train::preset::Preset;
 use sprint_explorer::tui::config;
 use tch::Device;
 
@@ -84,7 +87,7 @@ fn shipped(file: &str) -> Vec<u8> {
 
 fn sampled() -> TaskSet {
     let wish = Wish { name: "sampled".into(), length: 2, count: 2, seed: 5, rooms: vec![Room::Bathroom] };
-    tasks::sample_generated(&wish, &|| ()).unwrap()
+    sample::sample_generated(&wish, &|| ()).unwrap()
 }
 
 fn by_hand() -> serde_json::Value {
@@ -97,7 +100,7 @@ fn by_hand() -> serde_json::Value {
 
 fn task_set(at: &Path) -> anyhow::Result<()> {
     let path = at.join("tasks.json");
-    let mistakes = taskcheck::mistakes(&path)?;
+    let mistakes = check::mistakes(&path)?;
     let set = taskset::read(&path)?;
     let scenes = Scenes::of(&path, &set.value);
     let found = scenes.check(&set.value.tasks);
@@ -319,7 +322,7 @@ fn progress(_: &Path) -> Vec<Vec<u8>> {
 }
 
 fn curve(at: &Path) -> anyhow::Result<()> {
-    let drawing = curves::draw(&[("one".into(), curves::read(at)?)], &[])?;
+    let drawing = training_curves::draw(&[("one".into(), training_curves::read(at)?)], &[])?;
     drawing.svg();
     drawing.png().map(drop)
 }

@@ -3,7 +3,7 @@
 use ratatui::style::{Color, Modifier, Style};
 
 use super::Job;
-use crate::run::export::lettering::{ADVANCE, glyph};
+use crate::report::export::lettering::{ADVANCE, glyph};
 
 /// A numbered thing in the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,7 +8,6 @@ pub mod encoder;
 pub mod inline;
 pub mod labels;
 pub mod overlay;
-pub mod pair;
 mod placeholder;
 pub mod sixel;
 

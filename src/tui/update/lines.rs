@@ -1,11 +1,11 @@
 //! Lines that are typed over the screen: instructions and verbs.
 
 use super::Effect;
-use super::perform::perform;
+use super::on_action::perform;
+use crate::explore::verb;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
-use crate::tui::verb;
 
 /// Opens a line or list over the screen; what keys meant before comes back when it closes.
 pub(super) fn open_line(app: &mut App, mode: Mode) {

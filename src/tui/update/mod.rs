@@ -1,24 +1,24 @@
 //! The one function that changes the explorer's state: a message in, effects out. No IO.
 
-mod hear;
+mod on_action;
+mod on_event;
 mod lines;
 mod pages;
-mod perform;
 mod pointer;
 mod travel;
 
-pub use perform::perform;
+pub use on_action::perform;
 
 use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
 use ratatui::layout::Size;
 
+use crate::explore::verb::Verb;
+use crate::explore::worker::{Command, Report};
 use crate::tui::app::App;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
-use crate::tui::verb::Verb;
-use crate::tui::worker::{Command, Report};
-use hear::hear;
+use on_event::hear;
 
 /// Something that happened.
 #[derive(Clone)]
@@ -144,13 +144,13 @@ mod tests {
 
     use super::*;
     use crate::domain::{Action, ActionType};
+    use crate::explore::session::Event;
+    use crate::explore::worker::Going;
     use crate::house::{Outcome, Reason};
-    use crate::tui::engine::Event;
     use crate::tui::graphics::Protocol;
     use crate::tui::log::Tone;
     use crate::tui::testing;
     use crate::tui::theme::Ability;
-    use crate::tui::worker::Going;
 
     fn app() -> App {
         testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL)

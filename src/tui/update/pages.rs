@@ -1,10 +1,10 @@
 //! Pages and their lists.
 
 use super::{Effect, send};
+use crate::explore::verb::Page;
+use crate::explore::worker::Command;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
-use crate::tui::verb::Page;
-use crate::tui::worker::Command;
 
 /// Shows a page. Everything is drawn anew: pictures lie over the cells that change.
 pub fn turn_to(app: &mut App, page: Page) -> Vec<Effect> {

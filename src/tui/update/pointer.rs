@@ -3,17 +3,17 @@
 use crossterm::event::{MouseButton, MouseEvent, MouseEventKind};
 use ratatui::layout::Position;
 
+use super::on_action::perform;
 use super::pages::turn_to;
-use super::perform::perform;
 use super::{Effect, send};
 use crate::domain::{Cell, Instance};
+use crate::explore::inspect::things;
+use crate::explore::verb::{Page, Verb};
+use crate::explore::worker::Command;
 use crate::tui::app::App;
-use crate::tui::inspect::things;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
-use crate::tui::verb::{Page, Verb};
 use crate::tui::view::hit::{Hit, hit};
-use crate::tui::worker::Command;
 
 /// Does what the mouse asks for; nothing where it is not wanted, or while a line is typed.
 pub(super) fn heed(app: &mut App, event: MouseEvent) -> Vec<Effect> {

@@ -1,11 +1,11 @@
 //! Going on, back and forth.
 
 use super::{Effect, send};
+use crate::explore::verb::Verb;
+use crate::explore::worker::{Command, Going};
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
-use crate::tui::verb::Verb;
-use crate::tui::worker::{Command, Going};
 
 pub(super) fn go_on(app: &mut App, by_policy: bool) -> Vec<Effect> {
     if app.going.is_some() && !by_policy {

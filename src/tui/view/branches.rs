@@ -8,9 +8,9 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::{fit, panel, picture, put};
+use crate::explore::timeline::{Divergence, Timeline};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use crate::tui::timeline::{Divergence, Timeline};
 
 /// The page.
 pub struct Branches<'a>(pub &'a App);

@@ -7,8 +7,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 use super::{bar, fit, panel, put, share, wrap};
+use crate::analysis::instruction_ab::{Contrast, Row};
 use crate::domain::Class;
-use crate::run::contrast::{Contrast, Row};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use ratatui::style::Color;
 
 use super::chain::warmth;
+use crate::analysis::value_map::Landscape;
 use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Pose};
-use crate::run::landscape::Landscape;
-use crate::tui::engine::Snapshot;
+use crate::explore::session::Snapshot;
 
 /// Furniture that begins higher above the floor than this hangs over other furniture and is left out, in millimetres.
 const OVERHEAD: i32 = 1200;

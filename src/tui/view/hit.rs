@@ -4,10 +4,10 @@ use ratatui::layout::{Position, Rect};
 
 use super::{log, map, reach, time, world};
 use crate::domain::{Cell, Instance};
+use crate::explore::verb::Page;
 use crate::house::view::decode;
 use crate::tui::app::App;
 use crate::tui::layout::Layout;
-use crate::tui::verb::Page;
 
 /// Something on the screen that can be picked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

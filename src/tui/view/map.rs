@@ -9,13 +9,13 @@ use unicode_width::UnicodeWidthStr;
 use super::ground::{Ground, extent, furniture_colour};
 use super::hit::Hit;
 use super::{fit, panel};
+use crate::analysis::value_map::Landscape;
 use crate::domain::{Cell, Heading, Instance, Point};
-use crate::run::landscape::Landscape;
+use crate::explore::inspect::things;
+use crate::explore::session::Snapshot;
+use crate::explore::verb::Page;
 use crate::tui::app::App;
-use crate::tui::engine::Snapshot;
-use crate::tui::inspect::things;
 use crate::tui::theme::THEME;
-use crate::tui::verb::Page;
 
 /// The panel with the floor plan.
 pub struct Map<'a>(pub &'a App);

@@ -10,8 +10,8 @@ use unicode_width::UnicodeWidthStr;
 use super::{bar, fit, panel, put, share, wrap};
 use crate::agent::{Decision, Mind};
 use crate::domain::{ActionType, Class};
+use crate::explore::session::Snapshot;
 use crate::tui::app::App;
-use crate::tui::engine::Snapshot;
 use crate::tui::theme::THEME;
 
 /// The panel with the distribution.

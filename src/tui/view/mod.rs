@@ -33,7 +33,7 @@ use super::app::App;
 use super::keys::Mode;
 use super::layout::SMALLEST;
 use super::theme::THEME;
-use super::verb::Page;
+use crate::explore::verb::Page;
 
 impl Widget for &App {
     fn render(self, area: Rect, buf: &mut Buffer) {

@@ -7,9 +7,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Padding, Widget};
 
 use super::{fit, wrap};
+use crate::explore::verb::matching;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use crate::tui::verb::matching;
 
 /// The list, at the foot of an area.
 pub struct Palette<'a>(pub &'a App);

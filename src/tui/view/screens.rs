@@ -4,20 +4,20 @@ use std::sync::Arc;
 
 use termprofile::TermProfile;
 
+use crate::agent::registry::{PolicyKind, Who};
+use crate::analysis::chain::{Handover, Outcome, Play, Rate, Trials};
+use crate::analysis::value_map::{Height, Landscape, Measure};
 use crate::domain::{Action, ActionType, World};
-use crate::run::chain::{Handover, Outcome, Play, Rate, Trials};
-use crate::run::landscape::{Height, Landscape, Measure};
+use crate::explore::chained::Chained;
+use crate::explore::session::{Engine, Event};
+use crate::explore::verb::{Page, Verb};
+use crate::explore::worker::{Command, Report};
 use crate::tui::app::App;
-use crate::tui::chained::Chained;
-use crate::tui::engine::{Engine, Event};
 use crate::tui::graphics::Protocol;
 use crate::tui::keys::bindings;
-use crate::tui::policies::{PolicyKind, Who};
 use crate::tui::testing::{app, engine, screen, snapshot, thought, values};
 use crate::tui::theme::Ability;
 use crate::tui::update::{Effect, Msg, perform, update};
-use crate::tui::verb::{Page, Verb};
-use crate::tui::worker::{Command, Report};
 
 /// The smallest screen, and a large one.
 const SIZES: [(u16, u16); 2] = [(80, 24), (120, 36)];

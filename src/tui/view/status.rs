@@ -8,11 +8,11 @@ use unicode_width::UnicodeWidthStr;
 
 use super::fit;
 use super::log::tone;
+use crate::explore::verb::Page;
+use crate::explore::worker::Going;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
-use crate::tui::verb::Page;
-use crate::tui::worker::Going;
 
 /// The first row.
 pub struct Header<'a>(pub &'a App);

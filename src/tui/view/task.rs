@@ -6,7 +6,7 @@ use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
 use super::{panel, put, wrap};
-use crate::run::rollout::End;
+use crate::episode::rollout::End;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 

@@ -9,11 +9,11 @@ use unicode_width::UnicodeWidthStr;
 
 use super::{bar, fit, panel, put, share, wrap};
 use crate::domain::Class;
+use crate::explore::choices::{Choice, choices};
+use crate::explore::session::Snapshot;
+use crate::explore::timeline::Beat;
 use crate::tui::app::App;
-use crate::tui::choices::{Choice, choices};
-use crate::tui::engine::Snapshot;
 use crate::tui::theme::THEME;
-use crate::tui::timeline::Beat;
 
 /// The page.
 pub struct Thoughts<'a>(pub &'a App);

@@ -8,9 +8,9 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::fit;
+use crate::explore::timeline::{Beat, Timeline};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use crate::tui::timeline::{Beat, Timeline};
 
 /// The row with the timeline.
 pub struct Time<'a>(pub &'a App);

@@ -7,8 +7,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 use super::{fit, map, panel, put};
+use crate::explore::inspect::{Thing, things};
 use crate::tui::app::App;
-use crate::tui::inspect::{Thing, things};
 use crate::tui::theme::THEME;
 
 /// The page.

@@ -7,8 +7,8 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 
 use super::{panel, put};
-use crate::run::chain::Play;
-use crate::tui::chained::Chained;
+use crate::analysis::chain::Play;
+use crate::explore::chained::Chained;
 use crate::tui::theme::THEME;
 use crate::tui::view::fit;
 

@@ -6,11 +6,11 @@ use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
 use super::{panel, put, wrap};
-use crate::run::chain::Handover;
+use crate::analysis::chain::Handover;
+use crate::explore::chained::Chained;
+use crate::explore::inspect::{changes, stands};
+use crate::explore::session::Snapshot;
 use crate::tui::app::App;
-use crate::tui::chained::Chained;
-use crate::tui::engine::Snapshot;
-use crate::tui::inspect::{changes, stands};
 use crate::tui::theme::THEME;
 
 /// The panel, with a column a policy.

@@ -7,9 +7,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 use super::{panel, put};
-use crate::run::chain::{Handover, Outcome, Play, Rate, Trials};
+use crate::analysis::chain::{Handover, Outcome, Play, Rate, Trials};
+use crate::explore::chained::Chained;
 use crate::tui::app::App;
-use crate::tui::chained::Chained;
 use crate::tui::theme::THEME;
 use crate::tui::view::fit;
 

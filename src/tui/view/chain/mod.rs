@@ -12,8 +12,8 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 use super::{panel, put, wrap};
+use crate::explore::chained::Chained;
 use crate::tui::app::App;
-use crate::tui::chained::Chained;
 use crate::tui::theme::THEME;
 use heat::Strips;
 use link::LinkPanel;

@@ -1,0 +1,82 @@
+//! What a trained agent is told, in the form that its networks take.
+
+use std::sync::Arc;
+
+use tch::{Device, Kind, Tensor};
+
+use super::config::Config;
+use super::frame_history::SharedEmbedder;
+use super::goal;
+use super::policy::{Reading, Situation};
+use crate::house::House;
+use crate::language::instruction::normalise;
+use crate::language::vocabulary::Vocabulary;
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::SIDE;
+
+/// Words that an agent which reads words takes in: shorter instructions are padded and longer ones cut, so that every pass has
+/// one shape.
+const WORDS: usize = 128;
+
+/// The instruction's embedding [1, embedding] or its words [1, 128], or the maps of its goal's last frames, like an observation.
+///
+/// # Errors
+/// When the sentence encoder fails, or an agent that is shown its goal has no task to take it from.
+pub fn told(
+    situation: &Situation<'_>,
+    config: &Config,
+    visual: &dyn FrameEncoder,
+    sentences: &SharedEmbedder,
+    device: Device,
+) -> anyhow::Result<Tensor> {
+    if config.policy.goal.is_some() {
+        return shown(situation, config.policy.history as usize, visual);
+    }
+    let instruction = normalise(situation.instruction);
+    if config.policy.attention.is_some() {
+        let mut numbers = words(config, &instruction);
+        numbers.resize(WORDS, Vocabulary::PADDING);
+        return Ok(Tensor::from_slice(&numbers).unsqueeze(0).to_device(device));
+    }
+    let mut embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
+    Ok(embedder.embed(&[&instruction])?.to_device(device).to_kind(Kind::Float))
+}
+
+/// How much of an instruction the agent reads; nothing where it is shown its goal, or the sentence encoder fails.
+pub fn reading(instruction: &str, config: &Config, sentences: &SharedEmbedder) -> Option<Reading> {
+    let instruction = normalise(instruction);
+    match (&config.policy.goal, &config.policy.attention) {
+        (Some(_), _) => None,
+        (None, Some(_)) => {
+            let words = words(config, &instruction).len();
+            Some(Reading { tokens: words.min(WORDS), cut: words.saturating_sub(WORDS) })
+        }
+        (None, None) => {
+            let count = sentences.lock().ok()?.encoder().tokens(&instruction).ok()?;
+            Some(Reading { tokens: count.used, cut: count.truncated })
+        }
+    }
+}
+
+/// The numbers of an instruction's words.
+fn words(config: &Config, instruction: &str) -> Vec<i64> {
+    Vocabulary::new(config.words.clone().unwrap_or_default()).numbers(instruction)
+}
+
+/// Of the same shape, for nobody.
+pub fn nothing(config: &Config, device: Device) -> Tensor {
+    let (policy, features) = (&config.policy, config.features());
+    match (policy.goal, &policy.attention) {
+        (Some(_), _) => Tensor::zeros([1, policy.history * features, SIDE, SIDE], (Kind::Float, device)),
+        (None, Some(_)) => Tensor::zeros([1, WORDS as i64], (Kind::Int64, device)),
+        (None, None) => Tensor::zeros([1, policy.embedding], (Kind::Float, device)),
+    }
+}
+
+fn shown(situation: &Situation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
+    let see = |world| visual.image(House::new(Arc::clone(situation.house.scene()), world).frame());
+    let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
+    let missing = history - images.len();
+    let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();
+    Ok(visual.encode(&stacked).flatten(0, 1).unsqueeze(0))
+}

@@ -1,0 +1,4 @@
+//! Policies that read the task instead of the instruction.
+
+pub mod expert;
+pub mod scanning;

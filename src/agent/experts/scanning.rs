@@ -1,0 +1,71 @@
+//! A demonstrator that looks before it walks: the expert, who knows where everything is, made to act on what was seen, so
+//! that someone who only sees can learn from it.
+
+use std::collections::BTreeSet;
+
+use anyhow::Context;
+
+use crate::agent::policy::{Decision, Policy, Situation};
+use crate::domain::{Action, ActionType, Cell, Instance};
+use crate::house::expert::{Expert, Pace};
+
+/// Turns to the right while it looks for something: with the first view, a full circle.
+const TURNS: u32 = 3;
+
+/// The expert, who first turns around until it has seen what it is going for.
+pub struct Seeker {
+    pace: Pace,
+    expert: Expert,
+    /// Everything that came into view in this episode.
+    seen: BTreeSet<Instance>,
+    /// What it looks for, where it began to, and how often it has turned since.
+    search: Option<(Instance, Cell, u32)>,
+}
+
+impl Seeker {
+    /// A demonstrator at the start of an episode.
+    pub fn new(pace: Pace) -> Seeker {
+        Seeker { pace, expert: Expert::of(pace), seen: BTreeSet::new(), search: None }
+    }
+
+    /// Whether to turn on the spot before going for `aim`.
+    fn must_look(&mut self, aim: Instance, cell: Cell) -> bool {
+        if self.seen.contains(&aim) {
+            self.search = None;
+            return false;
+        }
+        match &mut self.search {
+            Some((wanted, place, turns)) if *wanted == aim => {
+                // Once it has looked around, it goes where it knows the thing to be; a push away starts no new search.
+                let looks = *place == cell && *turns < TURNS;
+                *turns = if looks { *turns + 1 } else { TURNS };
+                looks
+            }
+            _ => {
+                self.search = Some((aim, cell, 1));
+                true
+            }
+        }
+    }
+}
+
+impl Policy for Seeker {
+    fn name(&self) -> &str {
+        "seeker"
+    }
+
+    fn begin(&mut self, _seed: u64) {
+        *self = Seeker::new(self.pace);
+    }
+
+    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+        let grader = situation.grader.context("only a task can be demonstrated")?;
+        let action = self.expert.next(situation.house, grader)?;
+        self.seen.extend(situation.house.view().sightings.iter().map(|sighting| sighting.instance));
+        let cell = situation.house.world().agent.cell;
+        let aim = self.expert.aim().and_then(|aim| aim.target);
+        let looks = action.target.is_none() && aim.is_some_and(|aim| self.must_look(aim, cell));
+        let action = if looks { Action::navigate(ActionType::RotateRight) } else { action };
+        Ok(Decision { action, mind: None })
+    }
+}

@@ -1,0 +1,178 @@
+//! What a trained agent carries from step to step of an episode.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tch::Tensor;
+
+use super::loop_guard::Rounds;
+use super::policy::Decision;
+use super::select::{self, Heads, Selection};
+use crate::house::view::Candidate;
+use crate::nets::embedding_cache::Embedder;
+
+/// A sentence encoder with its cache, which several policies may share.
+pub type SharedEmbedder = Arc<Mutex<Embedder>>;
+
+/// The last frames, what would lead in rounds, what was told, and chance.
+#[derive(Debug)]
+pub struct Memory {
+    /// The maps of the last frames, oldest first, and the step that the last one belongs to.
+    seen: VecDeque<Tensor>,
+    seen_at: Option<u32>,
+    last_image: Vec<u8>,
+    rounds: Rounds,
+    /// The instruction that was read last, with what the networks take for it.
+    read: Option<(String, Tensor)>,
+    rng: ChaCha8Rng,
+}
+
+impl Default for Memory {
+    fn default() -> Memory {
+        Memory {
+            seen: VecDeque::new(),
+            seen_at: None,
+            last_image: Vec::new(),
+            rounds: Rounds::default(),
+            read: None,
+            rng: ChaCha8Rng::seed_from_u64(0),
+        }
+    }
+}
+
+impl Clone for Memory {
+    /// The maps and what was told are shared, not copied: nothing ever writes into them.
+    fn clone(&self) -> Memory {
+        Memory {
+            seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
+            seen_at: self.seen_at,
+            last_image: self.last_image.clone(),
+            rounds: self.rounds.clone(),
+            read: self.read.as_ref().map(|(text, told)| (text.clone(), told.shallow_clone())),
+            rng: self.rng.clone(),
+        }
+    }
+}
+
+impl Memory {
+    /// Forgets the past: a new episode starts.
+    pub fn begin(&mut self, seed: u64) {
+        self.seen.clear();
+        self.last_image.clear();
+        self.rounds = Rounds::default();
+        self.seen_at = None;
+        // The next episode's goal may look different, whatever its instruction.
+        self.read = None;
+        self.rng = ChaCha8Rng::seed_from_u64(seed);
+    }
+
+    /// The map of an image that looks as the last one did; nothing where the image is new.
+    pub fn map_of(&self, image: &[u8]) -> Option<Tensor> {
+        self.seen.back().filter(|_| self.last_image == image).map(Tensor::shallow_clone)
+    }
+
+    /// Looks at the image of a step, and notes what came of the last one.
+    pub fn look(&mut self, image: &[u8], step: u32) {
+        let changed = self.last_image != image;
+        if self.seen_at != Some(step) {
+            self.rounds.note(&self.last_image, changed);
+        }
+        if changed {
+            image.clone_into(&mut self.last_image);
+        }
+    }
+
+    /// Adds the map of the frame at `step`; the last `history` maps as one observation. Before the first frames there was
+    /// the first one.
+    pub fn observe(&mut self, map: Tensor, step: u32, history: usize) -> Tensor {
+        if self.seen_at == Some(step) {
+            self.seen.pop_back();
+        }
+        self.seen_at = Some(step);
+        self.seen.push_back(map);
+        while self.seen.len() > history {
+            self.seen.pop_front();
+        }
+        let first = history - self.seen.len();
+        let maps: Vec<&Tensor> = (0..history).map(|i| &self.seen[i.saturating_sub(first)]).collect();
+        Tensor::cat(&maps, 1)
+    }
+
+    /// What the agent is told: asked of `hear` once an instruction.
+    ///
+    /// # Errors
+    /// When `hear` fails.
+    pub fn told(&mut self, instruction: &str, hear: impl FnOnce() -> anyhow::Result<Tensor>) -> anyhow::Result<Tensor> {
+        if let Some((text, told)) = &self.read
+            && text == instruction
+        {
+            return Ok(told.shallow_clone());
+        }
+        let told = hear()?;
+        self.rounds.allow_all();
+        self.read = Some((instruction.to_string(), told.shallow_clone()));
+        Ok(told)
+    }
+
+    /// Decides from what the networks say, and remembers the choice. Nothing that would lead in rounds is chosen while there
+    /// is something else.
+    pub fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
+        let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
+        let (candidates, tried) = self.rounds.open(&self.last_image, candidates);
+        let decision = select::decide(heads, &candidates, &tried, selection);
+        self.rounds.choose(decision.action, &candidates);
+        decision
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+    use crate::domain::ActionType;
+
+    fn map(value: f32) -> Tensor {
+        Tensor::full([1, 2, 2, 2], f64::from(value), (Kind::Float, Device::Cpu))
+    }
+
+    #[test]
+    fn nothing_that_leads_in_rounds_is_chosen_until_another_instruction_is_given() {
+        use ActionType::{MoveAhead, RotateLeft, RotateRight};
+        let mut memory = Memory::default();
+        memory.begin(1);
+        let mut leave = |text: &str, step: u32| {
+            drop(memory.told(text, || Ok(map(0.0))).unwrap());
+            memory.look(&[7], step);
+            let _ = memory.observe(map(0.0), step, 5);
+            let logits = ActionType::ALL.map(|kind| -(kind.index() as f32));
+            memory.decide(&Heads::of(&logits, &[0.0; 82]), &[], false).action.kind
+        };
+        assert_eq!([leave("Go.", 0), leave("Go.", 1), leave("Go.", 2)], [MoveAhead, RotateLeft, RotateRight]);
+        assert_eq!([leave("Come.", 3), leave("Come.", 4)], [MoveAhead, RotateLeft]);
+    }
+
+    #[test]
+    fn a_copy_goes_on_exactly_as_the_original_does() {
+        let mut memory = Memory::default();
+        memory.begin(5);
+        for step in 0..3u8 {
+            memory.look(&[step], u32::from(step));
+            let _ = memory.observe(map(f32::from(step)), u32::from(step), 5);
+        }
+        let copy = memory.clone();
+        let go_on = |mut memory: Memory| {
+            let mut trace = Vec::new();
+            for step in 3..12u8 {
+                memory.look(&[step / 4], u32::from(step));
+                let seen = memory.observe(map(f32::from(step)), u32::from(step), 5);
+                let decision = memory.decide(&Heads::of(&[0.1; ActionType::COUNT], &[0.0; 82]), &[], true);
+                trace.push((Vec::<f32>::try_from(seen.flatten(0, -1)).unwrap(), decision.action));
+            }
+            trace
+        };
+        assert_eq!(go_on(memory), go_on(copy));
+    }
+}

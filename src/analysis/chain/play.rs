@@ -1,0 +1,213 @@
+//! A chain that is followed: how each link came out, and how warm every link was on the way.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::Chain;
+use crate::agent::{Decision, Policy};
+use crate::domain::World;
+use crate::episode::rollout::Rollout;
+
+/// How a link came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// It was reached: the links before it were done.
+    pub reached: bool,
+    /// It was done; `None` where nobody grades it.
+    pub done: Option<bool>,
+    /// Its steps.
+    pub steps: u32,
+    /// The state in which it began.
+    pub entry: World,
+    /// The state in which it ended.
+    pub exit: World,
+    /// What chaining would learn where the next link takes over; nothing without critics.
+    pub handover: Option<Handover>,
+}
+
+/// The end of a link as equations 4 and 5 see it. Both end the link there, with what the next one makes of it as the reward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Handover {
+    /// V of the exit state under the next link's instruction.
+    pub worth: f32,
+    /// min Q of the link's last action under the next link's instruction: equation 4 draws it to the target.
+    pub next: f32,
+    /// min Q of the link's last action under both instructions joined: equation 5 draws it to the target.
+    pub joined: f32,
+}
+
+impl Handover {
+    /// The reward: the worth within 0 to 1, where every return lies.
+    pub fn target(self) -> f32 {
+        self.worth.clamp(0.0, 1.0)
+    }
+}
+
+/// A chain that was followed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Play {
+    /// How each link came out, as far as it got.
+    pub outcomes: Vec<Outcome>,
+    /// For every step, how warm each link was: V under its instruction, or without critics the probability that its
+    /// instruction gives to what was done.
+    pub heat: Vec<Vec<f32>>,
+    /// The heat is V.
+    pub by_value: bool,
+    /// The link in force at every step.
+    pub in_force: Vec<usize>,
+}
+
+impl Chain {
+    /// Follows the chain: told all at once, or link by link as each is done. `visit` sees what is known before every step; `stop`
+    /// ends it early.
+    ///
+    /// # Errors
+    /// Whatever the policy reports.
+    pub fn play(
+        &self,
+        policy: &mut dyn Policy,
+        whole: bool,
+        stop: &AtomicBool,
+        visit: &mut dyn FnMut(&Play),
+    ) -> anyhow::Result<Play> {
+        let limits = self.limits();
+        let told = |link: usize| if whole { self.whole() } else { self.links[link].clone() };
+        let mut rollout = Rollout::new(self.house(&self.start), told(0), self.grader(), None);
+        policy.begin(0);
+        let mut play = Play::default();
+        let all: u32 = limits.iter().sum();
+        for (link, &limit) in limits.iter().enumerate() {
+            let entry = rollout.house.world().clone();
+            let begun = rollout.steps();
+            rollout.instruction = told(link);
+            let mut done = self.graded.is_some().then_some(false);
+            let spent = |rollout: &Rollout| match whole {
+                true => rollout.steps() >= all,
+                false => rollout.steps() - begun >= limit,
+            };
+            let mut last = None;
+            let breaks = |before: &Outcome| !before.reached || before.done == Some(false);
+            let failed = play.outcomes.last().is_some_and(breaks);
+            while !failed && !spent(&rollout) && !stop.load(Ordering::Relaxed) {
+                let decision = rollout.decide(policy)?;
+                last = self.feel(policy, &mut rollout, &decision, link, &mut play)?;
+                visit(&play);
+                if rollout.carry_out(decision).completed_one {
+                    done = Some(true);
+                    break;
+                }
+            }
+            let handover = match (self.links.get(link + 1), last) {
+                (Some(told), Some((next, joined))) => {
+                    let values =
+                        asked(policy, &mut rollout, told, |policy, rollout| policy.values(&mut rollout.situation()))?;
+                    values.map(|values| Handover { worth: values.state, next, joined })
+                }
+                _ => None,
+            };
+            let (steps, exit) = (rollout.steps() - begun, rollout.house.world().clone());
+            play.outcomes.push(Outcome {
+                reached: !failed,
+                done: done.filter(|_| !failed),
+                steps,
+                entry,
+                exit,
+                handover,
+            });
+        }
+        Ok(play)
+    }
+
+    /// How warm every link is before a step. With critics also min Q of what is done, under the next link's instruction and
+    /// under both joined.
+    fn feel(
+        &self,
+        policy: &mut dyn Policy,
+        rollout: &mut Rollout,
+        decision: &Decision,
+        at: usize,
+        play: &mut Play,
+    ) -> anyhow::Result<Option<(f32, f32)>> {
+        let action = decision.action;
+        let class = action.target.and_then(|target| rollout.house.world().class_of(rollout.house.scene(), target));
+        let values = |policy: &mut dyn Policy, rollout: &mut Rollout| policy.values(&mut rollout.situation());
+        let mut heat = Vec::with_capacity(self.links.len());
+        let mut next = None;
+        for (link, told) in self.links.iter().enumerate() {
+            let felt = match asked(policy, rollout, told, values)? {
+                Some(values) => {
+                    play.by_value = true;
+                    if link == at + 1 {
+                        next = values.q(action.kind, class);
+                    }
+                    values.state
+                }
+                None => {
+                    let mind = asked(policy, rollout, told, |policy, rollout| rollout.decide(policy))?.mind;
+                    mind.and_then(|mind| mind.actions[action.kind.index()]).unwrap_or(0.0)
+                }
+            };
+            heat.push(felt);
+        }
+        play.heat.push(heat);
+        play.in_force.push(at);
+        let Some(next) = next else { return Ok(None) };
+        let both = self.links[at..=at + 1].join(" ");
+        let joined = asked(policy, rollout, &both, values)?.and_then(|values| values.q(action.kind, class));
+        Ok(joined.map(|joined| (next, joined)))
+    }
+}
+
+/// Asks a policy something under another instruction; it and the rollout are left as they were.
+fn asked<T>(
+    policy: &mut dyn Policy,
+    rollout: &mut Rollout,
+    told: &str,
+    ask: impl FnOnce(&mut dyn Policy, &mut Rollout) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let carried = policy.carried();
+    let before = std::mem::replace(&mut rollout.instruction, told.to_string());
+    let answer = ask(policy, rollout);
+    rollout.instruction = before;
+    policy.put_back(carried);
+    answer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::RandomPolicy;
+    use crate::analysis::chain::testing::chain;
+
+    #[test]
+    fn a_chain_is_followed_until_a_link_fails() {
+        let chain = chain();
+        let mut policy = RandomPolicy::new();
+        let mut seen = 0;
+        let play = chain.play(&mut policy, false, &AtomicBool::new(false), &mut |_| seen += 1).unwrap();
+        assert_eq!(seen, play.heat.len());
+        assert_eq!(play.outcomes.len(), 2);
+        let first = &play.outcomes[0];
+        assert!(first.reached && first.done.is_some() && first.handover.is_none());
+        assert_eq!(play.outcomes[1].reached, first.done == Some(true));
+        let steps: u32 = play.outcomes.iter().map(|outcome| outcome.steps).sum();
+        assert_eq!((play.heat.len(), play.in_force.len()), (steps as usize, steps as usize));
+        assert!(play.heat.iter().all(|heat| heat.len() == 2) && !play.by_value);
+    }
+
+    #[test]
+    fn nothing_is_reached_after_a_link_that_failed() {
+        let mut chain = chain();
+        let again = |n: usize| n % 2;
+        chain.links = (0..6).map(|n| chain.links[again(n)].clone()).collect();
+        if let Some((_, subtasks)) = &mut chain.graded {
+            *subtasks = (0..6).map(|n| subtasks[again(n)].clone()).collect();
+        }
+        for whole in [false, true] {
+            let play = chain.play(&mut RandomPolicy::new(), whole, &AtomicBool::new(false), &mut |_| ()).unwrap();
+            let broken = play.outcomes.iter().position(|outcome| outcome.done == Some(false)).unwrap();
+            let rest = &play.outcomes[broken + 1..];
+            assert!(rest.iter().all(|outcome| !outcome.reached && outcome.done.is_none() && outcome.steps == 0));
+            assert!(!rest.is_empty());
+        }
+    }
+}

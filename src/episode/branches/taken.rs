@@ -1,0 +1,30 @@
+//! A step that was taken, with the mind behind it.
+
+use std::sync::Arc;
+
+use crate::agent::{Decision, Values};
+use crate::episode::record::{Author, Step};
+
+/// A step that was taken.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    /// What was decided, and the mind behind it.
+    pub decision: Decision,
+    /// What was recorded of it; `told` and `by` are left out, they follow from the neighbours.
+    pub step: Step,
+    /// What the agent was told.
+    pub instruction: Arc<str>,
+    /// Who chose.
+    pub author: Author,
+    /// What the critics made of the state before it.
+    pub values: Option<Values>,
+}
+
+impl Taken {
+    /// Whether another step is the same choice: then it led to the same state.
+    pub(crate) fn is_same(&self, other: &Taken) -> bool {
+        self.decision.action == other.decision.action
+            && self.instruction == other.instruction
+            && self.author == other.author
+    }
+}

@@ -1,0 +1,185 @@
+//! A recorded episode as a sequence of states that can be drawn.
+
+use std::sync::Arc;
+
+use anyhow::ensure;
+
+use super::record::Episode;
+use super::scenes::Setting;
+use crate::domain::{Action, Scene, Task, World};
+use crate::house::grading::describe;
+use crate::house::view::Frame;
+use crate::house::{House, Outcome};
+use crate::language::instruction;
+
+/// An episode with the state after every step.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Task, scene and result in a line.
+    pub title: String,
+    /// Where it was.
+    pub scene: Arc<Scene>,
+    /// What the task asked, in words.
+    pub subtasks: Vec<String>,
+    /// The start, and the state after each step.
+    pub shots: Vec<Shot>,
+}
+
+/// A state of a recording.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// How many steps were taken.
+    pub step: u32,
+    /// The state.
+    pub world: World,
+    /// What the agent was told when it got here.
+    pub told: String,
+    /// What was done to get here, with its target's class; nothing at the start.
+    pub did: Option<String>,
+    /// What that came to.
+    pub outcome: Outcome,
+    /// It could be done.
+    pub possible: bool,
+    /// The subtask that it completed, in words.
+    pub done: Option<String>,
+}
+
+impl Shot {
+    /// What was done and what it came to.
+    pub fn words(&self) -> String {
+        match (&self.did, self.possible) {
+            (None, _) => "the start".into(),
+            (Some(did), true) => did.clone(),
+            (Some(did), false) => format!("{did} · {}", self.outcome),
+        }
+    }
+}
+
+/// Draws the states of a recording.
+pub struct Camera(House);
+
+impl Camera {
+    /// What the agent saw.
+    pub fn draw(&mut self, shot: &Shot) -> Frame {
+        self.0.restore(shot.world.clone());
+        self.0.frame().clone()
+    }
+}
+
+impl Recording {
+    /// Takes the steps of an episode again, by the rules alone.
+    ///
+    /// # Errors
+    /// When a step does not come to what was recorded.
+    pub fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<Recording> {
+        let mut house = House::new(setting.scene.clone(), setting.world.clone());
+        let subtasks: Vec<String> = task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect();
+        let mut told = instruction::normalise(&episode.instruction);
+        let start = Shot {
+            step: 0,
+            world: setting.world.clone(),
+            told: told.clone(),
+            did: None,
+            outcome: Outcome::Done,
+            possible: true,
+            done: None,
+        };
+        let mut shots = vec![start];
+        for (number, step) in (1..).zip(&episode.trace) {
+            if let Some(text) = &step.told {
+                told.clone_from(text);
+            }
+            let outcome = house.step(Action { kind: step.kind, target: step.target });
+            ensure!(
+                outcome == step.outcome,
+                "task {:?}, step {number} ({}): came to {outcome}, recorded is {}; the simulator or the scene is another one",
+                episode.task,
+                step.kind,
+                step.outcome
+            );
+            let class = step.class.map_or(String::new(), |class| format!(" {}", class.name()));
+            shots.push(Shot {
+                step: number,
+                world: house.world().clone(),
+                told: told.clone(),
+                did: Some(format!("{}{class}", step.kind)),
+                outcome,
+                possible: outcome.is_done(),
+                done: step.subtask.map(|at| subtasks.get(at as usize).cloned().unwrap_or_default()),
+            });
+        }
+        let result = match (episode.success, episode.of) {
+            (true, _) => "success".to_string(),
+            (false, 0) => "not graded".to_string(),
+            (false, of) => format!("{} of {of} subtasks", episode.completed),
+        };
+        let title = format!("{} in {}, {} steps: {result}", episode.task, setting.scene.name, episode.steps);
+        Ok(Recording { title, scene: setting.scene.clone(), subtasks, shots })
+    }
+
+    /// What the agent was told first.
+    pub fn told(&self) -> String {
+        self.shots.first().map_or_else(String::new, |shot| shot.told.clone())
+    }
+
+    /// Something to draw its states with.
+    pub fn camera(&self) -> Camera {
+        let world = self.shots.first().map_or_else(World::default, |shot| shot.world.clone());
+        Camera(House::new(self.scene.clone(), world))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::domain::ActionType;
+    use crate::episode::record::Step;
+    use crate::house::testing::kitchen;
+
+    /// A few turns in the kitchen; one subtask is said to be done.
+    pub(crate) fn recording() -> Recording {
+        let (scene, world) = kitchen();
+        let setting = Setting { scene, world };
+        let mut task = crate::data::taskset::tests::sample_set().tasks.remove(0);
+        task.instruction = "put the mug in the sink".into();
+        let kinds = [ActionType::RotateLeft, ActionType::LookUp, ActionType::RotateLeft];
+        let mut house = House::new(setting.scene.clone(), setting.world.clone());
+        let trace: Vec<Step> = kinds
+            .into_iter()
+            .map(|kind| Step {
+                kind,
+                target: None,
+                class: None,
+                outcome: house.step(Action::navigate(kind)),
+                subtask: (kind == ActionType::LookUp).then_some(0),
+                told: None,
+                by: None,
+            })
+            .collect();
+        let episode = Episode {
+            task: task.id.clone(),
+            seed: 0,
+            start_hash: setting.world.digest(),
+            instruction: task.instruction.clone(),
+            completed: 1,
+            of: 1,
+            success: true,
+            steps: 3,
+            trace,
+            ..Episode::default()
+        };
+        Recording::of(&setting, &task, &episode).unwrap()
+    }
+
+    #[test]
+    fn a_recording_has_the_state_after_every_step() {
+        let recording = recording();
+        assert_eq!(recording.shots.len(), 4);
+        assert_ne!(recording.shots[0].world, recording.shots[1].world);
+        assert_eq!(recording.told(), "Put the mug in the sink.");
+        assert!(recording.shots[2].done.is_some());
+        assert!(recording.title.ends_with("3 steps: success"), "{}", recording.title);
+        let frame = recording.camera().draw(&recording.shots[1]);
+        assert_eq!((frame.width, frame.height), (300, 300));
+    }
+}

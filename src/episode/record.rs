@@ -1,0 +1,187 @@
+//! Episodes: one rollout of a policy in a task, as runs record it.
+
+use serde::{Deserialize, Serialize};
+
+use super::failure::Failure;
+use super::instruction_variant::Wording;
+use super::rollout::{Rollout, Tick};
+use crate::domain::world::Instance;
+use crate::domain::{ActionType, Class};
+use crate::house::Outcome;
+
+/// One line of a run's `episodes.jsonl`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Episode {
+    /// The task's id.
+    pub task: String,
+    /// Which of the run's seeds.
+    pub seed: u64,
+    /// Whose words the agent heard.
+    #[serde(default, skip_serializing_if = "Wording::is_own")]
+    pub wording: Wording,
+    /// The subtask from which the agent acted; the expert did those before.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub from: u32,
+    /// Fingerprint of the world at the start.
+    pub start_hash: String,
+    /// What the agent was told.
+    pub instruction: String,
+    /// How many subtasks the agent completed.
+    pub completed: u32,
+    /// Of how many.
+    pub of: u32,
+    /// All were.
+    pub success: bool,
+    /// How many actions the agent took.
+    pub steps: u32,
+    /// Why it ended before its time, if it did: what the policy or the environment reported.
+    pub error: Option<String>,
+    /// What kept it from success, where it ended in its time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<Failure>,
+    /// How often it was begun; more than once where an error made it begin anew.
+    #[serde(default = "once", skip_serializing_if = "is_one")]
+    pub attempts: u32,
+    /// How many of the trace's steps the expert took first.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prefix: u32,
+    /// What was done, step by step.
+    pub trace: Vec<Step>,
+}
+
+/// What tells the episodes of a run apart.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// The task's id.
+    pub task: String,
+    /// Which seed.
+    pub seed: u64,
+    /// Whose words.
+    pub wording: Wording,
+    /// From which subtask.
+    pub from: u32,
+}
+
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "task {:?} and seed {}", self.task, self.seed)?;
+        if !self.wording.is_own() {
+            write!(f, " ({})", self.wording.name())?;
+        }
+        if self.from > 0 {
+            write!(f, " from subtask {}", self.from)?;
+        }
+        Ok(())
+    }
+}
+
+impl Episode {
+    /// What tells it apart from others of its run.
+    pub fn key(&self) -> Key {
+        Key { task: self.task.clone(), seed: self.seed, wording: self.wording, from: self.from }
+    }
+
+    /// Whether it was played as the task asks: from its start, in its own words.
+    pub fn is_plain(&self) -> bool {
+        self.wording.is_own() && self.from == 0
+    }
+
+    /// 1 for a success, else 0.
+    pub fn succeeded(&self) -> f64 {
+        f64::from(u8::from(self.success))
+    }
+
+    /// Completed subtasks as a share of those that were asked.
+    pub fn progress(&self) -> f64 {
+        f64::from(self.completed) / f64::from(self.of.max(1))
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one(number: &u32) -> bool {
+    *number == 1
+}
+
+fn once() -> u32 {
+    1
+}
+
+/// One action of an episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// What was done.
+    #[serde(rename = "do")]
+    pub kind: ActionType,
+    /// To what.
+    #[serde(rename = "to", default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<Instance>,
+    /// The target's class.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<Class>,
+    /// What it came to.
+    pub outcome: Outcome,
+    /// The subtask that it completed, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub subtask: Option<u32>,
+    /// What the agent was told from this step on, where that changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub told: Option<String>,
+    /// Who chose from this step on, where that changed; without any, the run's policy did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<Author>,
+}
+
+/// Who chose a step of an explored episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Author {
+    /// `hand` for a person, else the policy's name.
+    pub policy: String,
+    /// SHA-256 of its checkpoint, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<String>,
+    /// The seed of its chance.
+    pub seed: u64,
+    /// It drew its actions by chance instead of taking the likeliest.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub samples: bool,
+}
+
+impl Author {
+    /// The name of a person who acts.
+    pub const HAND: &str = "hand";
+
+    /// A person.
+    pub fn hand() -> Author {
+        Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, samples: false }
+    }
+
+    /// Whether a person chose.
+    pub fn is_hand(&self) -> bool {
+        self.policy == Author::HAND
+    }
+}
+
+impl Step {
+    /// The record of a step that `rollout` just took.
+    pub fn of(tick: &Tick, rollout: &Rollout) -> Step {
+        let (action, house) = (tick.decision.action, &rollout.house);
+        let completed = rollout.grader.as_ref().map_or(0, |grader| grader.completed() as u32);
+        Step {
+            kind: action.kind,
+            target: action.target,
+            class: action.target.and_then(|target| house.world().class_of(house.scene(), target)),
+            outcome: tick.outcome,
+            subtask: tick.completed_one.then(|| completed.saturating_sub(1)),
+            told: None,
+            by: None,
+        }
+    }
+}

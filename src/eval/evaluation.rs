@@ -1,0 +1,384 @@
+//! Evaluation: every task with every seed, on several threads, with the same result for any number of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::executor;
+use super::executor::MakeTeam;
+use super::options::Options;
+use crate::data::json::Document;
+use crate::domain::{Task, TaskSet};
+use crate::episode::instruction_variant;
+use crate::episode::record::{Episode, Key};
+use crate::episode::scenes::Scenes;
+use crate::house::grading::Grading;
+use crate::report::summary::Summary;
+use crate::run_dir::episode_spec::{Booking, bookings};
+use crate::run_dir::manifest::Manifest;
+use crate::run_dir::writer::RunFolder;
+
+/// An evaluation that can start: its tasks fit their scenes. Copies share tasks and scenes.
+#[derive(Clone)]
+pub struct Evaluation {
+    pub(crate) tasks: Arc<[Task]>,
+    pub(crate) scenes: Arc<Scenes>,
+    pub(crate) options: Options,
+    manifest: Manifest,
+}
+
+/// How far an evaluation is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Progress {
+    /// Episodes that are over.
+    pub done: usize,
+    /// Of how many.
+    pub of: usize,
+    /// Of the done ones, successes.
+    pub successes: usize,
+    /// Of the done ones, those that ended with an error.
+    pub errors: usize,
+}
+
+impl Progress {
+    fn count(&mut self, episode: &Episode) {
+        self.done += 1;
+        self.successes += usize::from(episode.success);
+        self.errors += usize::from(episode.error.is_some());
+    }
+}
+
+impl Evaluation {
+    /// Checks that every task can start, before anything is written.
+    ///
+    /// # Errors
+    /// Names the task and field that is wrong; the caller names the file.
+    pub fn prepare(
+        set: &Document<TaskSet>,
+        scenes: Scenes,
+        options: Options,
+        policy: &str,
+        checkpoint_hash: Option<String>,
+    ) -> anyhow::Result<Evaluation> {
+        let mut tasks = set.value.tasks.clone();
+        tasks.truncate(options.limit.unwrap_or(usize::MAX));
+        check(&tasks, options)?;
+        let scenes_hash = scenes.check(&tasks)?;
+        let manifest = Manifest {
+            format_version: Manifest::FORMAT,
+            sprint: env!("CARGO_PKG_VERSION").into(),
+            task_set: set.value.name.clone(),
+            task_set_hash: set.digest.clone(),
+            scenes_hash,
+            policy: policy.to_owned(),
+            checkpoint_hash,
+            tasks: tasks.len(),
+            seeds: options.seeds,
+            grader: options.grading,
+            step_by_step: options.step_by_step,
+            sampling: options.sampling,
+            language: options.language,
+            every_start: options.every_start,
+            shard: options.shard,
+        };
+        manifest.check()?;
+        Ok(Evaluation { tasks: tasks.into(), scenes: Arc::new(scenes), options, manifest })
+    }
+
+    /// What identifies this run.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The tasks that are played.
+    pub fn tasks(&self) -> &[Task] {
+        &self.tasks
+    }
+
+    /// Where they play.
+    pub fn scenes(&self) -> &Scenes {
+        &self.scenes
+    }
+
+    /// Every episode of the run, or of its share, in order.
+    pub fn all(&self) -> Vec<Booking> {
+        let all = bookings(&self.manifest, &self.tasks);
+        let own = self.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
+        all[own].to_vec()
+    }
+
+    /// What tells an episode apart from the others.
+    pub fn key(&self, booking: &Booking) -> Key {
+        booking.key(&self.tasks)
+    }
+
+    /// Plays these episodes on several threads; `sink` takes each, in their order.
+    ///
+    /// `stop` ends it early: what is under way is dropped.
+    ///
+    /// # Errors
+    /// When a team cannot be made, or `sink` fails.
+    pub fn play(
+        &self,
+        wanted: &[Booking],
+        make_team: &Arc<MakeTeam>,
+        stop: &Arc<AtomicBool>,
+        sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        executor::play(self, wanted, make_team, stop, sink)
+    }
+}
+
+/// Checks that the tasks have what the options need.
+fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
+    if options.step_by_step
+        && let Some(i) = tasks.iter().position(|task| task.sentences.is_empty())
+    {
+        anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
+    }
+    if options.grading == Grading::Strict {
+        let unrecorded = |task: &Task| task.subtasks.iter().position(|subtask| subtask.literal.is_none());
+        if let Some((i, j)) = tasks.iter().enumerate().find_map(|(i, task)| Some((i, unrecorded(task)?))) {
+            anyhow::bail!(
+                "tasks[{i}].subtasks[{j}].literal: missing, so the task {:?} has no recording for the strict grader; use --grader class",
+                tasks[i].id
+            );
+        }
+    }
+    if options.language && !instruction_variant::can_swap(tasks, options.step_by_step) {
+        anyhow::bail!(
+            "tasks: all are told the same, so no instruction can be swapped for another; leave out --language"
+        );
+    }
+    Ok(())
+}
+
+/// Runs an evaluation into its folder: the episodes that are not there yet, in the run's order.
+///
+/// `stop` ends it early: what is under way is dropped, and the summary says that it is partial.
+///
+/// # Errors
+/// When a team cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
+pub fn evaluate(
+    evaluation: &Evaluation,
+    make_team: &Arc<MakeTeam>,
+    folder: &mut RunFolder,
+    stop: &Arc<AtomicBool>,
+    progress: &mut dyn FnMut(Progress),
+) -> anyhow::Result<Summary> {
+    let all = evaluation.all();
+    let mut episodes: BTreeMap<Key, Episode> =
+        std::mem::take(&mut folder.earlier).into_iter().map(|episode| (episode.key(), episode)).collect();
+    let mut wanted = Vec::new();
+    for booking in &all {
+        match episodes.get(&evaluation.key(booking)) {
+            None => wanted.push(*booking),
+            // What failed before is begun anew as often as is asked now.
+            Some(found) if found.error.is_some() && found.attempts <= evaluation.options.retries => {
+                wanted.push(Booking { attempts: found.attempts, ..*booking });
+            }
+            Some(_) => {}
+        }
+    }
+    let mut state = Progress { of: all.len(), ..Progress::default() };
+    let again: Vec<Key> = wanted.iter().map(|booking| evaluation.key(booking)).collect();
+    for key in &again {
+        episodes.remove(key);
+    }
+    episodes.values().for_each(|episode| state.count(episode));
+    progress(state);
+    evaluation.play(&wanted, make_team, stop, &mut |mut episode| {
+        folder.append(&episode)?;
+        state.count(&episode);
+        progress(state);
+        // It is on disk; a night's run need not be in memory too.
+        episode.trace = Vec::new();
+        episodes.insert(episode.key(), episode);
+        Ok(())
+    })?;
+    finish(&evaluation.manifest, &evaluation.tasks, &all, folder)
+}
+
+/// Sums up what a folder holds, and writes the summary into it.
+///
+/// # Errors
+/// When the folder cannot be read or written to.
+pub fn finish(manifest: &Manifest, tasks: &[Task], all: &[Booking], folder: &mut RunFolder) -> anyhow::Result<Summary> {
+    let order: Vec<Key> = all.iter().map(|booking| booking.key(tasks)).collect();
+    let (episodes, hash) = folder.result(&order)?;
+    let mut summary = Summary::of(manifest, tasks, &episodes, episodes.len() < all.len());
+    summary.episodes_hash = hash;
+    summary.write(folder.path())?;
+    Ok(summary)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::atomic::Ordering;
+
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::agent::{Decision, Policy, Situation, Solo, Team};
+    use crate::data::{json, taskset};
+    use crate::domain::task::SceneRef;
+    use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
+    use crate::house::testing::kitchen;
+
+    /// Walks by chance, sometimes touching what it can; fails in the ways that it is told to.
+    pub(crate) struct Walker {
+        rng: ChaCha8Rng,
+        steps: u32,
+        fails: bool,
+        panics: bool,
+    }
+
+    impl Walker {
+        pub(crate) fn new(fails: bool, panics: bool) -> Walker {
+            Walker { rng: ChaCha8Rng::seed_from_u64(0), steps: 0, fails, panics }
+        }
+    }
+
+    impl Policy for Walker {
+        fn name(&self) -> &str {
+            "walker"
+        }
+
+        fn begin(&mut self, seed: u64) {
+            self.rng = ChaCha8Rng::seed_from_u64(seed);
+            self.steps = 0;
+        }
+
+        fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+            self.steps += 1;
+            assert!(!(self.panics && self.steps == 4), "out of legs");
+            anyhow::ensure!(!(self.fails && self.steps == 6), "no way to the mug");
+            let candidates = situation.house.candidates();
+            let action = if !candidates.is_empty() && self.rng.random_bool(0.5) {
+                candidates[self.rng.random_range(0..candidates.len())].action()
+            } else {
+                Action::navigate(ActionType::ALL[self.rng.random_range(0..5)])
+            };
+            Ok(Decision { action, mind: None })
+        }
+    }
+
+    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Team>> {
+        Ok(Box::new(Solo(Box::new(Walker::new(fails, panics)))))
+    }
+
+    /// Three tasks in the test kitchen, and the folder that they live in.
+    fn tasks() -> (tempfile::TempDir, Document<TaskSet>) {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, world) = kitchen();
+        json::write(&folder.path().join(format!("{}.json", scene.name)), &*scene).unwrap();
+        let task = |name: &str| Task {
+            id: format!("take-{name}"),
+            scene: SceneRef::Named(scene.name.clone()),
+            start: Some(world.clone()),
+            instruction: format!("take the {name}"),
+            sentences: vec![format!("  take   the {name}")],
+            roles: vec![Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None }],
+            subtasks: vec![Subtask {
+                skill: SkillKind::Pickup,
+                object: 0,
+                receptacle: None,
+                closes: false,
+                literal: None,
+            }],
+            expert_steps: 15,
+            horizon: 30,
+            goal: None,
+            source: None,
+            reworded: false,
+        };
+        let names: BTreeSet<&str> = world.objects.iter().map(|object| object.class.name()).collect();
+        let tasks = names.into_iter().take(3).map(task).collect();
+        let set = TaskSet { format_version: 1, name: "kitchen".into(), scenes: Some(".".into()), tasks };
+        taskset::write(&folder.path().join("tasks.json"), &set).unwrap();
+        let document = taskset::read(&folder.path().join("tasks.json")).unwrap();
+        (folder, document)
+    }
+
+    pub(crate) fn options() -> Options {
+        Options { seeds: 4, ..Options::plain(Grading::Class) }
+    }
+
+    pub(crate) struct Ran {
+        pub(crate) summary: Summary,
+        pub(crate) lines: String,
+    }
+
+    pub(crate) fn run(
+        into: &std::path::Path,
+        options: Options,
+        make: impl Fn() -> anyhow::Result<Box<dyn Team>> + Send + Sync + 'static,
+        stop_after: usize,
+    ) -> anyhow::Result<Ran> {
+        let (folder, set) = tasks();
+        let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
+        let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;
+        let mut folder = RunFolder::open(into, evaluation.manifest())?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopping = stop.clone();
+        let mut progress = move |progress: Progress| {
+            if progress.done >= stop_after {
+                stopping.store(true, Ordering::Relaxed);
+            }
+        };
+        let summary = evaluate(&evaluation, &(Arc::new(make) as Arc<MakeTeam>), &mut folder, &stop, &mut progress)?;
+        Ok(Ran { summary, lines: std::fs::read_to_string(into.join("episodes.jsonl"))? })
+    }
+
+    #[test]
+    fn the_result_does_not_depend_on_the_number_of_threads() {
+        let folder = tempfile::tempdir().unwrap();
+        let with = |jobs: usize| {
+            let into = folder.path().join(jobs.to_string());
+            run(&into, Options { jobs, ..options() }, || walker(false, false), usize::MAX).unwrap()
+        };
+        let (one, four) = (with(1), with(4));
+        assert_eq!(one.lines.lines().count(), 12);
+        assert_eq!(one.lines, four.lines);
+        assert_eq!(one.summary, four.summary);
+        assert_ne!(one.lines.lines().next(), one.lines.lines().nth(1), "seeds differ");
+    }
+
+    #[test]
+    fn errors_and_panics_end_their_episode_and_stay_in_the_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let failing = run(&folder.path().join("a"), options(), || walker(true, false), usize::MAX).unwrap();
+        assert_eq!((failing.summary.episodes, failing.summary.partial), (12, false));
+        assert!(failing.summary.errors > 0);
+        assert!(failing.lines.contains("\"error\":\"no way to the mug\""), "{}", failing.lines);
+        let panicking = run(&folder.path().join("b"), options(), || walker(false, true), usize::MAX).unwrap();
+        assert_eq!(panicking.summary.episodes, 12);
+        assert!(panicking.lines.contains("\"error\":\"panicked: out of legs\""), "{}", panicking.lines);
+    }
+
+    #[test]
+    fn a_stopped_run_is_valid_and_partial_and_continues_to_the_same_result() {
+        let folder = tempfile::tempdir().unwrap();
+        let (whole, stopped) = (folder.path().join("whole"), folder.path().join("stopped"));
+        let make = || walker(false, false);
+        let whole = run(&whole, options(), make, usize::MAX).unwrap();
+        let partial = run(&stopped, Options { jobs: 2, ..options() }, make, 3).unwrap();
+        assert!(partial.summary.partial && (3..12).contains(&partial.summary.episodes));
+        let resumed = run(&stopped, options(), make, usize::MAX).unwrap();
+        assert_eq!(resumed.lines, whole.lines);
+        assert_eq!(resumed.summary, whole.summary);
+        let again = run(&stopped, options(), make, usize::MAX).unwrap();
+        assert_eq!(again.lines, whole.lines, "a complete run is left as it is");
+    }
+
+    #[test]
+    fn a_folder_of_other_settings_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path(), options(), || walker(false, false), usize::MAX).unwrap();
+        let other = Options { seeds: 5, ..options() };
+        let error = run(folder.path(), other, || walker(false, false), usize::MAX).err().unwrap();
+        assert!(error.to_string().contains("seeds: 4, not 5"), "{error}");
+    }
+}

@@ -1,0 +1,98 @@
+//! Joins the shares of a run into the same folder that one machine would have written.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+
+use super::evaluation::finish;
+use super::tasks::sample;
+use crate::episode::record::Key;
+use crate::report::summary::Summary;
+use crate::run_dir::episode_spec::bookings;
+use crate::run_dir::manifest::Manifest;
+use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::shard::Shard;
+use crate::run_dir::writer::RunFolder;
+
+/// The shares that lie in a run's folder, by number.
+///
+/// # Errors
+/// When there are none, or the folder cannot be read.
+pub fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let folder = run.join(Shard::FOLDER);
+    let entries = std::fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut found: Vec<PathBuf> =
+        entries.filter_map(Result::ok).map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    found.sort();
+    ensure!(!found.is_empty(), "{} holds no shares; eval --shard writes them", folder.display());
+    Ok(found)
+}
+
+/// Merges shares into the run folder `into`.
+///
+/// # Errors
+/// When a share is missing, there twice, not of the same run, or not complete; or when the folder holds another run.
+pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
+    let mut runs = BTreeMap::new();
+    for path in shares {
+        let run = FinishedRun::open(path)?;
+        let shard = run.manifest.shard.with_context(|| format!("{} is no share but a whole run", path.display()))?;
+        if let Some(other) = runs.insert(shard.index, run) {
+            bail!("{} and {} are the same share {shard}", other.path.display(), path.display());
+        }
+    }
+    let (_, first) = runs.first_key_value().context("there are no shares to merge")?;
+    let manifest = Manifest { shard: None, ..first.manifest.clone() };
+    let of = first.manifest.shard.map_or(1, |shard| shard.of);
+    for run in runs.values() {
+        let whole = Manifest { shard: None, ..run.manifest.clone() };
+        let differences = manifest.differences(&whole);
+        if !differences.is_empty() {
+            bail!(
+                "{} and {} are not of one run ({})",
+                first.path.display(),
+                run.path.display(),
+                differences.join("; ")
+            );
+        }
+        let others = run.manifest.shard.map_or(1, |shard| shard.of);
+        ensure!(
+            others == of,
+            "{}: a share of {others}, but {} is one of {of}",
+            run.path.display(),
+            first.path.display()
+        );
+    }
+    let missing: Vec<String> =
+        (1..=of).filter(|index| !runs.contains_key(index)).map(|i| format!("{i}/{of}")).collect();
+    ensure!(missing.is_empty(), "missing shares: {}; play them with eval --shard", missing.join(", "));
+    let file = first.path.join(RunFolder::TASKS);
+    let (set, episodes) = (first.set.clone(), runs.values().map(|run| run.episodes.len()).sum::<usize>());
+    let all = bookings(&manifest, &set.tasks);
+    for run in runs.values() {
+        let (found, wanted) = (run.episodes.len(), run.bookings().len());
+        ensure!(
+            found == wanted,
+            "{} has {found} of its {wanted} episodes; the same eval command with --shard completes it",
+            run.path.display()
+        );
+    }
+    ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
+    let mut folder = RunFolder::open(into, &manifest)?;
+    folder.write_tasks(&sample::as_seen_from(&set, &set.tasks, &file, into)?)?;
+    let there: std::collections::BTreeSet<Key> =
+        folder.earlier.iter().map(crate::episode::record::Episode::key).collect();
+    for run in runs.values() {
+        let mut by_key: BTreeMap<Key, _> = run.episodes.iter().map(|episode| (episode.key(), episode)).collect();
+        for booking in run.bookings() {
+            let key = booking.key(&set.tasks);
+            let episode =
+                by_key.remove(&key).with_context(|| format!("{}: no episode of {key}", run.path.display()))?;
+            if !there.contains(&key) {
+                folder.append(episode)?;
+            }
+        }
+    }
+    finish(&manifest, &set.tasks, &all, &mut folder)
+}

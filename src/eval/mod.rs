@@ -1,0 +1,12 @@
+//! Evaluation: task sets, workers that play them, verification and replay.
+
+pub mod evaluation;
+pub mod executor;
+pub mod in_flight;
+pub mod merge;
+pub mod options;
+pub mod replay;
+pub mod tasks;
+pub mod verify;
+pub mod work_queue;
+pub mod worker;

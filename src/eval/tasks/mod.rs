@@ -1,0 +1,4 @@
+//! Task sets: sampled, and checked.
+
+pub mod check;
+pub mod sample;

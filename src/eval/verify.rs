@@ -1,0 +1,374 @@
+//! Verifying a run: its episodes are played again, and must come out the same, step by step.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use serde::Serialize;
+
+use crate::agent::{Carried, Policy};
+use crate::data::json;
+use crate::domain::{Action, Task, TaskSet};
+use crate::episode::branches::{FRAMES, Moment, look_back};
+use crate::episode::record::{Author, Episode, Step};
+use crate::episode::rollout::Rollout;
+use crate::episode::scenes::{Scenes, Setting};
+use crate::house::House;
+use crate::house::grading::{Grader, Grading};
+use crate::language::instruction;
+use crate::report::summary::Summary;
+use crate::run_dir::episode_spec::policy_seed;
+use crate::run_dir::manifest::Manifest;
+use crate::run_dir::writer::{RunFolder, read_episodes};
+
+/// What came of verifying.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// Episodes that were played again.
+    pub episodes: usize,
+    /// Steps that were the same.
+    pub steps: usize,
+    /// Of these, steps whose choice was made again too; the others were a person's, or a policy's that is not at hand.
+    pub choices: usize,
+    /// What differed, an entry an episode.
+    pub differences: Vec<Difference>,
+    /// Policies that were not at hand, so that only what their actions came to was compared.
+    pub missing: Vec<String>,
+    /// How many of the episodes were played as the tasks ask: from the start, in the task's own words.
+    pub plain: usize,
+    /// How many such episodes the run's summary tells of, where there is one.
+    pub summarised: Option<usize>,
+}
+
+impl Verdict {
+    /// Whether everything came out the same, and nothing is gone.
+    pub fn is_equal(&self) -> bool {
+        self.differences.is_empty() && self.summarised.is_none_or(|count| count == self.plain)
+    }
+}
+
+/// The first difference of an episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Which episode of the run, from 1.
+    pub episode: usize,
+    /// Its task.
+    pub task: String,
+    /// At which step, from 1; 0 for the start or the whole.
+    pub step: u32,
+    /// Of what.
+    pub what: &'static str,
+    /// What the run says.
+    pub recorded: String,
+    /// What it is now.
+    pub found: String,
+}
+
+/// A run with its tasks.
+pub struct Recorded {
+    /// What it was made from.
+    pub manifest: Manifest,
+    /// Its tasks.
+    pub tasks: Vec<Task>,
+    /// Where they play.
+    pub scenes: Scenes,
+    /// Its episodes.
+    pub episodes: Vec<Episode>,
+    /// How many episodes its summary tells of, where there is one.
+    pub summarised: Option<usize>,
+}
+
+impl Recorded {
+    /// Reads a run folder. Its tasks are in it, or in `tasks`, the file that the run was made from.
+    ///
+    /// # Errors
+    /// When it is no run, its summary is malformed, its tasks are not at hand, or `tasks` is another file.
+    pub fn open(run: &Path, tasks: Option<&Path>) -> anyhow::Result<Recorded> {
+        let summary = run.join(RunFolder::SUMMARY);
+        let summarised = summary.exists().then(|| json::read::<Summary>(&summary, Summary::FORMAT)).transpose()?;
+        let summarised = summarised.map(|summary| summary.value.episodes);
+        let manifest = json::read::<Manifest>(&run.join(RunFolder::MANIFEST), Manifest::FORMAT)?.value;
+        let (tasks, scenes) = tasks_of(run, &manifest, tasks)?;
+        let (episodes, _) = read_episodes(&run.join(RunFolder::EPISODES))?;
+        Ok(Recorded { manifest, tasks, scenes, episodes, summarised })
+    }
+
+    /// The task of an episode, with its place in the set, and where it starts.
+    ///
+    /// # Errors
+    /// When the set has no such task, or it fits its scene no longer.
+    pub fn setting(&self, episode: &Episode) -> anyhow::Result<(usize, &Task, Setting)> {
+        let found = self.tasks.iter().enumerate().find(|(_, task)| task.id == episode.task);
+        let (at, task) = found.with_context(|| format!("the tasks hold no {:?}", episode.task))?;
+        Ok((at, task, self.scenes.setting(task)?))
+    }
+
+    /// Who acted in an episode that does not say so.
+    pub fn author(&self, task: usize, episode: &Episode) -> Author {
+        Author {
+            policy: self.manifest.policy.clone(),
+            checkpoint: self.manifest.checkpoint_hash.clone(),
+            seed: policy_seed(task, episode.seed),
+            samples: self.manifest.sampling,
+        }
+    }
+}
+
+/// The tasks of a run: those in its folder, which are what it played of the file that it was made from, or of that file.
+fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(Vec<Task>, Scenes)> {
+    let own = run.join(RunFolder::TASKS);
+    ensure!(
+        file.is_some() || own.exists(),
+        "{} does not hold its tasks; name the file that it was made from with --tasks (the set {:?})",
+        run.display(),
+        manifest.task_set
+    );
+    let path = file.unwrap_or(&own);
+    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    ensure!(
+        file.is_none() || document.digest == manifest.task_set_hash,
+        "{} is not what {} was made from: its SHA-256 is {:.12}, the run's {:.12}",
+        path.display(),
+        run.display(),
+        document.digest,
+        manifest.task_set_hash
+    );
+    let scenes = Scenes::of(path, &document.value);
+    let mut tasks = document.value.tasks;
+    tasks.truncate(manifest.tasks);
+    Ok((tasks, scenes))
+}
+
+/// Makes the policy of an author; `None` where it is not at hand.
+pub type Summon<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<Box<dyn Policy>>> + 'a;
+
+/// Plays every episode of a run again. `progress` hears how many are done.
+///
+/// # Errors
+/// When a task does not fit its scene, or a policy cannot be made. What differs is in the verdict.
+pub fn verify(run: &Recorded, summon: &mut Summon<'_>, progress: &mut dyn FnMut(usize)) -> anyhow::Result<Verdict> {
+    let mut verdict = Verdict { summarised: run.summarised, ..Verdict::default() };
+    for (number, episode) in (1..).zip(&run.episodes) {
+        let (at, task, setting) = run.setting(episode).with_context(|| format!("episode {number}"))?;
+        let author = run.author(at, episode);
+        let mut again = Again { verdict: &mut verdict, number, episode };
+        if let Some((step, what, recorded, found)) = again.play(task, setting, author, run.manifest.grader, summon)? {
+            let task = episode.task.clone();
+            verdict.differences.push(Difference { episode: number, task, step, what, recorded, found });
+        }
+        verdict.episodes += 1;
+        verdict.plain += usize::from(episode.is_plain());
+        progress(number);
+    }
+    Ok(verdict)
+}
+
+/// An episode that is played again.
+struct Again<'a> {
+    verdict: &'a mut Verdict,
+    number: usize,
+    episode: &'a Episode,
+}
+
+/// Step, field, recorded, found.
+type Found = (u32, &'static str, String, String);
+
+impl Again<'_> {
+    fn play(
+        &mut self,
+        task: &Task,
+        setting: Setting,
+        mut author: Author,
+        grading: Grading,
+        summon: &mut Summon<'_>,
+    ) -> anyhow::Result<Option<Found>> {
+        let episode = self.episode;
+        let start = setting.world.digest();
+        if start != episode.start_hash {
+            return Ok(Some((0, "start", episode.start_hash.clone(), start)));
+        }
+        let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        let grader = (!task.subtasks.is_empty()).then_some(grader);
+        let house = House::new(setting.scene, setting.world);
+        let mut rollout = Rollout::new(house, episode.instruction.clone(), grader, None);
+        let mut policy: Option<Box<dyn Policy>> = None;
+        let mut summoned: Option<Author> = None;
+        let named = episode.trace.iter().filter_map(|step| step.by.as_ref()).find(|by| !by.is_hand());
+        let first = match episode.trace.first().and_then(|step| step.by.as_ref()) {
+            None => Some(author.clone()),
+            Some(_) => named.cloned(),
+        };
+        let mut past: VecDeque<Moment> = VecDeque::new();
+        for (number, recorded) in (1..).zip(&episode.trace) {
+            if number <= episode.prefix {
+                // The expert led here, unseen by the run's policy.
+                if let Some(found) = self.act(&mut rollout, number, recorded) {
+                    return Ok(Some(found));
+                }
+                continue;
+            }
+            if let Some(told) = &recorded.told {
+                let own = instruction::normalise(&task.instruction) == instruction::normalise(told);
+                rollout.instruction.clone_from(told);
+                if !own {
+                    rollout.grader = None;
+                }
+            }
+            if let Some(by) = &recorded.by {
+                author = by.clone();
+            }
+            // While a person acts, the policy before (or the first one to come) looks on.
+            let acts = if author.is_hand() { summoned.clone().or_else(|| first.clone()) } else { Some(author.clone()) };
+            if let Some(acts) = acts.filter(|acts| summoned.as_ref() != Some(acts)) {
+                policy = summon(&acts).with_context(|| format!("episode {}", self.number))?;
+                if policy.is_none() && !self.verdict.missing.contains(&acts.policy) {
+                    self.verdict.missing.push(acts.policy.clone());
+                }
+                if let Some(policy) = policy.as_deref_mut() {
+                    let before: Vec<Moment> = past.iter().cloned().collect();
+                    look_back(policy, &acts, &mut rollout, &before, number - 1);
+                }
+                summoned = Some(acts);
+            }
+            let action = Action { kind: recorded.kind, target: recorded.target };
+            if let Some(policy) = policy.as_deref_mut() {
+                let chosen = rollout.decide(policy);
+                if !author.is_hand() {
+                    let chosen = chosen.map(|decision| decision.action);
+                    if !chosen.as_ref().is_ok_and(|chosen| *chosen == action) {
+                        let found = chosen.map_or_else(|error| format!("{error:#}"), |chosen| format!("{chosen:?}"));
+                        return Ok(Some((number, "choice", format!("{action:?}"), found)));
+                    }
+                    self.verdict.choices += 1;
+                }
+            }
+            past.push_front(Moment::of(&rollout, &author, Carried::Nothing));
+            past.truncate(FRAMES - 1);
+            if let Some(found) = self.act(&mut rollout, number, recorded) {
+                return Ok(Some(found));
+            }
+        }
+        let own = episode.trace.get(episode.prefix as usize..).unwrap_or_default();
+        let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
+        let (steps, success) = (own.len() as u32, episode.of > 0 && completed == episode.of);
+        let counted = |completed, steps, success| format!("{completed} subtasks, {steps} steps, success {success}");
+        let recorded = counted(episode.completed, episode.steps, episode.success);
+        let found = counted(completed, steps, success);
+        Ok((recorded != found).then_some((0, "result", recorded, found)))
+    }
+
+    /// Takes a recorded step; what it comes to now, where that is something else.
+    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &Step) -> Option<Found> {
+        let tick = rollout.act(Action { kind: recorded.kind, target: recorded.target });
+        let found = Step { told: recorded.told.clone(), by: recorded.by.clone(), ..Step::of(&tick, rollout) };
+        if found != *recorded {
+            let field = if found.outcome != recorded.outcome { "outcome" } else { "subtask" };
+            let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
+            return Some((number, field, text(recorded), text(&found)));
+        }
+        self.verdict.steps += 1;
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::RandomPolicy;
+    use crate::domain::{ActionType, Class, Role, SkillKind, Subtask};
+    use crate::episode::branches::{Taken, Tree};
+    use crate::explore::session_export;
+    use crate::explore::session_export::Explored;
+    use crate::house::testing::kitchen;
+
+    /// A random walk of eight steps in the kitchen; the fourth and fifth by hand, with another instruction from the sixth on.
+    fn walked() -> Explored {
+        let (scene, world) = kitchen();
+        let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
+        let mut task = session_export::ungraded(crate::domain::task::SceneRef::Named(scene.name.clone()));
+        task.roles = vec![role("Mug")];
+        task.subtasks =
+            vec![Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None }];
+        (task.id, task.start, task.instruction) = ("main".into(), Some(world.clone()), "Take the mug.".into());
+        let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+        let mut rollout = Rollout::new(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
+        let mut policy = RandomPolicy::new();
+        policy.begin(9);
+        let random = Author { policy: "random".into(), checkpoint: None, seed: 9, samples: false };
+        let mut tree = Tree::new(Moment::of(&rollout, &random, policy.carried()));
+        for step in 0..8 {
+            if step == 5 {
+                rollout.instruction = "Dance.".into();
+                rollout.grader = None;
+            }
+            let mut decision = rollout.decide(&mut policy).unwrap();
+            let by_hand = (3..5).contains(&step);
+            if by_hand {
+                decision.action = Action::navigate(ActionType::LookUp);
+            }
+            let tick = rollout.carry_out(decision.clone());
+            let taken = Taken {
+                decision,
+                step: Step::of(&tick, &rollout),
+                instruction: rollout.instruction.as_str().into(),
+                author: if by_hand { Author::hand() } else { random.clone() },
+                values: None,
+            };
+            let moment = Moment::of(&rollout, &random, policy.carried());
+            tree.grow(taken, || moment, String::new);
+        }
+        Explored { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }
+    }
+
+    fn random(author: &Author) -> anyhow::Result<Option<Box<dyn Policy>>> {
+        Ok((author.policy == "random").then(|| Box::new(RandomPolicy::new()) as Box<dyn Policy>))
+    }
+
+    fn verified(explored: &Explored) -> Verdict {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        session_export::write(explored, &path).unwrap();
+        let run = Recorded::open(&path, None).unwrap();
+        assert_eq!(run.episodes, explored.episodes);
+        verify(&run, &mut random, &mut |_| ()).unwrap()
+    }
+
+    #[test]
+    fn what_was_explored_is_a_run_that_comes_out_the_same() {
+        let verdict = verified(&walked());
+        assert_eq!((verdict.episodes, verdict.steps), (1, 8), "{verdict:?}");
+        assert_eq!(verdict.choices, 3 + 3, "a person's two steps are not chosen again");
+        assert!(verdict.differences.is_empty() && verdict.missing.is_empty(), "{verdict:?}");
+    }
+
+    #[test]
+    fn a_changed_record_is_found_at_its_first_step() {
+        let check = |change: fn(&mut Episode), step: u32, what: &str| {
+            let mut explored = walked();
+            change(&mut explored.episodes[0]);
+            let verdict = verified(&explored);
+            let found: Vec<_> =
+                verdict.differences.iter().map(|difference| (difference.step, difference.what)).collect();
+            assert_eq!(found, [(step, what)]);
+        };
+        check(|episode| episode.start_hash = "00".into(), 0, "start");
+        check(
+            |episode| episode.trace[3].outcome = crate::house::Outcome::Impossible(crate::house::Reason::Blocked),
+            4,
+            "outcome",
+        );
+        check(|episode| episode.trace[0].kind = ActionType::Slice, 1, "choice");
+        check(|episode| episode.completed += 1, 0, "result");
+    }
+
+    #[test]
+    fn a_policy_that_is_not_at_hand_is_named_and_its_actions_are_replayed() {
+        let explored = walked();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        session_export::write(&explored, &path).unwrap();
+        let run = Recorded::open(&path, None).unwrap();
+        let verdict = verify(&run, &mut |_| Ok(None), &mut |_| ()).unwrap();
+        assert_eq!((verdict.steps, verdict.choices, verdict.missing), (8, 0, vec!["random".to_string()]));
+    }
+}

@@ -1,0 +1,48 @@
+//! The episodes that wait to be played.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use crate::run_dir::episode_spec::Booking;
+
+/// What is wanted, by seat.
+pub(crate) struct Queues {
+    by_seat: Vec<Vec<(usize, Booking)>>,
+    next: Vec<AtomicUsize>,
+    /// Episodes that a failure of a whole team interrupted: each is played again with nobody beside it, which shows whose the
+    /// failure was.
+    alone: Mutex<VecDeque<(usize, Booking)>>,
+}
+
+impl Queues {
+    /// By the seats of their places in the run.
+    pub fn new(wanted: &[Booking], seats: usize) -> Queues {
+        let mut by_seat = vec![Vec::new(); seats];
+        for (at, booking) in wanted.iter().enumerate() {
+            by_seat[booking.place % seats].push((at, *booking));
+        }
+        Queues { by_seat, next: (0..seats).map(|_| AtomicUsize::new(0)).collect(), alone: Mutex::default() }
+    }
+
+    /// The next episode for a seat.
+    pub fn next(&self, seat: usize) -> Option<(usize, Booking)> {
+        let at = self.next[seat].fetch_add(1, Ordering::Relaxed);
+        self.by_seat[seat].get(at).copied()
+    }
+
+    /// Has these played again with nobody beside them.
+    pub fn play_alone(&self, interrupted: impl Iterator<Item = (usize, Booking)>) {
+        self.alone.lock().unwrap_or_else(PoisonError::into_inner).extend(interrupted);
+    }
+
+    /// Whether somebody is to be played with nobody beside it.
+    pub fn someone_waits_alone(&self) -> bool {
+        !self.alone.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+    }
+
+    /// The next of those.
+    pub fn next_alone(&self) -> Option<(usize, Booking)> {
+        self.alone.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
+    }
+}

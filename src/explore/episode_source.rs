@@ -1,0 +1,138 @@
+//! Where episodes come from: generated houses by seed, one scene, or the tasks of a set.
+
+use std::sync::Arc;
+
+use anyhow::Context;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use crate::domain::scene::Room;
+use crate::domain::task::SceneRef;
+use crate::domain::{Scene, Task, Trajectory, World};
+use crate::episode::scenes::Scenes;
+use crate::house::generate;
+
+/// An episode's start.
+#[derive(Clone, Debug)]
+pub struct Opening {
+    /// The floor plan.
+    pub scene: Arc<Scene>,
+    /// The state at the start.
+    pub world: World,
+    /// How tasks refer to the floor plan.
+    pub reference: SceneRef,
+    /// What is asked.
+    pub task: Option<Task>,
+    /// The episode ends at the task's horizon.
+    pub limited: bool,
+}
+
+/// Where to begin.
+pub enum Start {
+    /// In the generated house of this room and the seed.
+    Generated(Room),
+    /// Where demonstrations of one scene began; the seed picks among them.
+    Recorded {
+        /// The scene.
+        scene: Arc<Scene>,
+        /// The demonstrations.
+        trajectories: Vec<Trajectory>,
+    },
+    /// At one task of a set.
+    Tasks {
+        /// The tasks.
+        tasks: Vec<Task>,
+        /// Which one, from 0.
+        index: usize,
+    },
+}
+
+/// The sequence of episodes.
+pub struct Openings {
+    start: Start,
+    seed: u64,
+    scenes: Scenes,
+}
+
+/// How many subtasks a task in a generated house has.
+const LENGTH: usize = 2;
+
+impl Openings {
+    /// Episodes from `start` on; `scenes` holds those that tasks name.
+    pub fn new(start: Start, seed: u64, scenes: Scenes) -> Openings {
+        Openings { start, seed, scenes }
+    }
+
+    /// The seed of the present episode.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// To the next episode: the next seed, or the next task.
+    pub fn advance(&mut self) {
+        match &mut self.start {
+            Start::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
+            Start::Generated(_) | Start::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
+        }
+    }
+
+    /// To the episode of that seed; for a task set, to the task of that number.
+    pub fn seek(&mut self, seed: u64) {
+        match &mut self.start {
+            Start::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
+            Start::Generated(_) | Start::Recorded { .. } => self.seed = seed,
+        }
+    }
+
+    /// Opens the present episode.
+    ///
+    /// # Errors
+    /// When a scene or task cannot be opened.
+    pub fn open(&self) -> anyhow::Result<Opening> {
+        match &self.start {
+            Start::Generated(room) => {
+                let (scene, world) = generate::house(*room, self.seed);
+                let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+                let reference = SceneRef::Generated { room: *room, seed: self.seed };
+                let task = (1..=LENGTH)
+                    .rev()
+                    .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
+                let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
+                Ok(Opening { scene: Arc::new(scene), world, reference, task, limited: false })
+            }
+            Start::Recorded { scene, trajectories } => {
+                let at = self.seed as usize % trajectories.len().max(1);
+                let trajectory = trajectories.get(at).context("no demonstration was recorded in this scene")?;
+                let world = trajectory.start.clone();
+                let (reference, task) = (trajectory.scene.clone(), Some(task_of(trajectory)));
+                Ok(Opening { scene: scene.clone(), world, reference, task, limited: false })
+            }
+            Start::Tasks { tasks, index } => {
+                let task = tasks.get(*index).context("the task set is empty")?;
+                let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
+                let (scene, world, reference) = (setting.scene, setting.world, task.scene.clone());
+                Ok(Opening { scene, world, reference, task: Some(task.clone()), limited: true })
+            }
+        }
+    }
+}
+
+/// The whole of a demonstration as a task.
+fn task_of(trajectory: &Trajectory) -> Task {
+    let annotation = trajectory.annotations.first();
+    let steps = trajectory.actions.len() as u32;
+    Task {
+        id: trajectory.id.clone(),
+        scene: trajectory.scene.clone(),
+        start: None,
+        instruction: annotation.map_or_else(|| "look around".into(), |annotation| annotation.goal.clone()),
+        sentences: Vec::new(),
+        roles: trajectory.roles.clone(),
+        subtasks: trajectory.skills.clone(),
+        expert_steps: steps,
+        horizon: 2 * steps,
+        goal: trajectory.goal.clone(),
+        source: Some((trajectory.id.clone(), 0)),
+        reworded: false,
+    }
+}

@@ -1,0 +1,174 @@
+//! Keeping what was explored: as a run, as a task, or as something to look at. Each says in a line what it wrote.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use super::Engine;
+use crate::domain::{Scene, Task};
+use crate::episode::branches::Moment;
+use crate::episode::frames::Recording;
+use crate::episode::scenes::Setting;
+use crate::explore::session_export;
+use crate::explore::session_export::Explored;
+use crate::report::export;
+use crate::run_dir::writer;
+
+impl Engine {
+    /// Everything that was tried as a run's tasks and episodes, a branch each.
+    pub fn explored(&self) -> Explored {
+        let branches = || self.tree.branches().iter().enumerate();
+        let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
+        Explored {
+            scene: self.rollout.house.scene().clone(),
+            tasks,
+            episodes: branches().map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
+        }
+    }
+
+    /// The branch in hand as a recording.
+    ///
+    /// # Errors
+    /// Never for what the simulator itself did.
+    pub fn recording(&self) -> anyhow::Result<Recording> {
+        let start = &self.tree.beginning(self.tree.branch());
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
+        Recording::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
+    }
+
+    /// The present state and instruction as a task: what is left of the subtasks, with the expert's own number of steps.
+    ///
+    /// # Errors
+    /// When nobody grades the instruction, nothing is left to do, or the expert sees no way.
+    pub fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
+        let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
+        let id = format!("{}-{name}-{}", self.rollout.house.scene().name, self.tree.at());
+        let base = self.task_at(self.tree.moment(), &id);
+        Ok((session_export::rest_of(base, &self.rollout)?, self.rollout.house.scene().clone()))
+    }
+
+    /// The task that begins at a moment; without subtasks where nobody grades the instruction.
+    fn task_at(&self, moment: &Moment, id: &str) -> Task {
+        let graded = self.task.as_ref().filter(|_| moment.grader.is_some());
+        let mut task = graded.cloned().unwrap_or_else(|| session_export::ungraded(self.reference.clone()));
+        task.id = id.into();
+        task.start = Some((*moment.world).clone());
+        task.instruction.clone_from(&moment.instruction);
+        task
+    }
+
+    /// Writes every branch as an episode of a run, into `path` or a new folder.
+    ///
+    /// # Errors
+    /// When the folder holds something else, or cannot be written to.
+    pub fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
+        let path = path.unwrap_or_else(|| {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+            writer::default_path("explored", since, &|path| path.exists())
+        });
+        let explored = self.explored();
+        session_export::write(&explored, &path)?;
+        let many = explored.episodes.len();
+        let what = if many == 1 { "branch".to_string() } else { format!("{many} branches") };
+        Ok(format!("wrote the {what} as {}; sprint open shows it again", path.display()))
+    }
+
+    /// Adds the present state, instruction and remaining subtasks as a task to a task file.
+    ///
+    /// # Errors
+    /// When nobody grades the instruction, or the file cannot be written.
+    pub fn keep_task(&self, path: &Path) -> anyhow::Result<String> {
+        let (task, scene) = self.as_task()?;
+        let steps = task.expert_steps;
+        let (id, many) = session_export::add_task(path, task, &scene)?;
+        Ok(format!("{id} is task {} of {} (expert: {steps} steps)", many, path.display()))
+    }
+
+    /// Writes the branch in hand in the form that the file's ending asks for.
+    ///
+    /// # Errors
+    /// When the ending is unknown, or the file cannot be written.
+    pub fn export(&self, path: &Path) -> anyhow::Result<String> {
+        let size = export::write(&self.recording()?, self.tree().at(), path)?;
+        Ok(format!("wrote {}, {:.1} kB", path.display(), size as f64 / 1000.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::agent::registry::PolicyKind;
+    use crate::data::taskset;
+    use crate::domain::{Action, ActionType};
+    use crate::eval::verify::{Recorded, verify};
+    use crate::explore::testing;
+
+    #[test]
+    fn an_exploration_with_forks_is_kept_and_verified_and_its_state_becomes_a_task() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Random).unwrap();
+        for _ in 0..6 {
+            engine.step().unwrap();
+        }
+        engine.seek(3);
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.instruct("dance").unwrap();
+        engine.step().unwrap();
+        engine.rename(1, "1").unwrap();
+        assert_eq!([engine.branch("1").unwrap(), engine.branch("2").unwrap()], [0, 1], "a number is a place");
+        let path = folder.path().join("run");
+        assert!(engine.keep(Some(path.clone())).unwrap().contains("2 branches"));
+        assert!(engine.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));
+        let run = Recorded::open(&path, None).unwrap();
+        let mut summon = |_: &crate::episode::record::Author| -> anyhow::Result<Option<Box<dyn crate::agent::Policy>>> {
+            Ok(Some(Box::new(crate::agent::RandomPolicy::new())))
+        };
+        let verdict = verify(&run, &mut summon, &mut |_| ()).unwrap();
+        assert!(verdict.differences.is_empty(), "{verdict:?}");
+        assert_eq!((verdict.episodes, verdict.steps, verdict.choices), (2, 6 + 5, 6 + 4));
+
+        let tasks = folder.path().join("tasks.json");
+        assert!(engine.keep_task(&tasks).unwrap_err().to_string().contains("nobody grades"));
+        engine.switch(0).unwrap();
+        engine.seek(4);
+        engine.keep_task(&tasks).unwrap();
+        assert!(engine.keep_task(&tasks).unwrap().contains("is task 2"));
+        let set = taskset::read(&tasks).unwrap().value;
+        assert_eq!(set.tasks.len(), 2);
+        assert!(set.tasks[0].expert_steps > 0 && set.tasks[0].start.is_some());
+    }
+
+    #[test]
+    fn a_branch_is_exported_by_its_ending() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = testing::engine();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        for name in ["a.gif", "a.strip.png", "a.txt", "a.html", "a.png"] {
+            assert!(engine.export(&folder.path().join(name)).unwrap().contains(name));
+        }
+        let text = std::fs::read_to_string(folder.path().join("a.txt")).unwrap();
+        assert!(text.contains("1  RotateLeft"), "{text}");
+        assert!(engine.export(&folder.path().join("a.mov")).is_err());
+    }
+
+    #[test]
+    fn what_is_asked_after_a_reset_is_graded_in_its_own_branch() {
+        let mut engine = testing::engine();
+        engine.choose(PolicyKind::Expert).unwrap();
+        let own = engine.instruction().to_string();
+        engine.instruct("look around").unwrap();
+        engine.plant();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.instruct(&own).unwrap();
+        engine.reset();
+        while engine.end().is_none() {
+            engine.step().unwrap();
+        }
+        let explored = engine.explored();
+        let graded: Vec<_> = explored.episodes.iter().map(|episode| (episode.of > 0, episode.success)).collect();
+        assert_eq!(graded, [(false, false), (true, true)]);
+        let subtasks: Vec<_> = explored.tasks.iter().map(|task| task.subtasks.is_empty()).collect();
+        assert_eq!(subtasks, [true, false]);
+    }
+}

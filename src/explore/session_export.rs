@@ -1,0 +1,169 @@
+//! What a person explored, as an ordinary run: a branch an episode. The folder holds the tasks too, so that it can be opened
+//! and verified by itself.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, ensure};
+use sha2::{Digest, Sha256};
+
+use crate::agent::{ExpertPolicy, Policy};
+use crate::data::{atomic_file, json, taskset};
+use crate::domain::task::SceneRef;
+use crate::domain::{Scene, Task, TaskSet};
+use crate::episode::record::Episode;
+use crate::episode::rollout::{End, Rollout};
+use crate::episode::scenes::Scenes;
+use crate::house::House;
+use crate::house::grading::{Grader, Grading};
+use crate::report::summary::Summary;
+use crate::run_dir::manifest::Manifest;
+use crate::run_dir::writer::RunFolder;
+
+/// The tasks and episodes of an exploration, a branch each.
+#[derive(Clone, Debug)]
+pub struct Explored {
+    /// Where it was.
+    pub scene: Arc<Scene>,
+    /// What was asked at the start, under each branch's name.
+    pub tasks: Vec<Task>,
+    /// What was done.
+    pub episodes: Vec<Episode>,
+}
+
+/// The folder with its scenes, where they come from a dataset.
+const SCENES: &str = "scenes";
+/// The most steps that the expert is given for a task.
+const MOST: u32 = 1000;
+
+/// Writes an exploration into a new run folder.
+///
+/// # Errors
+/// When the folder holds something else, or cannot be written to.
+pub fn write(explored: &Explored, path: &Path) -> anyhow::Result<()> {
+    ensure!(!path.join(RunFolder::MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
+    let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
+    let set = TaskSet {
+        format_version: TaskSet::FORMAT,
+        name: "explored".into(),
+        scenes: named.then(|| SCENES.to_string()),
+        tasks: explored.tasks.clone(),
+    };
+    let mut bytes = serde_json::to_vec_pretty(&set)?;
+    bytes.push(b'\n');
+    let mut scenes_digest = Sha256::new();
+    scenes_digest.update(serde_json::to_vec(&*explored.scene)?);
+    let manifest = Manifest {
+        format_version: Manifest::FORMAT,
+        sprint: env!("CARGO_PKG_VERSION").into(),
+        task_set: set.name.clone(),
+        task_set_hash: json::hex(&Sha256::digest(&bytes)),
+        scenes_hash: json::hex(&scenes_digest.finalize()),
+        policy: "explored".into(),
+        checkpoint_hash: None,
+        tasks: set.tasks.len(),
+        seeds: 1,
+        grader: Grading::Class,
+        step_by_step: false,
+        sampling: false,
+        language: false,
+        every_start: false,
+        shard: None,
+    };
+    let mut folder = RunFolder::open(path, &manifest)?;
+    atomic_file::write(&path.join(RunFolder::TASKS), &bytes)?;
+    if named {
+        json::write(&path.join(SCENES).join(format!("{}.json", explored.scene.name)), &*explored.scene)?;
+    }
+    for episode in &explored.episodes {
+        folder.append(episode)?;
+    }
+    Summary::of(&manifest, &set.tasks, &explored.episodes, false).write(folder.path())
+}
+
+/// A task without subtasks: nobody grades what a person made up.
+pub fn ungraded(scene: SceneRef) -> Task {
+    Task {
+        id: String::new(),
+        scene,
+        start: None,
+        instruction: "look around".into(),
+        sentences: Vec::new(),
+        roles: Vec::new(),
+        subtasks: Vec::new(),
+        expert_steps: 0,
+        horizon: 0,
+        goal: None,
+        source: None,
+        reworded: false,
+    }
+}
+
+/// What is left of a task from the present state of a rollout; things that were chosen for earlier subtasks stay chosen.
+///
+/// # Errors
+/// When nobody grades it, nothing is left, or the expert cannot do it.
+pub fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
+    let grader = rollout.grader.as_ref().context("nobody grades this instruction, so it cannot be a task")?;
+    let done = grader.completed();
+    let subtasks = grader.subtasks().get(done..).unwrap_or_default().to_vec();
+    ensure!(!subtasks.is_empty(), "every subtask is done here; go back to a step where something is left to do");
+    let mut roles = task.roles.clone();
+    for (at, role) in (0u8..).zip(&mut roles) {
+        role.bound = grader.binding(at);
+    }
+    let sentences = task.sentences.get(done..).unwrap_or_default().to_vec();
+    let instruction = match (done, sentences.is_empty()) {
+        (0, _) | (_, true) => task.instruction.clone(),
+        (_, false) => sentences.join(" "),
+    };
+    let mut rest = Task { roles, subtasks, sentences, instruction, goal: None, source: None, ..task };
+    if rest.sentences.len() != rest.subtasks.len() {
+        rest.sentences.clear();
+    }
+    rest.expert_steps = expert_steps(&rest, rollout.house.scene())?;
+    rest.horizon = 2 * rest.expert_steps;
+    Ok(rest)
+}
+
+fn expert_steps(task: &Task, scene: &Arc<Scene>) -> anyhow::Result<u32> {
+    let world = task.start.clone().context("the task has no start")?;
+    let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+    let house = House::new(scene.clone(), world);
+    let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(MOST));
+    let mut expert = ExpertPolicy::new();
+    expert.begin(0);
+    while rollout.end().is_none() {
+        rollout.step(&mut expert)?;
+    }
+    ensure!(rollout.end() == Some(End::Success), "the expert does not finish this within {MOST} steps");
+    Ok(rollout.steps())
+}
+
+/// Adds a task to a task file, which is made where there is none; returns the id that it has there and how many tasks there are.
+///
+/// # Errors
+/// When the file is no task file, or cannot be written.
+pub fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(String, usize)> {
+    let mut set = if path.exists() {
+        taskset::read(path)?.value
+    } else {
+        let name = path.file_stem().map_or_else(|| "tasks".into(), |name| name.to_string_lossy().into_owned());
+        TaskSet { format_version: TaskSet::FORMAT, name, scenes: None, tasks: Vec::new() }
+    };
+    if let SceneRef::Named(name) = &task.scene {
+        let folder = set.scenes.get_or_insert_with(|| SCENES.into()).clone();
+        let file = path.parent().unwrap_or(Path::new("")).join(folder).join(format!("{name}.json"));
+        if !file.exists() {
+            json::write(&file, scene)?;
+        }
+    }
+    let taken = |id: &String| set.tasks.iter().any(|task| task.id == *id);
+    let mut ids = std::iter::once(task.id.clone()).chain((2..).map(|number| format!("{}-{number}", task.id)));
+    let id = ids.find(|id| !taken(id)).unwrap_or_default();
+    task.id.clone_from(&id);
+    set.tasks.push(task);
+    Scenes::of(path, &set).check(&set.tasks)?;
+    taskset::write(path, &set)?;
+    Ok((id, set.tasks.len()))
+}

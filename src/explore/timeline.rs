@@ -1,0 +1,220 @@
+//! The steps of the branch in hand in a form that a screen can draw, and how two branches part.
+
+use std::sync::Arc;
+
+use crate::domain::ActionType;
+use crate::episode::branches::{Taken, Tree};
+use crate::house::view::Frame;
+
+/// What was tried, for the screen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timeline {
+    /// The step in hand.
+    pub at: u32,
+    /// The steps of the branch in hand.
+    pub beats: Vec<Beat>,
+    /// Other branches leave it at the start.
+    pub forks_at_start: bool,
+    /// Every branch.
+    pub branches: Vec<Bough>,
+    /// The number of the one in hand.
+    pub branch: usize,
+}
+
+/// A step on the timeline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beat {
+    /// What was done.
+    pub kind: ActionType,
+    /// It could be done.
+    pub done: bool,
+    /// The subtask that it completed, from 1.
+    pub completed: Option<u32>,
+    /// A person chose it.
+    pub by_hand: bool,
+    /// The agent was told something else before it.
+    pub told: bool,
+    /// Other branches leave after it.
+    pub forks: bool,
+    /// The entropy of the choice, in nats.
+    pub entropy: Option<f32>,
+    /// The probability of what was chosen.
+    pub chosen: Option<f32>,
+    /// V of the state before it.
+    pub value: Option<f32>,
+    /// Q of what was chosen.
+    pub q: Option<f32>,
+}
+
+/// A branch in the list of branches.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bough {
+    /// Its name.
+    pub name: String,
+    /// Why it began.
+    pub why: String,
+    /// The branch that it left, and after which step.
+    pub left: Option<(usize, u32)>,
+    /// Its last step.
+    pub last: u32,
+    /// Subtasks that were completed on it.
+    pub completed: u32,
+}
+
+impl Beat {
+    fn of(taken: &Taken, before: Option<&Taken>, forks: bool) -> Beat {
+        let mind = taken.decision.mind.as_ref();
+        let kind = taken.decision.action.kind;
+        Beat {
+            kind,
+            done: taken.step.outcome.is_done(),
+            completed: taken.step.subtask.map(|subtask| subtask + 1),
+            by_hand: taken.author.is_hand(),
+            told: before.is_some_and(|before| before.instruction != taken.instruction),
+            forks,
+            entropy: mind.map(|mind| mind.entropy),
+            chosen: mind.and_then(|mind| mind.actions[kind.index()]),
+            value: taken.values.as_ref().map(|values| values.state),
+            q: taken.values.as_ref().and_then(|values| values.q(kind, taken.step.class)),
+        }
+    }
+
+    /// Something to jump to.
+    pub fn is_event(&self) -> bool {
+        self.completed.is_some() || !self.done || self.told || self.forks
+    }
+}
+
+impl Timeline {
+    /// The branch in hand of a tree.
+    pub fn of(tree: &Tree) -> Timeline {
+        let steps: Vec<&Taken> = tree.steps().collect();
+        let mut forks = tree.forks();
+        let forks_at_start = forks.next().unwrap_or(false);
+        let before = std::iter::once(None).chain(steps.iter().copied().map(Some));
+        let beats = steps.iter().zip(before).zip(forks).map(|((taken, before), forks)| Beat::of(taken, before, forks));
+        let boughs = tree.branches().iter().enumerate().map(|(at, branch)| Bough {
+            name: branch.name.clone(),
+            why: branch.why.clone(),
+            left: branch.left,
+            last: tree.length(at),
+            completed: tree.completed(at),
+        });
+        Timeline {
+            at: tree.at(),
+            beats: beats.collect(),
+            forks_at_start,
+            branches: boughs.collect(),
+            branch: tree.branch(),
+        }
+    }
+
+    /// The next event after the step in hand (or, backwards, the last before it); the end of the branch without any.
+    pub fn event(&self, forward: bool) -> u32 {
+        let last = self.beats.len() as u32;
+        let mut events = (1..=last).zip(&self.beats).filter(|(_, beat)| beat.is_event()).map(|(step, _)| step);
+        match forward {
+            true => events.find(|&step| step > self.at).unwrap_or(last),
+            false => events.take_while(|&step| step < self.at).last().unwrap_or(0),
+        }
+    }
+
+    /// The step that completed a subtask, from 1.
+    pub fn subtask(&self, number: u32) -> Option<u32> {
+        (1..).zip(&self.beats).find(|(_, beat)| beat.completed == Some(number)).map(|(step, _)| step)
+    }
+}
+
+/// How two branches part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Divergence {
+    /// Their names.
+    pub names: [String; 2],
+    /// How many steps they share.
+    pub shared: u32,
+    /// The steps after that, side by side.
+    pub rows: Vec<Parted>,
+    /// What the agent saw on both, side by side in one picture, at the steps that are named.
+    pub sights: Option<(Arc<Frame>, [u32; 2])>,
+}
+
+/// A step of two branches that have parted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parted {
+    /// Which step.
+    pub step: u32,
+    /// What each did, in words; nothing where it is over.
+    pub sides: [Option<String>; 2],
+    /// The world was the same after it.
+    pub same: bool,
+}
+
+impl Divergence {
+    /// How `one` and `other` part.
+    pub fn of(tree: &Tree, one: usize, other: usize) -> Divergence {
+        let stories = [tree.story(one), tree.story(other)];
+        let name = |at: usize| tree.branches().get(at).map_or_else(String::new, |branch| branch.name.clone());
+        let shared = tree.shared(one, other);
+        let longest = stories.iter().map(Vec::len).max().unwrap_or(0) as u32;
+        let rows = (shared + 1..longest).map(|step| {
+            let of = |side: usize| stories[side].get(step as usize);
+            let side = |side: usize| of(side).and_then(|(_, taken)| taken.map(words));
+            let same = matches!((of(0), of(1)), (Some((a, _)), Some((b, _))) if a.world == b.world);
+            Parted { step, sides: [side(0), side(1)], same }
+        });
+        Divergence { names: [name(one), name(other)], shared, rows: rows.collect(), sights: None }
+    }
+}
+
+/// A step in words.
+pub fn words(taken: &Taken) -> String {
+    let class = taken.step.class.map_or(String::new(), |class| format!(" {}", class.name()));
+    let hand = if taken.author.is_hand() { " (you)" } else { "" };
+    let done = taken.step.subtask.map_or(String::new(), |subtask| format!(" · subtask {} done", subtask + 1));
+    let outcome = if taken.step.outcome.is_done() { String::new() } else { format!(" · {}", taken.step.outcome) };
+    format!("{}{class}{hand}{outcome}{done}", taken.step.kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::Action;
+    use crate::explore::testing;
+
+    #[test]
+    fn events_are_what_one_jumps_to() {
+        let mut engine = testing::engine();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        for _ in 0..4 {
+            engine.act(Action::navigate(ActionType::LookDown));
+        }
+        engine.instruct("dance").unwrap();
+        engine.act(Action::navigate(ActionType::RotateLeft));
+        let time = Timeline::of(engine.tree());
+        let events: Vec<u32> =
+            (1..).zip(&time.beats).filter(|(_, beat)| beat.is_event()).map(|(step, _)| step).collect();
+        assert_eq!(events.last(), Some(&6), "the new instruction");
+        assert!(events.len() >= 2, "and a look beyond the limit: {events:?}");
+        assert_eq!(time.event(false), events[events.len() - 2]);
+        assert_eq!(time.event(true), 6);
+        engine.seek(0);
+        assert_eq!(Timeline::of(engine.tree()).event(true), events[0]);
+    }
+
+    #[test]
+    fn parted_branches_are_told_side_by_side() {
+        let mut engine = testing::engine();
+        let turn = |kind| Action::navigate(kind);
+        engine.act(turn(ActionType::RotateLeft));
+        engine.act(turn(ActionType::RotateLeft));
+        engine.seek(1);
+        engine.act(turn(ActionType::RotateRight));
+        engine.act(turn(ActionType::LookUp));
+        let parted = engine.divergence(0);
+        assert_eq!((parted.names.clone(), parted.shared), (["b1".into(), "main".into()], 1));
+        assert_eq!(parted.rows.len(), 2);
+        assert_eq!(parted.rows[0].sides, [Some("RotateRight (you)".into()), Some("RotateLeft (you)".into())]);
+        assert_eq!(parted.rows[1].sides[1], None);
+        assert!(!parted.rows[0].same);
+    }
+}

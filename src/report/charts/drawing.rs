@@ -1,0 +1,195 @@
+//! A drawing of lines, dots and texts on white, as vectors or as pixels.
+
+use std::fmt::Write;
+
+use crate::report::export::Canvas;
+use crate::report::export::lettering::{ADVANCE, glyph};
+
+/// Red, green, blue.
+pub type Colour = [u8; 3];
+
+/// Where a text's point lies.
+#[derive(Clone, Copy, Debug)]
+pub enum Anchor {
+    /// At its left end.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+#[derive(Clone, Debug)]
+enum Mark {
+    Line { points: Vec<(f64, f64)>, colour: Colour, width: f64 },
+    Dot { at: (f64, f64), colour: Colour },
+    Text { at: (f64, f64), text: String, anchor: Anchor, colour: Colour },
+}
+
+/// Pixels of the picture to a unit of the drawing.
+const SCALE: f64 = 2.0;
+/// A dot's radius.
+const RADIUS: f64 = 3.5;
+
+/// Lines, dots and texts, in the order in which they cover each other.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    size: (f64, f64),
+    title: String,
+    marks: Vec<Mark>,
+}
+
+impl Drawing {
+    /// An empty drawing; the title is for those who cannot see it.
+    pub fn new(width: f64, height: f64, title: &str) -> Drawing {
+        Drawing { size: (width, height), title: title.to_owned(), marks: Vec::new() }
+    }
+
+    /// A line through points.
+    pub fn line(&mut self, points: &[(f64, f64)], colour: Colour, width: f64) {
+        self.marks.push(Mark::Line { points: points.to_vec(), colour, width });
+    }
+
+    /// A dot.
+    pub fn dot(&mut self, at: (f64, f64), colour: Colour) {
+        self.marks.push(Mark::Dot { at, colour });
+    }
+
+    /// A text in one line, its baseline at `at`.
+    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: Colour) {
+        self.marks.push(Mark::Text { at, text: text.to_owned(), anchor, colour });
+    }
+
+    /// As an SVG document, or as a part of a page.
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size;
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" \
+             height=\"{height:.0}\" font-family=\"sans-serif\" font-size=\"12\" role=\"img\">\n<title>{}</title>\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
+            escape(&self.title)
+        );
+        let hex = |[r, g, b]: &Colour| format!("#{r:02x}{g:02x}{b:02x}");
+        for mark in &self.marks {
+            // Writing to a string cannot fail.
+            let _ = match mark {
+                Mark::Line { points, colour, width } => {
+                    let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+                    let (points, colour) = (points.join(" "), hex(colour));
+                    writeln!(
+                        svg,
+                        r#"<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}"/>"#
+                    )
+                }
+                Mark::Dot { at: (x, y), colour } => {
+                    writeln!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{RADIUS}" fill="{}"/>"#, hex(colour))
+                }
+                Mark::Text { at: (x, y), text, anchor, colour } => {
+                    let anchor = match anchor {
+                        Anchor::Start => "start",
+                        Anchor::Middle => "middle",
+                        Anchor::End => "end",
+                    };
+                    let (text, colour) = (escape(text), hex(colour));
+                    writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" fill="{colour}">{text}</text>"#)
+                }
+            };
+        }
+        svg + "</svg>\n"
+    }
+
+    /// As a PNG file.
+    ///
+    /// # Errors
+    /// Never in practice: it is written to memory.
+    pub fn png(&self) -> anyhow::Result<Vec<u8>> {
+        let (width, height) = ((SCALE * self.size.0).ceil() as usize, (SCALE * self.size.1).ceil() as usize);
+        let mut canvas = Canvas::new(width, height, [255; 3]);
+        for mark in &self.marks {
+            match mark {
+                Mark::Line { points, colour, width } => {
+                    points.windows(2).for_each(|ends| stroke(&mut canvas, ends[0], ends[1], *colour, *width));
+                }
+                Mark::Dot { at, colour } => disc(&mut canvas, *at, RADIUS, *colour),
+                Mark::Text { at, text, anchor, colour } => write(&mut canvas, *at, text, *anchor, *colour),
+            }
+        }
+        canvas.png()
+    }
+}
+
+/// Text as it stands in SVG and HTML.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Sets the pixel of a place in pixels.
+fn put(canvas: &mut Canvas, x: f64, y: f64, colour: Colour) {
+    if x >= 0.0 && y >= 0.0 {
+        canvas.set(x as usize, y as usize, colour);
+    }
+}
+
+fn disc(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, colour: Colour) {
+    let radius = SCALE * radius;
+    let reach = radius.ceil() as i32;
+    for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (f64::from(dx), f64::from(dy)))) {
+        if dx.hypot(dy) <= radius {
+            put(canvas, SCALE * x + dx, SCALE * y + dy, colour);
+        }
+    }
+}
+
+fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), colour: Colour, width: f64) {
+    let parts = (SCALE * (to.0 - from.0).hypot(to.1 - from.1)).ceil().max(1.0);
+    for part in 0..=parts as u32 {
+        let share = f64::from(part) / parts;
+        let at = (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
+        disc(canvas, at, width / 2.0, colour);
+    }
+}
+
+fn write(canvas: &mut Canvas, (x, y): (f64, f64), text: &str, anchor: Anchor, colour: Colour) {
+    // A dot of a letter is a unit of the drawing.
+    let length = (text.chars().count() * ADVANCE) as f64;
+    let left = x - match anchor {
+        Anchor::Start => 0.0,
+        Anchor::Middle => length / 2.0,
+        Anchor::End => length,
+    };
+    for (place, letter) in text.chars().enumerate() {
+        for (down, bits) in glyph(letter).into_iter().enumerate() {
+            for across in (0..5usize).filter(|across| bits >> (4 - across) & 1 == 1) {
+                let corner = (SCALE * (left + (place * ADVANCE + across) as f64), SCALE * (y - 7.0 + down as f64));
+                for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    put(canvas, corner.0.round() + dx, corner.1.round() + dy, colour);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drawing_shows_the_same_in_both_forms() {
+        let mut drawing = Drawing::new(60.0, 40.0, "a<b");
+        drawing.line(&[(10.0, 20.0), (50.0, 20.0)], [0, 0, 255], 2.0);
+        drawing.dot((10.0, 20.0), [255, 0, 0]);
+        drawing.text((30.0, 10.0), "x & y", Anchor::Middle, [0, 0, 0]);
+        // What lies outside is cut.
+        drawing.dot((-100.0, 900.0), [1, 2, 3]);
+        let svg = drawing.svg();
+        for part in ["<title>a&lt;b", "x &amp; y", "points=\"10.0,20.0 50.0,20.0\"", "<circle cx=\"10.0\""] {
+            assert!(svg.contains(part), "{part} in {svg}");
+        }
+        let image = image::load_from_memory(&drawing.png().unwrap()).unwrap().to_rgb8();
+        assert_eq!(image.dimensions(), (120, 80));
+        assert_eq!(image.get_pixel(60, 40).0, [0, 0, 255]);
+        assert_eq!(image.get_pixel(20, 40).0, [255, 0, 0]);
+        assert!(image.pixels().any(|pixel| pixel.0 == [0, 0, 0]), "the text is there");
+        assert!(!image.pixels().any(|pixel| pixel.0 == [1, 2, 3]));
+    }
+}

@@ -1,0 +1,127 @@
+//! Curves of trainings: every scalar of `progress.jsonl` as a panel, drawn to SVG or PNG.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::drawing::{Anchor, Drawing};
+use super::line_chart::{COLOURS, Chart, INK, Line};
+
+/// The size of a panel.
+const PANEL: (f64, f64) = (380.0, 230.0);
+/// Panels in a row.
+const COLUMNS: usize = 3;
+/// The height of a line of the legend.
+const LINE: f64 = 16.0;
+
+/// The scalars of a training by stage and name, each a number at some steps.
+pub type Curves = BTreeMap<String, BTreeMap<u64, f64>>;
+
+/// Reads a checkpoint folder's `training/progress.jsonl`. Of a step that was taken twice, by a training that was resumed, the
+/// later one counts. A last line that was cut short is passed over.
+///
+/// # Errors
+/// When the file cannot be read, or another line of it is malformed.
+pub fn read(folder: &Path) -> anyhow::Result<Curves> {
+    let path = folder.join("training/progress.jsonl");
+    anyhow::ensure!(
+        path.exists(),
+        "{} keeps no training's curves (training/progress.jsonl is missing); `sprint pretrain` writes them",
+        folder.display()
+    );
+    let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let mut curves = Curves::new();
+    let lines: Vec<&str> = text.lines().collect();
+    for (number, line) in lines.iter().enumerate() {
+        let value: serde_json::Map<String, serde_json::Value> = match serde_json::from_str(line) {
+            Ok(value) => value,
+            Err(_) if number + 1 == lines.len() => break,
+            Err(error) => return Err(error).with_context(|| format!("{}: line {}", path.display(), number + 1)),
+        };
+        let stage = value.get("stage").and_then(serde_json::Value::as_str).unwrap_or("training").to_string();
+        let Some(step) = value.get("step").and_then(serde_json::Value::as_u64) else { continue };
+        for (name, number) in value {
+            if let (false, Some(number)) = (["stage", "step", "of"].contains(&name.as_str()), number.as_f64()) {
+                curves.entry(format!("{stage}/{name}")).or_default().insert(step, number);
+            }
+        }
+    }
+    Ok(curves)
+}
+
+/// Draws named trainings into shared panels, a panel a scalar; with `only`, those whose names contain one of these words.
+///
+/// # Errors
+/// When no scalar is left to draw.
+pub fn draw(trainings: &[(String, Curves)], only: &[String]) -> anyhow::Result<Drawing> {
+    let wanted = |name: &str| only.is_empty() || only.iter().any(|word| name.contains(word.as_str()));
+    let mut names: Vec<&str> = trainings
+        .iter()
+        .flat_map(|(_, curves)| curves.keys())
+        .map(String::as_str)
+        .filter(|name| wanted(name))
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    anyhow::ensure!(!names.is_empty(), "there is nothing to draw: no training has such numbers");
+    let columns = names.len().min(COLUMNS);
+    let legend = LINE * (trainings.len() as f64 + 1.0);
+    let rows = names.len().div_ceil(columns);
+    let mut drawing = Drawing::new(PANEL.0 * columns as f64, legend + PANEL.1 * rows as f64, "Curves of trainings");
+    for (i, (name, _)) in trainings.iter().enumerate() {
+        let (y, colour) = (LINE * (i as f64 + 1.0), COLOURS[i % COLOURS.len()]);
+        drawing.line(&[(12.0, y), (36.0, y)], colour, 2.0);
+        drawing.text((44.0, y + 4.0), name, Anchor::Start, INK);
+    }
+    for (i, name) in names.into_iter().enumerate() {
+        let corner = (PANEL.0 * (i % columns) as f64, legend + PANEL.1 * (i / columns) as f64);
+        let line = |(_, curves): &(String, Curves)| {
+            let points = curves.get(name).into_iter().flatten().map(|(&step, &value)| (step as f64, value));
+            Line { points: points.collect(), ..Line::default() }
+        };
+        let lines = trainings.iter().map(line).collect();
+        Chart { title: name.to_owned(), lines, ..Chart::default() }.draw(&mut drawing, corner, PANEL);
+    }
+    Ok(drawing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn training() -> (tempfile::TempDir, Curves) {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("training")).unwrap();
+        let lines = [
+            r#"{"stage":"policy","step":50,"of":200,"q_loss":0.5,"v_mean":0.1}"#,
+            r#"{"stage":"policy","step":100,"of":200,"q_loss":0.4,"v_mean":0.2}"#,
+            r#"{"stage":"policy","step":100,"of":200,"q_loss":0.3,"v_mean":0.3}"#,
+            r#"{"stage":"policy","step":150,"of":2"#,
+        ];
+        std::fs::write(folder.path().join("training/progress.jsonl"), lines.join("\n")).unwrap();
+        let curves = read(folder.path()).unwrap();
+        (folder, curves)
+    }
+
+    #[test]
+    fn a_step_taken_twice_counts_once_and_a_cut_line_not_at_all() {
+        let curves = training().1;
+        assert_eq!(curves["policy/q_loss"], [(50, 0.5), (100, 0.3)].into());
+        assert_eq!(curves.len(), 2);
+    }
+
+    #[test]
+    fn curves_become_both_kinds_of_picture() {
+        let curves = training().1;
+        let both = [("one".to_string(), curves.clone()), ("<two>".to_string(), curves)];
+        let plot = draw(&both, &[]).unwrap();
+        let svg = plot.svg();
+        assert!(svg.contains("policy/v_mean") && svg.contains("&lt;two&gt;") && svg.ends_with("</svg>\n"));
+        let picture = image::load_from_memory(&plot.png().unwrap()).unwrap().to_rgb8();
+        assert!(picture.pixels().any(|pixel| pixel.0 == COLOURS[1]), "the second training's curve is there");
+        assert!(draw(&both, &["nothing".into()]).is_err());
+        let one = draw(&both, &["q_loss".into()]).unwrap().svg();
+        assert!(one.contains("q_loss") && !one.contains("v_mean"));
+    }
+}

@@ -1,0 +1,148 @@
+//! Runs compared with a first one.
+
+pub mod markdown;
+pub mod paired;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use self::paired::Paired;
+use super::stats;
+use super::stats::Interval;
+use super::summary::{Mean, Summary};
+use crate::episode::record::Episode;
+use crate::run_dir::reader::FinishedRun;
+
+/// What a comparison found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// Version of this format.
+    pub format_version: u32,
+    /// The runs as they stand, in the order given.
+    pub runs: Vec<Standing>,
+    /// Every further run against the first.
+    pub pairs: Vec<Paired>,
+}
+
+/// A run's own figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Standing {
+    /// Its folder, or its folders with commas between.
+    pub run: String,
+    /// Its task set.
+    pub task_set: String,
+    /// Who acted.
+    pub policy: String,
+    /// Episodes in the tasks' own words from their starts.
+    pub episodes: usize,
+    /// Episodes that ended with an error.
+    pub errors: usize,
+    /// The share of successes.
+    pub success: f64,
+    /// Its 95 % interval.
+    pub success_interval: Interval,
+    /// Completed subtasks of an episode.
+    pub completed_subtasks: Mean,
+    /// The same by folder, where there are several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub completed_by_folder: Vec<f64>,
+    /// Mean progress.
+    pub progress: f64,
+    /// By the number of subtasks: mean progress.
+    pub progress_by_length: BTreeMap<u32, f64>,
+}
+
+impl Comparison {
+    /// The format version this program writes.
+    pub const FORMAT: u32 = 3;
+
+    /// Compares every further run with the first; with it comes each run's summary.
+    ///
+    /// # Errors
+    /// When there are fewer than two, or two have no episode in common.
+    pub fn of(runs: &[FinishedRun]) -> anyhow::Result<(Comparison, Vec<Summary>)> {
+        let [first, others @ ..] = runs else { anyhow::bail!("name the runs to compare") };
+        anyhow::ensure!(!others.is_empty(), "name a second run to compare with {}", first.path.display());
+        let summary = |run: &FinishedRun| {
+            let partial = run.episodes.len() < run.bookings().len();
+            Summary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
+        };
+        let summaries: Vec<Summary> = runs.iter().map(summary).collect();
+        let standing = |(run, summary): (&FinishedRun, &Summary)| Standing {
+            run: run.path.display().to_string(),
+            task_set: summary.task_set.clone(),
+            policy: summary.policy.clone(),
+            episodes: summary.episodes,
+            errors: summary.errors,
+            success: summary.success,
+            success_interval: summary.success_interval,
+            completed_subtasks: summary.completed_subtasks,
+            completed_by_folder: completed_by_folder(run),
+            progress: summary.progress.mean,
+            progress_by_length: summary.progress_by_length.clone(),
+        };
+        let comparison = Comparison {
+            format_version: Comparison::FORMAT,
+            runs: runs.iter().zip(&summaries).map(standing).collect(),
+            pairs: others.iter().map(|other| Paired::of(first, other)).collect::<anyhow::Result<_>>()?,
+        };
+        Ok((comparison, summaries))
+    }
+
+    /// The most episodes in which a run fell behind the first.
+    pub fn regressions(&self) -> usize {
+        self.pairs.iter().map(|pair| pair.regressions.len()).max().unwrap_or(0)
+    }
+}
+
+/// Completed subtasks in the tasks' own words from their starts, folder by folder where there are several.
+fn completed_by_folder(run: &FinishedRun) -> Vec<f64> {
+    if run.sources.len() < 2 {
+        return Vec::new();
+    }
+    let mean = |episodes: &[Episode]| {
+        let counted = episodes.iter().filter(|episode| episode.is_plain());
+        stats::mean(counted.map(|episode| f64::from(episode.completed)))
+    };
+    run.by_folder().map(|(_, episodes)| mean(episodes)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::compare::paired::tests::run;
+
+    #[test]
+    fn three_runs_make_a_table_and_a_chapter_each() {
+        let runs = [run("a", &[true, true, false]), run("b", &[true, false, false]), run("c", &[true, true, true])];
+        let (comparison, summaries) = Comparison::of(&runs).unwrap();
+        assert_eq!((comparison.pairs.len(), summaries.len(), comparison.regressions()), (2, 3, 1));
+        let page = comparison.markdown();
+        for part in
+            ["| against a ", "## b against a", "## c against a", "### Regressions", "### Fixes", "sprint open b#2"]
+        {
+            assert!(page.contains(part), "{part} in {page}");
+        }
+        assert!(page.contains("-33.3 pp") && page.contains("bootstrap over tasks"), "{page}");
+        assert!(Comparison::of(&runs[..1]).is_err());
+    }
+
+    #[test]
+    fn a_method_trained_twice_is_one_row_that_tells_both_trainings() {
+        let twice = FinishedRun::joined(vec![run("a1", &[true, true]), run("a2", &[true, false])]).unwrap();
+        let other = FinishedRun::joined(vec![run("b1", &[false, false]), run("b2", &[true, false])]).unwrap();
+        let (comparison, _) = Comparison::of(&[twice, other]).unwrap();
+        let [first, second] = &comparison.runs[..] else { panic!("two rows") };
+        assert_eq!((first.episodes, &first.completed_by_folder), (4, &vec![2.0, 1.5]));
+        assert_eq!((second.completed_subtasks.mean, &second.completed_by_folder), (1.25, &vec![1.0, 1.5]));
+        assert_eq!((comparison.pairs[0].pairs, comparison.regressions()), (4, 2));
+        let page = comparison.markdown();
+        for part in ["| a1 and 1 more |", "| 2.00 1.50 |", "## b1 and 1 more against a1 and 1 more", "sprint open b1#2"]
+        {
+            assert!(page.contains(part), "{part} in {page}");
+        }
+    }
+}

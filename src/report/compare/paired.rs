@@ -1,0 +1,243 @@
+//! Two runs side by side: what each made of the same episodes.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::episode::record::{Episode, Key};
+use crate::report::stats;
+use crate::report::stats::Interval;
+use crate::report::summary::BOOTSTRAP_SEED;
+use crate::run_dir::reader::FinishedRun;
+
+/// A difference of two means, second less first, and its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Difference {
+    /// The first run's mean.
+    pub first: f64,
+    /// The second's.
+    pub second: f64,
+    /// Second less first.
+    pub difference: f64,
+    /// Its 95 % interval.
+    pub interval: Interval,
+}
+
+/// An episode in which one run succeeded and the other did not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// The task.
+    pub task: String,
+    /// The seed.
+    pub seed: u64,
+    /// What the agent was told in the second run.
+    pub instruction: String,
+    /// Completed subtasks in the first run and in the second, and of how many.
+    pub completed: [u32; 3],
+    /// The command that opens the first run's episode.
+    pub open_first: String,
+    /// The command that opens the second run's episode.
+    pub open_second: String,
+}
+
+/// What came of a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Paired {
+    /// The first run's folder.
+    pub first: String,
+    /// The second run's folder.
+    pub second: String,
+    /// Pairs of episodes: same task, seed and start, told the task's own words.
+    pub pairs: usize,
+    /// Episodes of either run without a counterpart.
+    pub unpaired: usize,
+    /// Of those, episodes whose counterpart began in another state.
+    pub other_starts: usize,
+    /// Success.
+    pub success: Difference,
+    /// Completed subtasks.
+    pub completed_subtasks: Difference,
+    /// Completed subtasks as a share of those that were asked.
+    pub progress: Difference,
+    /// Tasks that the first run solved more often, and those that the second did.
+    pub leaning: [usize; 2],
+    /// Two-sided exact McNemar test of equal success, a task a pair: several seeds of a task are alike.
+    pub mcnemar_p: f64,
+    /// Only the first run succeeded.
+    pub regressions: Vec<Change>,
+    /// Only the second run succeeded.
+    pub fixes: Vec<Change>,
+    /// How the intervals and the test were made.
+    pub methods: String,
+}
+
+impl Paired {
+    /// Pairs the episodes of two runs.
+    ///
+    /// # Errors
+    /// When they have no episode in common.
+    pub fn of(first: &FinishedRun, second: &FinishedRun) -> anyhow::Result<Paired> {
+        let mut others: BTreeMap<Key, &Episode> = second
+            .episodes
+            .iter()
+            .filter(|episode| episode.is_plain())
+            .map(|episode| (episode.key(), episode))
+            .collect();
+        // By task, in the first run's order.
+        let mut groups: Vec<Vec<(&Episode, &Episode)>> = Vec::new();
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        let (mut unpaired, mut other_starts) = (0, 0);
+        for episode in first.episodes.iter().filter(|episode| episode.is_plain()) {
+            match others.remove(&episode.key()) {
+                // An episode that failed before it had a start is no success from any start.
+                Some(other) if episode.start_hash == other.start_hash => {
+                    let place = *places.entry(&episode.task).or_insert(groups.len());
+                    if place == groups.len() {
+                        groups.push(Vec::new());
+                    }
+                    groups[place].push((episode, other));
+                }
+                Some(_) => (unpaired, other_starts) = (unpaired + 2, other_starts + 2),
+                None => unpaired += 1,
+            }
+        }
+        unpaired += others.len();
+        let all: Vec<(&Episode, &Episode)> = groups.iter().flatten().copied().collect();
+        anyhow::ensure!(
+            !all.is_empty(),
+            "{} and {} have no episode in common: they pair by task, seed and start",
+            first.path.display(),
+            second.path.display()
+        );
+        let change = |(a, b): &(&Episode, &Episode)| -> anyhow::Result<Change> {
+            Ok(Change {
+                task: a.task.clone(),
+                seed: a.seed,
+                instruction: b.instruction.clone(),
+                completed: [a.completed, b.completed, b.of],
+                open_first: format!("sprint open {}", first.reference(&a.key())?),
+                open_second: format!("sprint open {}", second.reference(&b.key())?),
+            })
+        };
+        let only = |wanted: bool| -> anyhow::Result<Vec<Change>> {
+            all.iter().filter(|(a, b)| a.success == wanted && b.success != wanted).map(change).collect()
+        };
+        let (regressions, fixes) = (only(true)?, only(false)?);
+        let solved = |of: fn(&(&Episode, &Episode)) -> bool, group: &[_]| group.iter().filter(|pair| of(pair)).count();
+        let leaning = |toward: Ordering| {
+            let lean = |group: &[_]| solved(|(a, _)| a.success, group).cmp(&solved(|(_, b)| b.success, group));
+            groups.iter().filter(|group| lean(group) == toward).count()
+        };
+        let leaning = [leaning(Ordering::Greater), leaning(Ordering::Less)];
+        Ok(Paired {
+            first: first.path.display().to_string(),
+            second: second.path.display().to_string(),
+            pairs: all.len(),
+            unpaired,
+            other_starts,
+            success: difference(&groups, Episode::succeeded),
+            completed_subtasks: difference(&groups, |episode| f64::from(episode.completed)),
+            progress: difference(&groups, Episode::progress),
+            leaning,
+            mcnemar_p: stats::mcnemar(leaning[0], leaning[1]),
+            regressions,
+            fixes,
+            methods: format!(
+                "differences by paired percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}; \
+                 success by McNemar's exact test over tasks, two-sided",
+                stats::RESAMPLES
+            ),
+        })
+    }
+}
+
+fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) -> Difference {
+    let first = stats::mean(groups.iter().flatten().map(|(a, _)| value(a)));
+    let second = stats::mean(groups.iter().flatten().map(|(_, b)| value(b)));
+    let differences: Vec<Vec<f64>> =
+        groups.iter().map(|group| group.iter().map(|(a, b)| value(b) - value(a)).collect()).collect();
+    let interval = stats::bootstrap_mean(&differences, BOOTSTRAP_SEED);
+    Difference { first, second, difference: second - first, interval }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::data::taskset::tests::sample_set;
+    use crate::episode::instruction_variant::Wording;
+    use crate::episode::scenes::Scenes;
+    use crate::run_dir::manifest::Manifest;
+    use crate::run_dir::manifest::tests::manifest;
+    use crate::run_dir::writer::tests::episode;
+
+    /// A run of the sample set in which these seeds of the first task succeeded.
+    pub(crate) fn run(name: &str, outcomes: &[bool]) -> FinishedRun {
+        let outcome = |(seed, &success): (u64, &bool)| Episode {
+            seed,
+            success,
+            completed: if success { 2 } else { 1 },
+            ..episode("first")
+        };
+        let set = sample_set();
+        FinishedRun {
+            path: name.into(),
+            sources: vec![(name.into(), outcomes.len())],
+            manifest: Manifest { seeds: outcomes.len() as u64, ..manifest() },
+            scenes: Scenes::in_folder(None),
+            set,
+            episodes: (0..).zip(outcomes).map(outcome).collect(),
+        }
+    }
+
+    #[test]
+    fn regressions_and_fixes_are_told_apart_and_named_with_the_command_that_opens_them() {
+        let (a, b) = (run("runs/a", &[true, true, false, false]), run("runs/b", &[true, false, true, false]));
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired), (4, 0));
+        assert_eq!(paired.regressions.len(), 1);
+        assert_eq!(paired.regressions[0].seed, 1);
+        assert_eq!(paired.regressions[0].open_second, "sprint open runs/b#2");
+        assert_eq!(paired.fixes[0].completed, [1, 2, 2]);
+        assert_eq!(paired.mcnemar_p, 1.0);
+        assert_eq!(paired.success.difference, 0.0);
+    }
+
+    #[test]
+    fn other_words_and_other_starts_are_not_compared() {
+        let [a, b] = [("a", [true, true, true]), ("b", [true, false, false])].map(|(name, outcomes)| {
+            let mut run = run(name, &outcomes);
+            (run.episodes[1].wording, run.episodes[2].from) = (Wording::Swapped, 1);
+            run
+        });
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired, paired.regressions.len()), (1, 0, 0));
+    }
+
+    #[test]
+    fn seeds_of_one_task_do_not_make_a_difference_certain() {
+        let paired = Paired::of(&run("a", &[false; 12]), &run("b", &[true; 12])).unwrap();
+        assert_eq!((paired.fixes.len(), paired.leaning, paired.mcnemar_p), (12, [0, 1], 1.0));
+    }
+
+    #[test]
+    fn an_episode_that_began_elsewhere_is_no_counterpart() {
+        let (a, mut b) = (run("a", &[true, true]), run("b", &[false, false]));
+        b.episodes[0].start_hash = "77".into();
+        let paired = Paired::of(&a, &b).unwrap();
+        assert_eq!((paired.pairs, paired.unpaired, paired.other_starts), (1, 2, 2));
+        b.episodes[1].seed = 9;
+        assert!(Paired::of(&a, &b).unwrap_err().to_string().contains("no episode in common"));
+    }
+
+    #[test]
+    fn a_run_against_itself_differs_in_nothing() {
+        let a = run("a", &[true, false, true]);
+        let paired = Paired::of(&a, &a).unwrap();
+        assert_eq!((paired.success.difference, paired.success.interval), (0.0, [0.0, 0.0]));
+        assert!(paired.regressions.is_empty() && paired.fixes.is_empty());
+    }
+}

@@ -1,0 +1,56 @@
+//! A GIF of a recording: every step a frame, with what was done under it.
+
+use anyhow::Context;
+use gif::{Encoder, Frame, Repeat};
+
+use super::canvas::Canvas;
+use super::lettering;
+use super::lettering::LINE;
+use crate::episode::frames::{Recording, Shot};
+
+const PAPER: [u8; 3] = [20, 20, 24];
+const INK: [u8; 3] = [230, 230, 230];
+const DONE: [u8; 3] = [90, 220, 130];
+const BAD: [u8; 3] = [255, 120, 110];
+/// Lines under the frame: two for the instruction, one for the step.
+const LINES: usize = 3;
+/// Hundredths of a second that a step is shown, and the last one.
+const SHOWN: (u16, u16) = (25, 200);
+
+/// The film as the bytes of a GIF file.
+///
+/// # Errors
+/// Never in practice: it is written to memory.
+pub fn draw(recording: &Recording) -> anyhow::Result<Vec<u8>> {
+    let mut camera = recording.camera();
+    let mut data = Vec::new();
+    let side = crate::house::House::FRAME;
+    let (width, height) = (side, side + LINES * LINE + 6);
+    {
+        let mut encoder = Encoder::new(&mut data, width as u16, height as u16, &[]).context("the film cannot begin")?;
+        encoder.set_repeat(Repeat::Infinite)?;
+        for (at, shot) in recording.shots.iter().enumerate() {
+            let mut canvas = Canvas::new(width, height, PAPER);
+            canvas.place(&camera.draw(shot), 0, 0, 1);
+            caption(&mut canvas, shot, side + 4);
+            // The fastest quantiser: house frames have few colours.
+            let mut frame = Frame::from_rgb_speed(width as u16, height as u16, &canvas.rgb, 30);
+            frame.delay = if at + 1 == recording.shots.len() { SHOWN.1 } else { SHOWN.0 };
+            encoder.write_frame(&frame).context("the film cannot be encoded")?;
+        }
+    }
+    Ok(data)
+}
+
+fn caption(canvas: &mut Canvas, shot: &Shot, top: usize) {
+    let width = canvas.width - 8;
+    for (row, line) in lettering::broken(&shot.told, width).iter().take(LINES - 1).enumerate() {
+        lettering::write(canvas, 4, top + row * LINE, line, INK);
+    }
+    let (text, colour) = match (&shot.done, shot.possible) {
+        (Some(done), _) => (format!("{} {} · done: {done}", shot.step, shot.words()), DONE),
+        (None, true) => (format!("{} {}", shot.step, shot.words()), INK),
+        (None, false) => (format!("{} {}", shot.step, shot.words()), BAD),
+    };
+    lettering::write(canvas, 4, top + (LINES - 1) * LINE, &text, colour);
+}

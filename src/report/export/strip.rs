@@ -1,0 +1,71 @@
+//! Single frames, and the frames at which something was completed in one row.
+
+use anyhow::Context;
+
+use super::canvas::Canvas;
+use super::lettering;
+use super::lettering::LINE;
+use crate::episode::frames::{Recording, Shot};
+
+const PAPER: [u8; 3] = [255, 255, 255];
+const INK: [u8; 3] = [20, 20, 24];
+const DONE: [u8; 3] = [20, 120, 60];
+/// Space around frames, in pixels.
+const MARGIN: usize = 8;
+/// Frames of a strip where no subtask was done.
+const FEWEST: usize = 5;
+/// The side of a frame in a strip, in pixels.
+const SIDE: usize = 150;
+
+/// The frame at a step, as the agent saw it.
+///
+/// # Errors
+/// When there is no such step.
+pub fn frame(recording: &Recording, at: u32) -> anyhow::Result<Canvas> {
+    let shot = recording.shots.get(at as usize).with_context(|| format!("there is no step {at}"))?;
+    let frame = recording.camera().draw(shot);
+    Ok(Canvas { width: frame.width, height: frame.height, rgb: frame.rgb })
+}
+
+/// The first frame, those at which a subtask was done, and the last one, each over its words.
+pub fn draw(recording: &Recording) -> Canvas {
+    let shots = chosen(recording);
+    let words: Vec<Vec<String>> = shots.iter().map(|shot| lettering::broken(&caption(shot), SIDE)).collect();
+    let lines = words.iter().map(Vec::len).max().unwrap_or(1);
+    let width = MARGIN + shots.len() * (SIDE + MARGIN);
+    let title = lettering::broken(&recording.told(), width - 2 * MARGIN);
+    let top = MARGIN + title.len() * LINE;
+    let mut canvas = Canvas::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
+    for (row, line) in title.iter().enumerate() {
+        lettering::write(&mut canvas, MARGIN, MARGIN / 2 + row * LINE, line, INK);
+    }
+    let mut camera = recording.camera();
+    for (place, (shot, words)) in shots.iter().zip(words).enumerate() {
+        let left = MARGIN + place * (SIDE + MARGIN);
+        let frame = camera.draw(shot);
+        canvas.place(&frame, left, top, (frame.width / SIDE).max(1));
+        let colour = if shot.done.is_some() { DONE } else { INK };
+        for (row, line) in words.iter().enumerate() {
+            lettering::write(&mut canvas, left, top + SIDE + MARGIN / 2 + row * LINE, line, colour);
+        }
+    }
+    canvas
+}
+
+fn caption(shot: &Shot) -> String {
+    match (&shot.done, shot.step) {
+        (Some(done), step) => format!("{step}: {done}"),
+        (None, 0) => "start".into(),
+        (None, step) => format!("{step}: {}", shot.did.as_deref().unwrap_or("")),
+    }
+}
+
+fn chosen(recording: &Recording) -> Vec<&Shot> {
+    let last = recording.shots.len().saturating_sub(1);
+    let telling = |(at, shot): &(usize, &Shot)| *at == 0 || *at == last || shot.done.is_some();
+    let found: Vec<&Shot> = recording.shots.iter().enumerate().filter(telling).map(|(_, shot)| shot).collect();
+    if found.len() > 2 || last < FEWEST {
+        return found;
+    }
+    (0..FEWEST).filter_map(|part| recording.shots.get(part * last / (FEWEST - 1))).collect()
+}

@@ -1,0 +1,24 @@
+//! A recording as plain lines.
+
+use std::fmt::Write;
+
+use crate::episode::frames::Recording;
+
+/// The transcript: what was told, and a line a step.
+pub fn write(recording: &Recording) -> String {
+    let mut text = format!("{}\n{}\n", recording.told(), recording.title);
+    for (number, subtask) in (1..).zip(&recording.subtasks) {
+        let _ = writeln!(text, "subtask {number}: {subtask}");
+    }
+    text.push('\n');
+    let mut told = recording.told();
+    for shot in &recording.shots[1.min(recording.shots.len())..] {
+        if shot.told != told {
+            told.clone_from(&shot.told);
+            let _ = writeln!(text, "      told: {told}");
+        }
+        let done = shot.done.as_ref().map_or(String::new(), |done| format!(" · done: {done}"));
+        let _ = writeln!(text, "{:>4}  {}{done}", shot.step, shot.words());
+    }
+    text
+}

@@ -1,0 +1,235 @@
+//! The parts of a summary that split a run's episodes: by scene, by wording, by where they start, by why they fell short.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::stats;
+use super::stats::Interval;
+use super::summary::{Mean, SkillRate};
+use crate::domain::task::SceneRef;
+use crate::domain::{SkillKind, Task};
+use crate::episode::failure::Failure;
+use crate::episode::instruction_variant::Wording;
+use crate::episode::record::Episode;
+
+/// Episodes by task in the set's order, by seed within: sums of floats then do not depend on the order of the episodes.
+#[derive(Clone)]
+pub struct Grouped<'a> {
+    groups: Vec<(&'a Task, Vec<&'a Episode>)>,
+}
+
+/// Figures of some of a run's episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    /// Episodes.
+    pub episodes: usize,
+    /// Of those, successes.
+    pub successes: usize,
+    /// The share of successes.
+    pub success: f64,
+    /// Its 95 % interval.
+    pub success_interval: Interval,
+    /// Completed subtasks as a share of those that were asked.
+    pub progress: Mean,
+}
+
+/// Episodes that fell short for one reason.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FailureClass {
+    /// How many.
+    pub episodes: usize,
+    /// As a share of all episodes.
+    pub share: f64,
+    /// The task of the first.
+    pub example: String,
+    /// Its seed.
+    pub example_seed: u64,
+}
+
+/// An episode that ended with an error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Errored {
+    /// The task.
+    pub task: String,
+    /// The seed.
+    pub seed: u64,
+    /// Whose words.
+    #[serde(default, skip_serializing_if = "Wording::is_own")]
+    pub wording: Wording,
+    /// From which subtask.
+    pub from: u32,
+    /// How often it was begun.
+    pub attempts: u32,
+    /// What was reported.
+    pub error: String,
+}
+
+/// Episodes that the expert led to the same subtask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// The agent's very first subtask.
+    pub first: SkillRate,
+    /// All that was left.
+    pub rest: Group,
+}
+
+impl<'a> Grouped<'a> {
+    /// Groups episodes by their tasks.
+    pub fn of(tasks: &'a [Task], episodes: &'a [Episode]) -> Grouped<'a> {
+        let mut of_task: BTreeMap<&str, Vec<&Episode>> = BTreeMap::new();
+        for episode in episodes {
+            of_task.entry(&episode.task).or_default().push(episode);
+        }
+        let mut groups: Vec<(&Task, Vec<&Episode>)> =
+            tasks.iter().filter_map(|task| Some((task, of_task.remove(task.id.as_str())?))).collect();
+        for (_, group) in &mut groups {
+            group.sort_by_key(|episode| (episode.seed, episode.wording, episode.from));
+        }
+        Grouped { groups }
+    }
+
+    /// Those of its episodes that `keep` says.
+    pub fn only(&self, keep: impl Fn(&Episode) -> bool) -> Grouped<'a> {
+        let kept = |group: &[&'a Episode]| group.iter().copied().filter(|episode| keep(episode)).collect::<Vec<_>>();
+        let groups = self.groups.iter().map(|(task, group)| (*task, kept(group)));
+        Grouped { groups: groups.filter(|(_, group)| !group.is_empty()).collect() }
+    }
+
+    /// How many tasks there are.
+    pub fn tasks(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// Every episode with its task.
+    pub fn pairs(&self) -> Vec<(&'a Task, &'a Episode)> {
+        self.groups.iter().flat_map(|(task, group)| group.iter().map(|&episode| (*task, episode))).collect()
+    }
+
+    /// A figure of every episode, by task.
+    pub fn values(&self, value: fn(&Episode) -> f64) -> Vec<Vec<f64>> {
+        self.groups.iter().map(|(_, group)| group.iter().map(|episode| value(episode)).collect()).collect()
+    }
+
+    /// Its figures.
+    pub fn group(&self) -> Group {
+        let all = self.pairs();
+        let successes = all.iter().filter(|(_, episode)| episode.success).count();
+        Group {
+            episodes: all.len(),
+            successes,
+            success: if all.is_empty() { 0.0 } else { successes as f64 / all.len() as f64 },
+            success_interval: stats::wilson_of_groups(&self.values(Episode::succeeded)),
+            progress: Mean::of(&self.values(Episode::progress)),
+        }
+    }
+
+    /// Figures by scene.
+    pub fn by_scene(&self) -> BTreeMap<String, Group> {
+        let mut scenes: BTreeMap<String, Vec<(&'a Task, Vec<&'a Episode>)>> = BTreeMap::new();
+        for (task, group) in &self.groups {
+            let name = match &task.scene {
+                SceneRef::Named(name) => name.clone(),
+                SceneRef::Generated { room, .. } => format!("generated {}", room.spoken()),
+            };
+            scenes.entry(name).or_default().push((task, group.clone()));
+        }
+        scenes.into_iter().map(|(name, groups)| (name, Grouped { groups }.group())).collect()
+    }
+
+    /// Steps of successful episodes as a multiple of the expert's, where the task says how many those are.
+    pub fn steps_over_expert(&self) -> Option<Mean> {
+        let ratios = self.groups.iter().filter(|(task, _)| task.expert_steps > 0).map(|(task, group)| {
+            let successes = group.iter().filter(|episode| episode.success);
+            successes.map(|episode| f64::from(episode.steps) / f64::from(task.expert_steps)).collect::<Vec<_>>()
+        });
+        let ratios: Vec<Vec<f64>> = ratios.filter(|group| !group.is_empty()).collect();
+        (!ratios.is_empty()).then(|| Mean::of(&ratios))
+    }
+}
+
+/// Why episodes fell short.
+pub fn failures(grouped: &Grouped<'_>) -> BTreeMap<Failure, FailureClass> {
+    let all = grouped.pairs();
+    let mut classes: BTreeMap<Failure, FailureClass> = BTreeMap::new();
+    for (task, episode) in &all {
+        let Some(failure) = episode.failure else { continue };
+        let new = || FailureClass { episodes: 0, share: 0.0, example: task.id.clone(), example_seed: episode.seed };
+        let class = classes.entry(failure).or_insert_with(new);
+        class.episodes += 1;
+        class.share = class.episodes as f64 / all.len() as f64;
+    }
+    classes
+}
+
+/// Every episode that ended with an error.
+pub fn errored(grouped: &Grouped<'_>) -> Vec<Errored> {
+    let errors = grouped.pairs().into_iter().filter_map(|(_, episode)| Some((episode, episode.error.clone()?)));
+    let listed = errors.map(|(episode, error)| Errored {
+        task: episode.task.clone(),
+        seed: episode.seed,
+        wording: episode.wording,
+        from: episode.from,
+        attempts: episode.attempts,
+        error,
+    });
+    listed.collect()
+}
+
+/// Figures by wording.
+pub fn language(grouped: &Grouped<'_>) -> BTreeMap<Wording, Group> {
+    let of = |wording: Wording| grouped.only(|episode| episode.wording == wording && episode.from == 0).group();
+    Wording::ALL.into_iter().map(|wording| (wording, of(wording))).filter(|(_, group)| group.episodes > 0).collect()
+}
+
+/// Figures by the subtask from which the agent acted.
+pub fn starts(grouped: &Grouped<'_>) -> BTreeMap<u32, Start> {
+    let own = grouped.only(|episode| episode.wording.is_own());
+    let last = own.pairs().iter().map(|(_, episode)| episode.from).max();
+    let of = |from: u32| {
+        let there = own.only(|episode| episode.from == from);
+        let first = SkillRate::of(&there.values(|episode| f64::from(u8::from(episode.completed > 0))));
+        Start { first, rest: there.group() }
+    };
+    last.map(|last| (0..=last).map(|from| (from, of(from))).collect()).unwrap_or_default()
+}
+
+/// How often a subtask whose turn came was completed, by its kind.
+pub fn skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    rates(grouped, |task, episode| {
+        let completed = episode.completed as usize;
+        let turns = task.subtasks.iter().enumerate().take(completed + 1);
+        turns.map(|(i, subtask)| (subtask.skill, i < completed)).collect()
+    })
+}
+
+/// How often the agent completed its very first subtask, by the subtask's kind.
+pub fn first_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    let own = grouped.only(|episode| episode.wording.is_own());
+    rates(&own, |task, episode| {
+        let first = task.subtasks.get(episode.from as usize);
+        first.map(|subtask| (subtask.skill, episode.completed > 0)).into_iter().collect()
+    })
+}
+
+/// Rates by kind of skill, of what each episode's turns came to.
+fn rates(
+    grouped: &Grouped<'_>,
+    turns: impl Fn(&Task, &Episode) -> Vec<(SkillKind, bool)>,
+) -> BTreeMap<SkillKind, SkillRate> {
+    let mut by_kind: BTreeMap<SkillKind, Vec<Vec<f64>>> = BTreeMap::new();
+    for (task, group) in &grouped.groups {
+        let mut of_task: BTreeMap<SkillKind, Vec<f64>> = BTreeMap::new();
+        for (kind, completed) in group.iter().flat_map(|episode| turns(task, episode)) {
+            of_task.entry(kind).or_default().push(f64::from(u8::from(completed)));
+        }
+        for (kind, values) in of_task {
+            by_kind.entry(kind).or_default().push(values);
+        }
+    }
+    by_kind.into_iter().map(|(kind, groups)| (kind, SkillRate::of(&groups))).collect()
+}

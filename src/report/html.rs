@@ -1,0 +1,122 @@
+//! A run as one HTML page that needs nothing else: figures, the plot, and every episode with frames from its way.
+
+use std::io::Cursor;
+
+use anyhow::Context;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use image::{ImageFormat, RgbImage, imageops};
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::charts::drawing::escape;
+use super::charts::progress_by_length;
+use super::summary::Summary;
+use crate::domain::{Action, Task};
+use crate::episode::record::Episode;
+use crate::episode::rollout::Rollout;
+use crate::house::House;
+use crate::house::grading::describe;
+use crate::run_dir::reader::FinishedRun;
+
+/// The side of a frame on the page, in pixels.
+const SIDE: u32 = 112;
+/// The page around the data.
+const PAGE: &str = include_str!("../../assets/report.html");
+
+/// The page of a run; `frames` is the most of an episode, 0 for none. Episodes are taken again on all cores.
+///
+/// # Errors
+/// When a scene is missing, or a frame cannot be encoded.
+pub fn page(run: &FinishedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
+    let row = |(number, episode): (usize, &Episode)| -> anyhow::Result<serde_json::Value> {
+        let task = run.set.tasks.iter().find(|task| task.id == episode.task).context("an episode of no task")?;
+        let outcome = match (&episode.error, episode.failure) {
+            (Some(_), _) => "error",
+            (None, _) if episode.success => "success",
+            (None, Some(failure)) => failure.words(),
+            (None, None) => "failure",
+        };
+        Ok(json!({
+            "number": number + 1,
+            "task": episode.task,
+            "seed": episode.seed,
+            "told": episode.instruction,
+            "words": episode.wording.name(),
+            "from": episode.from,
+            "completed": episode.completed,
+            "of": episode.of,
+            "steps": episode.steps,
+            "expert": task.expert_steps,
+            "outcome": outcome,
+            "error": episode.error,
+            "subtasks": task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect::<Vec<_>>(),
+            "open": format!("sprint open {}#{}", run.path.display(), number + 1),
+            "frames": strip(run, task, episode, frames)?,
+        }))
+    };
+    let rows: Vec<serde_json::Value> = run.episodes.par_iter().enumerate().map(row).collect::<anyhow::Result<_>>()?;
+    let data = in_script(&rows)?;
+    let title = format!("{} on {}", summary.policy, summary.task_set);
+    Ok(PAGE
+        .replace("{{title}}", &escape(&title))
+        .replace("{{plot}}", &progress_by_length::progress_by_length(&[summary]).svg())
+        .replace("{{summary}}", &escape(&summary.markdown()))
+        .replace("{{episodes}}", &data))
+}
+
+/// A value as JSON that stands inside a script element: without a `<` nothing can end it, or begin a comment.
+///
+/// # Errors
+/// Never for values that JSON has.
+pub fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
+}
+
+/// Frames of an episode: the start, what each completed subtask left, the end; each with the step it follows, as a PNG.
+fn strip(run: &FinishedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
+    if most == 0 || episode.start_hash.is_empty() {
+        return Ok(Vec::new());
+    }
+    let done = episode.trace.iter().enumerate().filter(|(_, step)| step.subtask.is_some()).map(|(i, _)| i + 1);
+    let mut steps: Vec<usize> = std::iter::once(0).chain(done).chain([episode.trace.len()]).collect();
+    steps.dedup();
+    while steps.len() > most.max(2) {
+        steps.remove(steps.len() / 2);
+    }
+    let setting = run.scenes.setting(task)?;
+    let mut rollout = Rollout::new(House::new(setting.scene, setting.world), String::new(), None, None);
+    let mut shown = Vec::new();
+    for step in 0..=episode.trace.len() {
+        if steps.contains(&step) {
+            shown.push(json!({"step": step, "png": picture(&mut rollout)?}));
+        }
+        if let Some(step) = episode.trace.get(step) {
+            rollout.act(Action { kind: step.kind, target: step.target });
+        }
+    }
+    Ok(shown)
+}
+
+fn picture(rollout: &mut Rollout) -> anyhow::Result<String> {
+    let frame = rollout.house.frame();
+    let (width, height) = (frame.width as u32, frame.height as u32);
+    let image = RgbImage::from_raw(width, height, frame.rgb.clone()).context("a frame has another size")?;
+    let small = imageops::thumbnail(&image, SIDE, SIDE);
+    let mut bytes = Cursor::new(Vec::new());
+    small.write_to(&mut bytes, ImageFormat::Png).context("a frame cannot be encoded")?;
+    Ok(STANDARD.encode(bytes.into_inner()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_in_a_script_ends_it_or_begins_a_comment() {
+        let said = "put it </script> <!-- <script> there";
+        let text = in_script(&said).unwrap();
+        assert!(!text.contains('<'), "{text}");
+        assert_eq!(serde_json::from_str::<String>(&text).unwrap(), said);
+    }
+}

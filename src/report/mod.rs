@@ -1,0 +1,11 @@
+//! What recorded episodes say: summaries, statistics, comparisons, pages, charts, films.
+
+pub mod charts;
+pub mod compare;
+pub mod export;
+pub mod groups;
+pub mod html;
+pub mod stats;
+pub mod summary;
+pub mod summary_markdown;
+pub mod threshold;

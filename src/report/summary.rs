@@ -1,0 +1,281 @@
+//! What a run came to: rates and means with their intervals.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::charts::progress_by_length;
+use super::groups;
+use super::groups::{Errored, FailureClass, Group, Grouped, Start};
+use super::stats;
+use super::stats::Interval;
+use crate::data::{atomic_file, json};
+use crate::domain::{SkillKind, Task};
+use crate::episode::failure::Failure;
+use crate::episode::instruction_variant::Wording;
+use crate::episode::record::Episode;
+use crate::house::grading::Grading;
+use crate::run_dir::manifest::Manifest;
+use crate::run_dir::writer::RunFolder;
+
+/// Drives the resampling of the bootstrap.
+pub const BOOTSTRAP_SEED: u64 = 0;
+
+/// A mean and its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mean {
+    /// Over all episodes.
+    pub mean: f64,
+    /// Lower and upper end.
+    pub interval: Interval,
+}
+
+impl Mean {
+    /// Of the values of each task's episodes.
+    pub fn of(groups: &[Vec<f64>]) -> Mean {
+        let mean = stats::mean(groups.iter().flatten().copied());
+        Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
+    }
+}
+
+/// How often the skills of one kind, once reached, were completed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkillRate {
+    /// Subtasks of the kind whose turn came.
+    pub reached: usize,
+    /// Of those, completed.
+    pub completed: usize,
+    /// The share; 0 when none was reached.
+    pub rate: f64,
+    /// Its 95 % interval.
+    pub interval: Interval,
+}
+
+/// How the intervals were made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntervalMethods {
+    /// Of rates.
+    pub rates: String,
+    /// Of means.
+    pub means: String,
+}
+
+/// The summary of a run. Its figures are of the episodes in the tasks' own words from their starts; those in other words or
+/// from later subtasks have tables of their own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Summary {
+    /// Version of this format.
+    pub format_version: u32,
+    /// The task set's name.
+    pub task_set: String,
+    /// The policy's name.
+    pub policy: String,
+    /// How subtasks were graded.
+    pub grader: Grading,
+    /// The run was interrupted; only some of its episodes are in.
+    pub partial: bool,
+    /// Tasks with at least one episode.
+    pub tasks: usize,
+    /// Episodes, failed and errored ones included.
+    pub episodes: usize,
+    /// Episodes that ended with an error, in other words and from later subtasks too; they count as no success.
+    pub errors: usize,
+    /// The share of episodes in which every subtask was completed.
+    pub success: f64,
+    /// Its 95 % interval.
+    pub success_interval: Interval,
+    /// Completed subtasks of an episode.
+    pub completed_subtasks: Mean,
+    /// Completed subtasks of an episode as a share of its subtasks.
+    pub progress: Mean,
+    /// By the number of subtasks: mean completed ones as a share of them.
+    pub progress_by_length: BTreeMap<u32, f64>,
+    /// By the number of subtasks: the 95 % interval of that.
+    pub progress_interval_by_length: BTreeMap<u32, Interval>,
+    /// By the number of subtasks: the share of successes.
+    pub success_by_length: BTreeMap<u32, f64>,
+    /// By the number of subtasks: the episodes.
+    pub episodes_by_length: BTreeMap<u32, usize>,
+    /// By the kind of skill.
+    pub skills: BTreeMap<SkillKind, SkillRate>,
+    /// By the scene; generated houses by their room.
+    pub scenes: BTreeMap<String, Group>,
+    /// Steps of an episode.
+    pub steps_mean: f64,
+    /// Steps that the expert takes, for the same episodes.
+    pub expert_steps_mean: f64,
+    /// Steps of a successful episode as a multiple of the expert's; nothing without any.
+    pub steps_over_expert: Option<Mean>,
+    /// Why episodes fell short, by class.
+    pub failures: BTreeMap<Failure, FailureClass>,
+    /// Every episode that ended with an error.
+    pub errored: Vec<Errored>,
+    /// By wording, where a run asked for them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub language: BTreeMap<Wording, Group>,
+    /// By the subtask from which the agent acted, where a run asked for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub starts: BTreeMap<u32, Start>,
+    /// By the kind of the first subtask that was the agent's own, where a run asked for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub first_skills: BTreeMap<SkillKind, SkillRate>,
+    /// SHA-256 of the episodes' lines in the run's order.
+    pub episodes_hash: String,
+    /// How the intervals were made.
+    pub interval_methods: IntervalMethods,
+}
+
+impl Summary {
+    /// Writes the summary in its three forms and the plots into a run's folder, each atomically.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        atomic_file::write(&folder.join("summary.md"), self.markdown().as_bytes())?;
+        atomic_file::write(&folder.join("summary.csv"), &self.csv()?)?;
+        let plot = progress_by_length::progress_by_length(&[self]);
+        progress_by_length::write(folder, progress_by_length::PROGRESS, &plot)?;
+        json::write_pretty(&folder.join(RunFolder::SUMMARY), self)
+    }
+
+    /// The format version this program reads and writes.
+    pub const FORMAT: u32 = 1;
+
+    /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
+    pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
+        let every = Grouped::of(tasks, episodes);
+        let main = every.only(|episode| episode.is_plain());
+        let all = main.pairs();
+        let lengths: BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
+        let by_length = |value: fn(&Episode) -> f64| -> BTreeMap<u32, f64> {
+            let of_length = |length| all.iter().filter(move |(_, e)| e.of == length).map(move |(_, e)| value(e));
+            lengths.iter().map(|&length| (length, stats::mean(of_length(length)))).collect()
+        };
+        let count = |length| all.iter().filter(|(_, episode)| episode.of == length).count();
+        let interval = |length: u32| Mean::of(&main.only(|e| e.of == length).values(Episode::progress)).interval;
+        Summary {
+            format_version: Summary::FORMAT,
+            task_set: manifest.task_set.clone(),
+            policy: manifest.policy.clone(),
+            grader: manifest.grader,
+            partial,
+            tasks: main.tasks(),
+            episodes: all.len(),
+            errors: every.pairs().iter().filter(|(_, episode)| episode.error.is_some()).count(),
+            success: stats::mean(all.iter().map(|(_, episode)| episode.succeeded())),
+            success_interval: stats::wilson_of_groups(&main.values(Episode::succeeded)),
+            completed_subtasks: Mean::of(&main.values(|episode| f64::from(episode.completed))),
+            progress: Mean::of(&main.values(Episode::progress)),
+            progress_by_length: by_length(Episode::progress),
+            progress_interval_by_length: lengths.iter().map(|&length| (length, interval(length))).collect(),
+            success_by_length: by_length(Episode::succeeded),
+            episodes_by_length: lengths.iter().map(|&length| (length, count(length))).collect(),
+            skills: groups::skills(&main),
+            scenes: main.by_scene(),
+            steps_mean: stats::mean(all.iter().map(|(_, episode)| f64::from(episode.steps))),
+            expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
+            steps_over_expert: main.steps_over_expert(),
+            failures: groups::failures(&main),
+            errored: groups::errored(&every),
+            language: if manifest.language { groups::language(&every) } else { BTreeMap::new() },
+            starts: if manifest.every_start { groups::starts(&every) } else { BTreeMap::new() },
+            first_skills: if manifest.every_start { groups::first_skills(&every) } else { BTreeMap::new() },
+            episodes_hash: String::new(),
+            interval_methods: IntervalMethods {
+                rates: match all.len() > main.tasks() {
+                    false => "Wilson score, 95 %".into(),
+                    true => {
+                        "Wilson score, 95 %, over the effective number of episodes: a task's seeds are alike".into()
+                    }
+                },
+                means: format!(
+                    "percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}",
+                    stats::RESAMPLES
+                ),
+            },
+        }
+    }
+}
+
+impl SkillRate {
+    /// Of each task's subtasks of the kind whose turn came: 1 where it was completed, else 0.
+    pub(crate) fn of(groups: &[Vec<f64>]) -> SkillRate {
+        let (reached, completed) = (groups.iter().map(Vec::len).sum(), groups.iter().flatten().sum::<f64>() as usize);
+        let rate = if reached == 0 { 0.0 } else { completed as f64 / reached as f64 };
+        SkillRate { reached, completed, rate, interval: stats::wilson_of_groups(groups) }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::data::taskset::tests::sample_set;
+    use crate::run_dir::manifest::tests::manifest;
+    use crate::run_dir::writer::tests::episode;
+
+    pub(crate) fn sample() -> (Vec<Task>, Vec<Episode>) {
+        let tasks = sample_set().tasks;
+        let done = |task: &str, seed, completed| Episode {
+            seed,
+            completed,
+            success: completed == 2,
+            steps: 10 * (1 + completed),
+            ..episode(task)
+        };
+        let mut episodes = vec![done("first", 0, 2), done("first", 1, 1), done("second", 0, 2), done("second", 1, 0)];
+        episodes[3].error = Some("the expert sees no way".into());
+        (tasks, episodes)
+    }
+
+    #[test]
+    fn a_summary_counts_by_hand() {
+        let (tasks, episodes) = sample();
+        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
+        assert_eq!((summary.tasks, summary.episodes, summary.errors), (2, 4, 1));
+        assert_eq!(summary.errored.len(), 1);
+        assert_eq!(summary.steps_over_expert.unwrap().mean, 1.5);
+        assert_eq!(summary.scenes["FloorPlan7"].episodes, 2);
+        assert_eq!(summary.success, 0.5);
+        assert_eq!(summary.completed_subtasks.mean, 1.25);
+        assert_eq!(summary.progress.mean, 0.625);
+        assert_eq!(summary.progress_by_length, BTreeMap::from([(2, 0.625)]));
+        assert_eq!(summary.success_by_length, BTreeMap::from([(2, 0.5)]));
+        assert_eq!((summary.steps_mean, summary.expert_steps_mean), (22.5, 20.0));
+        let pickup = summary.skills[&SkillKind::Pickup];
+        assert_eq!((pickup.reached, pickup.completed), (4, 3));
+        let put = summary.skills[&SkillKind::Put];
+        assert_eq!((put.reached, put.completed), (3, 2));
+    }
+
+    #[test]
+    fn the_order_of_the_episodes_does_not_matter() {
+        let (tasks, mut episodes) = sample();
+        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
+        episodes.reverse();
+        assert_eq!(Summary::of(&manifest(), &tasks, &episodes, false), summary);
+    }
+
+    #[test]
+    fn a_run_without_episodes_still_has_a_summary() {
+        let summary = Summary::of(&manifest(), &sample().0, &[], true);
+        assert_eq!((summary.episodes, summary.success, summary.success_interval), (0, 0.0, [0.0, 1.0]));
+        assert_eq!(summary.steps_over_expert, None);
+    }
+
+    #[test]
+    fn the_names_that_scripts_read_are_there() {
+        let (tasks, episodes) = sample();
+        let summary = serde_json::to_value(Summary::of(&manifest(), &tasks, &episodes, false)).unwrap();
+        for name in ["/episodes", "/errors", "/success", "/success_interval/1", "/completed_subtasks/mean"] {
+            assert!(summary.pointer(name).is_some_and(serde_json::Value::is_number), "{name}");
+        }
+        for name in ["/completed_subtasks/interval/0", "/progress_by_length/2", "/steps_mean", "/skills/Put/rate"] {
+            assert!(summary.pointer(name).is_some_and(serde_json::Value::is_number), "{name}");
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! A summary as a page for people and as a table for spreadsheets.
+
+use std::collections::BTreeMap;
+
+use super::groups::Group;
+use super::stats::Interval;
+use super::summary::{SkillRate, Summary};
+use crate::domain::SkillKind;
+
+impl Summary {
+    /// The page that people read.
+    pub fn markdown(&self) -> String {
+        let partial =
+            "\n**Partial: the run was interrupted. The same command with this folder as --out continues it.**\n";
+        let mut parts = vec![
+            format!("# {} on {}\n", self.policy, self.task_set) + if self.partial { partial } else { "" },
+            table(["measure", "value", "95 % interval"], self.whole()),
+            self.lengths(),
+            table(["skill", "reached", "completed", "rate", "95 % interval"], skill_rows(&self.skills)),
+        ];
+        if !self.failures.is_empty() {
+            let rows = self.failures.iter().map(|(failure, class)| {
+                let example = format!("{} (seed {})", class.example, class.example_seed);
+                [failure.words().into(), class.episodes.to_string(), percent(class.share), example]
+            });
+            parts.push(table(["why it fell short", "episodes", "share", "for example"], rows));
+        }
+        if !self.language.is_empty() {
+            let rows = self.language.iter().map(|(wording, group)| group_row(wording.name().into(), group));
+            parts.push(table(
+                ["told in words", "episodes", "success", "95 % interval", "progress", "95 % interval"],
+                rows,
+            ));
+        }
+        if !self.starts.is_empty() {
+            let rows = self.starts.iter().map(|(from, start)| {
+                let (first, rest) = (start.first, &start.rest);
+                let shares = [percent(first.rate), between(first.interval), percent(rest.success)];
+                let [rate, interval, all] = shares;
+                [from.to_string(), first.reached.to_string(), rate, interval, all]
+            });
+            let head = ["from subtask", "episodes", "that one done", "95 % interval", "all the rest done"];
+            parts.push(table(head, rows));
+            let head = ["first skill", "reached", "completed", "rate", "95 % interval"];
+            parts.push(table(head, skill_rows(&self.first_skills)));
+        }
+        let rows = self.scenes.iter().map(|(scene, group)| group_row(scene.clone(), group));
+        parts.push(table(["scene", "episodes", "success", "95 % interval", "progress", "95 % interval"], rows));
+        if !self.errored.is_empty() {
+            let rows = self.errored.iter().map(|episode| {
+                let error = episode.error.replace('|', "/").replace('\n', " ");
+                [episode.task.clone(), episode.seed.to_string(), episode.attempts.to_string(), error]
+            });
+            parts.push(table(["errored", "seed", "attempts", "reported"], rows));
+        }
+        parts.push(format!(
+            "Grader: {}. Intervals: rates by {}; means by {}.\nEpisodes: sha256 {}.\n",
+            self.grader, self.interval_methods.rates, self.interval_methods.means, self.episodes_hash
+        ));
+        parts.join("\n")
+    }
+
+    /// The measures of the whole run.
+    fn whole(&self) -> Vec<[String; 3]> {
+        let completed = self.completed_subtasks;
+        let [low, high] = completed.interval;
+        let mut whole = vec![
+            ["episodes".into(), self.episodes.to_string(), String::new()],
+            ["errors (no success)".into(), self.errors.to_string(), String::new()],
+            ["success".into(), percent(self.success), between(self.success_interval)],
+            ["completed subtasks".into(), format!("{:.2}", completed.mean), format!("{low:.2} to {high:.2}")],
+            ["progress".into(), percent(self.progress.mean), between(self.progress.interval)],
+            ["steps".into(), format!("{:.1}", self.steps_mean), String::new()],
+            ["steps of the expert".into(), format!("{:.1}", self.expert_steps_mean), String::new()],
+        ];
+        if let Some(ratio) = self.steps_over_expert {
+            let [low, high] = ratio.interval;
+            let name = "steps of successes / expert's".into();
+            whole.push([name, format!("{:.2}", ratio.mean), format!("{low:.2} to {high:.2}")]);
+        }
+        whole
+    }
+
+    /// Progress by length, a column each as the paper's table has it.
+    fn lengths(&self) -> String {
+        let lengths: Vec<u32> = self.episodes_by_length.keys().copied().collect();
+        let row = |name: &str, cell: &dyn Fn(u32) -> String| -> Vec<String> {
+            std::iter::once(name.to_owned()).chain(lengths.iter().map(|&length| cell(length))).collect()
+        };
+        let share = |map: &BTreeMap<u32, f64>, length| format!("{:.2}", map.get(&length).copied().unwrap_or_default());
+        let interval = |length| {
+            let [low, high] = self.progress_interval_by_length.get(&length).copied().unwrap_or_default();
+            format!("{low:.2} to {high:.2}")
+        };
+        let rows = [
+            row("episodes", &|length| self.episodes_by_length.get(&length).copied().unwrap_or_default().to_string()),
+            row("progress", &|length| share(&self.progress_by_length, length)),
+            row("95 % interval", &interval),
+            row("success", &|length| share(&self.success_by_length, length)),
+        ];
+        lined_up(&row("subtasks of the task", &|length| length.to_string()), &rows)
+    }
+
+    /// One row for each figure of the whole, of each length, and of each kind of skill.
+    ///
+    /// # Errors
+    /// Never in practice: it writes to memory.
+    pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        table.write_record(["group", "measure", "count", "value", "low", "high"])?;
+        let mut row = |group: &str, measure: &str, count: usize, value: f64, interval: Option<Interval>| {
+            let [low, high] = interval.map_or_else(Default::default, |ends| ends.map(|end| end.to_string()));
+            table.write_record([group, measure, &count.to_string(), &value.to_string(), &low, &high])
+        };
+        row("all", "success", self.episodes, self.success, Some(self.success_interval))?;
+        let (completed, progress) = (self.completed_subtasks, self.progress);
+        row("all", "completed_subtasks", self.episodes, completed.mean, Some(completed.interval))?;
+        row("all", "progress", self.episodes, progress.mean, Some(progress.interval))?;
+        row("all", "errors", self.episodes, self.errors as f64, None)?;
+        row("all", "steps", self.episodes, self.steps_mean, None)?;
+        row("all", "expert_steps", self.episodes, self.expert_steps_mean, None)?;
+        for (length, &count) in &self.episodes_by_length {
+            let group = format!("length {length}");
+            let value = |map: &BTreeMap<u32, f64>| map.get(length).copied().unwrap_or_default();
+            row(&group, "success", count, value(&self.success_by_length), None)?;
+            row(&group, "progress", count, value(&self.progress_by_length), None)?;
+        }
+        for (kind, skill) in &self.skills {
+            row(&format!("{kind:?}"), "completed", skill.reached, skill.rate, Some(skill.interval))?;
+        }
+        let scenes = self.scenes.iter().map(|(name, group)| (format!("scene {name}"), group));
+        let words = self.language.iter().map(|(wording, group)| (format!("words {}", wording.name()), group));
+        let starts = self.starts.iter().map(|(from, start)| (format!("from {from}"), &start.rest));
+        for (name, group) in scenes.chain(words).chain(starts) {
+            row(&name, "success", group.episodes, group.success, Some(group.success_interval))?;
+            row(&name, "progress", group.episodes, group.progress.mean, Some(group.progress.interval))?;
+        }
+        for (failure, class) in &self.failures {
+            row(failure.words(), "share", class.episodes, class.share, None)?;
+        }
+        Ok(table.into_inner()?)
+    }
+}
+
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+pub(crate) fn between([low, high]: Interval) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
+}
+
+fn skill_rows(skills: &BTreeMap<SkillKind, SkillRate>) -> Vec<[String; 5]> {
+    let row = |(kind, skill): (&SkillKind, &SkillRate)| {
+        let (reached, completed) = (skill.reached.to_string(), skill.completed.to_string());
+        [format!("{kind:?}"), reached, completed, percent(skill.rate), between(skill.interval)]
+    };
+    skills.iter().map(row).collect()
+}
+
+fn group_row(name: String, group: &Group) -> [String; 6] {
+    let (success, progress) = (percent(group.success), percent(group.progress.mean));
+    let intervals = (between(group.success_interval), between(group.progress.interval));
+    [name, group.episodes.to_string(), success, intervals.0, progress, intervals.1]
+}
+
+/// A Markdown table of rows of one width.
+pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
+    let rows: Vec<Vec<String>> = rows.into_iter().map(Vec::from).collect();
+    lined_up(&head.map(String::from), &rows)
+}
+
+/// A Markdown table whose columns line up in plain text too; all but the first are aligned right.
+pub fn lined_up(head: &[String], rows: &[Vec<String>]) -> String {
+    let lines = || std::iter::once(head).chain(rows.iter().map(Vec::as_slice));
+    let columns = 0..head.len();
+    let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();
+    let widths: Vec<usize> =
+        columns.clone().map(|i| lines().map(|row| cell(row, i).chars().count()).max().unwrap_or(0)).collect();
+    let line = |row: &[String]| {
+        let padded = columns.clone().map(|i| match i {
+            0 => format!("{:<1$}", cell(row, i), widths[i]),
+            _ => format!("{:>1$}", cell(row, i), widths[i]),
+        });
+        format!("| {} |\n", padded.collect::<Vec<_>>().join(" | "))
+    };
+    let rules = widths.iter().enumerate().map(|(i, width)| match i {
+        0 => "-".repeat(width + 2),
+        _ => format!("{}:", "-".repeat(width + 1)),
+    });
+    let rule = format!("|{}|\n", rules.collect::<Vec<_>>().join("|"));
+    std::iter::once(line(head)).chain([rule]).chain(rows.iter().map(|row| line(row))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::summary::tests::sample;
+    use crate::run_dir::manifest::tests::manifest;
+
+    #[test]
+    fn the_page_and_the_table_look_as_agreed() {
+        let (tasks, episodes) = sample();
+        let summary = Summary::of(&manifest(), &tasks, &episodes, true);
+        insta::assert_snapshot!("page", summary.markdown());
+        insta::assert_snapshot!("table", String::from_utf8(summary.csv().unwrap()).unwrap());
+    }
+}

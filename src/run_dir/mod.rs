@@ -1,0 +1,7 @@
+//! Run folders: the manifest, the episodes of a run in order, reader and writer, shards.
+
+pub mod episode_spec;
+pub mod manifest;
+pub mod reader;
+pub mod shard;
+pub mod writer;

@@ -1,0 +1,167 @@
+//! One task demonstrated: what the demonstrator would do in every state, while chance or a learner disturbs what is done.
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::agent::experts::scanning::Seeker;
+use crate::agent::learned::LearnedPolicy;
+use crate::agent::{Decision, ExpertPolicy, Policy};
+use crate::domain::trajectory::Annotation;
+use crate::domain::{Action, ActionType, Scene, Task, Trajectory, World};
+use crate::episode::rollout::Rollout;
+use crate::episode::scenes::Setting;
+use crate::house::House;
+use crate::house::expert::Pace;
+use crate::house::grading::{Grader, Grading};
+use crate::language::phrases;
+
+/// The longest disturbance, in steps.
+const LONGEST: u32 = 4;
+/// More steps than this beyond three times the expert's give an episode up.
+const SLACK: u32 = 40;
+
+/// Who demonstrates, or corrects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demonstrator {
+    /// Turns around until it has seen what it goes for, as someone must who only sees.
+    #[default]
+    Seeker,
+    /// Goes straight for things, seen or not, as ALFRED's planner did.
+    Expert,
+}
+
+impl Demonstrator {
+    fn policy(self, pace: Pace) -> Box<dyn Policy> {
+        match self {
+            Demonstrator::Seeker => Box::new(Seeker::new(pace)),
+            Demonstrator::Expert => Box::new(ExpertPolicy::of(pace)),
+        }
+    }
+}
+
+/// How tasks are demonstrated.
+#[derive(Clone, Copy, Debug)]
+pub struct Manner {
+    /// Who says what is right in every state.
+    pub demonstrator: Demonstrator,
+    /// Which of several ways is right.
+    pub pace: Pace,
+    /// The share of steps at which chance takes over for a few steps.
+    pub noise: f64,
+}
+
+/// What a task itself says. Of a single skill, the instruction is its sentence.
+pub(crate) fn own_words(task: &Task) -> Annotation {
+    let alone = task.subtasks.len() == 1 && task.sentences.is_empty();
+    let steps = if alone { vec![task.instruction.clone()] } else { task.sentences.clone() };
+    Annotation { goal: task.instruction.clone(), steps }
+}
+
+/// What the grammar says of a task, several times over.
+pub(crate) fn phrasings(
+    scene: &Scene,
+    start: &World,
+    task: &Task,
+    times: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Annotation> {
+    let Task { roles, subtasks, .. } = task;
+    let origins = phrases::origins(scene, start, roles);
+    let story = phrases::Story { roles, subtasks, origins: &origins };
+    let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
+    (0..times.max(1)).map(annotate).collect()
+}
+
+/// A task that is about to be demonstrated.
+pub(crate) struct Demonstration<'a> {
+    /// What to do.
+    pub task: &'a Task,
+    /// Where.
+    pub setting: Setting,
+    /// The trajectory's.
+    pub id: String,
+    /// What is said of it.
+    pub annotations: Vec<Annotation>,
+    /// How.
+    pub manner: Manner,
+}
+
+impl Demonstration<'_> {
+    /// Plays a task to its end; `None` when the demonstrator sees no way or takes too long.
+    pub fn play(
+        self,
+        mut learner: Option<&mut LearnedPolicy>,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Option<Trajectory>> {
+        let Task { roles, subtasks, .. } = self.task;
+        let told = self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
+        let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
+        let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
+        let mut rollout = Rollout::new(house, told, Some(grader), None);
+        let mut demonstrator = self.manner.demonstrator.policy(self.manner.pace);
+        if let Some(learner) = learner.as_deref_mut() {
+            learner.begin(rng.random());
+            // Half of the episodes it acts as when it is measured.
+            learner.set_sampling(rng.random());
+        }
+        // Some episodes are left undisturbed.
+        let noise = if rng.random_bool(0.3) { 0.0 } else { self.manner.noise };
+        let (mut actions, mut choices, mut skill_starts) = (Vec::new(), Vec::new(), vec![0]);
+        let mut disturbed = 0;
+        while rollout.end().is_none() {
+            if rollout.steps() > 3 * self.task.expert_steps + SLACK {
+                return Ok(None);
+            }
+            let Ok(choice) = rollout.decide(demonstrator.as_mut()) else { return Ok(None) };
+            if disturbed == 0 && rng.random_bool(noise) {
+                disturbed = rng.random_range(1..=LONGEST);
+            }
+            let action = match learner.as_deref_mut().filter(|_| rollout.steps() < self.task.horizon) {
+                _ if disturbed > 0 => {
+                    disturbed -= 1;
+                    disturbance(&mut rollout.house, rng)
+                }
+                Some(learner) => rollout.decide(learner)?.action,
+                None => choice.action,
+            };
+            actions.push(action);
+            choices.push(choice.action);
+            let tick = rollout.carry_out(Decision { action, mind: None });
+            if tick.completed_one && rollout.end().is_none() {
+                skill_starts.push(tick.step);
+            }
+        }
+        if choices == actions {
+            choices.clear();
+        }
+        Ok(Some(Trajectory {
+            id: self.id,
+            split: "train".into(),
+            scene: self.task.scene.clone(),
+            start: self.setting.world,
+            actions,
+            roles: roles.clone(),
+            skills: subtasks.clone(),
+            skill_starts,
+            goal: self.task.goal.clone(),
+            annotations: self.annotations,
+            boxes: Vec::new(),
+            choices,
+        }))
+    }
+}
+
+/// Something that could happen by chance: mostly a step or a turn, at times an interaction.
+fn disturbance(house: &mut House, rng: &mut ChaCha8Rng) -> Action {
+    let candidates = house.candidates();
+    if !candidates.is_empty() && rng.random_bool(0.08) {
+        return candidates[rng.random_range(0..candidates.len())].action();
+    }
+    Action::navigate(match rng.random_range(0..10) {
+        0..4 => ActionType::MoveAhead,
+        4..6 => ActionType::RotateLeft,
+        6..8 => ActionType::RotateRight,
+        8 => ActionType::LookUp,
+        _ => ActionType::LookDown,
+    })
+}

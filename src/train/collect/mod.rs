@@ -1,0 +1,413 @@
+//! Collects demonstrations in generated houses or of given tasks.
+
+mod demonstration;
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tch::Device;
+
+use self::demonstration::{Demonstration, own_words, phrasings};
+pub use self::demonstration::{Demonstrator, Manner};
+use super::metrics::{Report, Scalars};
+use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
+use crate::data::dataset::{Counts, Manifest, Writer};
+use crate::data::ensure_free;
+use crate::domain::task::SceneRef;
+use crate::domain::{Room, Task, Trajectory};
+use crate::episode::scenes::{Scenes, Setting};
+use crate::house::generate;
+
+/// What to collect.
+pub struct Collection {
+    /// The dataset's folder.
+    pub out: PathBuf,
+    /// Of what.
+    pub source: Source,
+    /// Drives houses, tasks, words and chance.
+    pub seed: u64,
+    /// How.
+    pub manner: Manner,
+    /// A checkpoint that acts instead of the demonstrator, with its sentence encoder: the demonstrator then only says what it
+    /// would do, and finishes what is left at the horizon.
+    pub learner: Option<(PathBuf, SharedEmbedder)>,
+}
+
+/// What is demonstrated.
+pub enum Source {
+    /// Tasks that the generator finds in houses of its own.
+    Generated {
+        /// How many trajectories.
+        episodes: usize,
+        /// Task lengths, drawn uniformly; a length may be listed more than once.
+        lengths: Vec<usize>,
+        /// Phrasings of each trajectory.
+        annotations: usize,
+    },
+    /// Each of these tasks once, in its own words.
+    Tasks {
+        /// The tasks.
+        tasks: Vec<Task>,
+        /// Where they play.
+        scenes: Scenes,
+    },
+}
+
+/// What a collection came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Collected {
+    /// How many demonstrations were kept.
+    pub trajectories: usize,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
+/// Episodes in one house.
+const PER_HOUSE: usize = 4;
+/// Houses, or given tasks, between two writes, at most.
+const GROUP: usize = 32;
+/// Generated houses, at most: where fewer tasks than wished for can be demonstrated it must end some time.
+const HOUSES: u64 = 1_000_000;
+
+impl Collection {
+    /// Collects; the same trajectories for any number of threads. Stopped, it keeps the first of them. A task that the
+    /// demonstrator cannot do gives no trajectory.
+    ///
+    /// # Errors
+    /// When a given task does not fit its scene, or the folder holds something already, which is found before anything is written;
+    /// when the folder cannot be written to, or the learner not be loaded.
+    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Collected> {
+        if let Source::Tasks { tasks, scenes } = &self.source {
+            scenes.check(tasks)?;
+        }
+        ensure_free::check(&self.out)?;
+        let mut writer = Writer::new(&self.out)?;
+        let mut counts = Counts::default();
+        let mut scenes = BTreeSet::new();
+        let (mut next, mut stopped) = (0u64, false);
+        while let Some(lots) = self.source.lots(next, counts.trajectories as usize) {
+            next = lots.end;
+            let endless = matches!(self.source, Source::Generated { .. }) && next >= HOUSES;
+            anyhow::ensure!(!endless, "too few of the generated tasks could be demonstrated");
+            let lot = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
+                let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
+                if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.lot(number, learner.as_mut()) }
+            };
+            let made: Vec<Vec<Trajectory>> =
+                lots.into_par_iter().map_init(|| self.load(), lot).collect::<anyhow::Result<_>>()?;
+            if stop.load(Ordering::Relaxed) {
+                // Of this group some lots may be missing.
+                stopped = true;
+                break;
+            }
+            let missing = self.source.most() - counts.trajectories as usize;
+            for trajectory in made.into_iter().flatten().take(missing) {
+                count(&trajectory, &mut counts);
+                self.keep_scene(&trajectory.scene, &writer, &mut scenes)?;
+                writer.trajectory(&trajectory)?;
+            }
+            report.step(&Scalars::new("episodes", self.source.done(next, &counts), self.source.most() as u64))?;
+        }
+        writer.finish(&Manifest {
+            format_version: Manifest::FORMAT,
+            source: self.source.name().into(),
+            counts: [("train".to_string(), counts)].into(),
+            scenes: scenes.len() as u64,
+            held_out: Vec::new(),
+            skipped: Vec::new(),
+        })?;
+        Ok(Collected { trajectories: counts.trajectories as usize, stopped })
+    }
+
+    /// Writes a scene that comes from a file beside the trajectories, once.
+    fn keep_scene(&self, reference: &SceneRef, writer: &Writer, kept: &mut BTreeSet<String>) -> anyhow::Result<()> {
+        if let (SceneRef::Named(name), Source::Tasks { scenes, .. }) = (reference, &self.source)
+            && kept.insert(name.clone())
+        {
+            writer.scene(&scenes.scene(reference)?.0)?;
+        }
+        Ok(())
+    }
+
+    fn load(&self) -> anyhow::Result<Option<LearnedPolicy>> {
+        let Some((folder, sentences)) = &self.learner else { return Ok(None) };
+        LearnedPolicy::load(folder, sentences.clone(), Device::Cpu).map(Some)
+    }
+
+    /// The trajectories of one house, or of one given task.
+    fn lot(&self, number: u64, learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(number + 1);
+        match &self.source {
+            Source::Generated { lengths, annotations, .. } => {
+                self.house(number, (lengths, *annotations), learner, &mut rng)
+            }
+            Source::Tasks { tasks, scenes } => {
+                let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
+                let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
+                let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
+                let demonstration = Demonstration { task, setting, id, annotations, manner: self.manner };
+                Ok(demonstration.play(learner, &mut rng)?.into_iter().collect())
+            }
+        }
+    }
+
+    fn house(
+        &self,
+        number: u64,
+        (lengths, annotations): (&[usize], usize),
+        mut learner: Option<&mut LearnedPolicy>,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Vec<Trajectory>> {
+        let room = Room::ALL[(number % 4) as usize];
+        let seed = self.seed * 1_000_000 + number;
+        let (scene, world) = generate::house(room, seed);
+        let scene = Arc::new(scene);
+        let mut made = Vec::new();
+        for position in 0..PER_HOUSE {
+            let length = lengths.get(rng.random_range(0..lengths.len().max(1))).copied().unwrap_or(1);
+            let reference = SceneRef::Generated { room, seed };
+            let Some(task) = generate::task(&scene, &world, reference, length, rng) else { continue };
+            let start = task.start.clone().unwrap_or_else(|| world.clone());
+            let id = format!("{}-{position}", scene.name);
+            let annotations = phrasings(&scene, &start, &task, annotations, rng);
+            let setting = Setting { scene: scene.clone(), world: start };
+            let demonstration = Demonstration { task: &task, setting, id, annotations, manner: self.manner };
+            made.extend(demonstration.play(learner.as_deref_mut(), rng)?);
+        }
+        Ok(made)
+    }
+}
+
+impl Source {
+    /// Which lots come next, when those before `next` gave so many trajectories.
+    fn lots(&self, next: u64, made: usize) -> Option<Range<u64>> {
+        let count = match self {
+            Source::Generated { episodes, .. } => GROUP.min(episodes.saturating_sub(made).div_ceil(PER_HOUSE)),
+            Source::Tasks { tasks, .. } => GROUP.min(tasks.len() - (next as usize).min(tasks.len())),
+        };
+        (count > 0).then(|| next..next + count as u64)
+    }
+
+    /// The most trajectories that there will be.
+    fn most(&self) -> usize {
+        match self {
+            Source::Generated { episodes, .. } => *episodes,
+            Source::Tasks { tasks, .. } => tasks.len(),
+        }
+    }
+
+    /// How far it has come, of [`Source::most`].
+    fn done(&self, next: u64, counts: &Counts) -> u64 {
+        match self {
+            Source::Generated { .. } => counts.trajectories,
+            Source::Tasks { .. } => next,
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Source::Generated { .. } => "generated",
+            Source::Tasks { .. } => "tasks",
+        }
+    }
+}
+
+fn count(trajectory: &Trajectory, counts: &mut Counts) {
+    let (skills, annotations) = (trajectory.skills.len() as u64, trajectory.annotations.len() as u64);
+    let aligned = trajectory.annotations.iter().filter(|words| words.steps.len() as u64 == skills).count() as u64;
+    counts.trajectories += 1;
+    counts.annotated_primitives += annotations * skills;
+    counts.aligned_primitives += aligned * skills;
+    counts.spans += annotations * (skills * skills.saturating_sub(1) / 2);
+    counts.spans_after_holdout += aligned * (skills * skills.saturating_sub(1) / 2);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::Decision;
+    use crate::data::dataset::Dataset;
+    use crate::data::json;
+    use crate::domain::trajectory::Annotation;
+    use crate::domain::{Class, Role};
+    use crate::episode::rollout::Rollout;
+    use crate::house::House;
+    use crate::house::expert::Pace;
+    use crate::house::grading::{Grader, Grading};
+    use crate::nets::embedding_cache::Embedder;
+    use crate::nets::sentence::default_folder;
+
+    const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 };
+
+    struct Silent;
+
+    impl Report for Silent {
+        fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Two tasks: one in a scene file of the folder, in a person's words, and one that the demonstrator cannot do.
+    fn tasks(folder: &std::path::Path) -> Vec<Task> {
+        let (scene, world) = generate::house(Room::Kitchen, 3);
+        json::write(&folder.join(format!("{}.json", scene.name)), &scene).unwrap();
+        let reference = SceneRef::Named(scene.name.clone());
+        let task = generate::task(&scene, &world, reference, 1, &mut ChaCha8Rng::seed_from_u64(5)).unwrap();
+        let task = Task { start: Some(world), instruction: "do that for me".into(), sentences: Vec::new(), ..task };
+        let mut hopeless = Task { id: "hopeless".into(), ..task.clone() };
+        hopeless.subtasks[0].object = hopeless.roles.len() as u8;
+        hopeless.roles.push(Role { class: Class::named("Desk").unwrap(), ..task.roles[0].clone() });
+        vec![hopeless, task]
+    }
+
+    #[test]
+    fn given_tasks_are_demonstrated_in_their_own_words_and_their_scenes_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let tasks = tasks(folder.path());
+        let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
+        let collection = Collection {
+            out: folder.path().join("D"),
+            source: Source::Tasks { tasks: tasks.clone(), scenes },
+            seed: 1,
+            manner: UNDISTURBED,
+            learner: None,
+        };
+        assert_eq!(
+            collection.run(&mut Silent, &AtomicBool::new(false)).unwrap(),
+            Collected { trajectories: 1, stopped: false }
+        );
+        let dataset = Dataset::open(&collection.out).unwrap();
+        let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
+        let told = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
+        assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![told]));
+        let scene = dataset.scenes().unwrap().into_values().next().unwrap();
+        let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None);
+        let mut rollout = Rollout::new(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
+        made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision { action, mind: None })));
+        assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
+    }
+
+    /// How many steps the same tasks take, demonstrated in each of two manners.
+    fn steps(manners: [Manner; 2]) -> Vec<(usize, usize)> {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, other] = manners.map(|manner| {
+            let collection = Collection {
+                out: folder.path().join(format!("{manner:?}")),
+                source: Source::Generated { episodes: 12, lengths: vec![1], annotations: 1 },
+                seed: 2,
+                manner,
+                learner: None,
+            };
+            collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+            let dataset = Dataset::open(&collection.out).unwrap();
+            let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
+            made.into_iter().map(|trajectory| (trajectory.id, trajectory.actions.len())).collect::<Vec<_>>()
+        });
+        let same = |((id, steps), (same, others)): (&(String, usize), &(String, usize))| {
+            assert_eq!(id, same, "the same tasks");
+            (*steps, *others)
+        };
+        one.iter().zip(&other).map(same).collect()
+    }
+
+    #[test]
+    fn who_is_prompt_is_done_sooner() {
+        let expert = Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED };
+        let pairs = steps([expert, Manner { pace: Pace::Prompt, ..expert }]);
+        let saved: Vec<_> = pairs.iter().filter(|(steady, prompt)| prompt < steady).collect();
+        let (steady, prompt) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+        assert!(prompt < steady && !saved.is_empty(), "{pairs:?}");
+    }
+
+    #[test]
+    fn a_learner_acts_greedily_in_some_episodes_and_draws_in_others() {
+        let _chance = crate::nets::testing::chance();
+        let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
+            eprintln!("skipped: needs the sentence encoder (`make setup`)");
+            return;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let task = tasks(folder.path()).remove(1);
+        let again = |number: usize| Task { id: format!("again-{number}"), ..task.clone() };
+        let first = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+        let collection = Collection {
+            out: folder.path().join("D"),
+            source: Source::Tasks {
+                tasks: (0..8).map(again).collect(),
+                scenes: Scenes::in_folder(Some(folder.path().to_owned())),
+            },
+            seed: 1,
+            manner: UNDISTURBED,
+            learner: Some((first, Arc::new(std::sync::Mutex::new(sentences)))),
+        };
+        collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+        let dataset = Dataset::open(&collection.out).unwrap();
+        let done: Vec<_> = dataset.trajectories().unwrap().map(|trajectory| trajectory.unwrap().actions).collect();
+        let twins = |actions: &&Vec<crate::domain::Action>| done.iter().filter(|other| other == actions).count() > 1;
+        let alike = done.iter().filter(twins).count();
+        assert!((2..done.len()).contains(&alike), "{alike} of {} did what another one did", done.len());
+    }
+
+    #[test]
+    fn the_seeker_looks_around_for_what_the_expert_goes_for_unseen() {
+        let pairs = steps([UNDISTURBED, Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED }]);
+        let longer = pairs.iter().filter(|(looks, goes)| looks > goes).count();
+        assert!(longer > pairs.len() / 2, "{pairs:?}");
+    }
+
+    #[test]
+    fn a_stopped_collection_keeps_what_came_first() {
+        /// Stops at the first word of progress.
+        struct Stopping<'a>(&'a AtomicBool);
+        impl Report for Stopping<'_> {
+            fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+                self.0.store(true, Ordering::Relaxed);
+                Ok(())
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let collection = |name: &str| Collection {
+            out: folder.path().join(name),
+            source: Source::Generated { episodes: 150, lengths: vec![1], annotations: 1 },
+            seed: 4,
+            manner: UNDISTURBED,
+            learner: None,
+        };
+        let made = |collection: &Collection| -> Vec<Trajectory> {
+            Dataset::open(&collection.out).unwrap().trajectories().unwrap().collect::<Result<_, _>>().unwrap()
+        };
+        let (whole, part, stop) = (collection("whole"), collection("part"), AtomicBool::new(false));
+        whole.run(&mut Silent, &AtomicBool::new(false)).unwrap();
+        let collected = part.run(&mut Stopping(&stop), &stop).unwrap();
+        let kept = made(&part);
+        assert_eq!(collected, Collected { trajectories: kept.len(), stopped: true });
+        assert!(!kept.is_empty() && kept.len() < 150, "{}", kept.len());
+        assert_eq!(kept, made(&whole)[..kept.len()]);
+    }
+
+    #[test]
+    fn a_task_that_does_not_fit_its_scene_is_refused_and_an_earlier_dataset_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut tasks = tasks(folder.path());
+        let collected = |tasks: &[Task]| {
+            let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
+            let source = Source::Tasks { tasks: tasks.to_vec(), scenes };
+            let collection =
+                Collection { out: folder.path().join("D"), source, seed: 1, manner: UNDISTURBED, learner: None };
+            collection.run(&mut Silent, &AtomicBool::new(false))
+        };
+        assert_eq!(collected(&tasks).unwrap(), Collected { trajectories: 1, stopped: false });
+        tasks[1].start = None;
+        let error = format!("{:#}", collected(&tasks).unwrap_err());
+        assert!(error.starts_with("tasks[1].start: missing"), "{error}");
+        assert_eq!(Dataset::open(&folder.path().join("D")).unwrap().trajectories().unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,232 @@
+//! Encoding: every frame of datasets is drawn and becomes a feature map, once; the maps are kept in each dataset's cache.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::sync_channel;
+
+use anyhow::Context;
+use sha2::{Digest, Sha256};
+use tch::{Device, Kind, Tensor};
+
+use super::frame_store::Footage;
+use super::metrics::{Report, Scalars};
+use crate::data::Dataset;
+use crate::data::features::{Features, Header, Writer};
+use crate::house::House;
+use crate::house::render::Renderer;
+use crate::nets::device;
+use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::SIDE;
+
+/// Frames that are encoded at once; with more, a core's cache no longer holds what lies between two layers.
+const BATCH: usize = 32;
+/// Trajectories whose first frames tell whether all still look as they did.
+const LOOKED_AT: usize = 24;
+
+/// The maps of every frame of the footage, in its order; `datasets` are those it was opened with. What is missing is computed.
+/// Nothing when it was stopped: the same call goes on from there.
+///
+/// # Errors
+/// When a frame cannot be drawn, or a cache be read or written.
+pub fn features(
+    encoder: &dyn FrameEncoder,
+    datasets: &[Dataset],
+    footage: &Footage,
+    report: &mut dyn Report,
+    stop: &AtomicBool,
+) -> anyhow::Result<Option<Features>> {
+    let mut all: Option<Features> = None;
+    for (dataset, trajectories) in datasets.iter().zip(&footage.parts) {
+        let header = Header {
+            format_version: Header::FORMAT,
+            encoder: encoder.digest().to_string(),
+            dataset: format!("{}-{}", dataset.digest()?, looks(footage, trajectories)?),
+            maps: footage.frames_of(trajectories) as u64,
+            numbers: (encoder.features() * SIDE * SIDE) as u64,
+        };
+        let cache = dataset.folder().join("cache");
+        let mut found = Features::read(&cache, &header)?;
+        if found.is_none() {
+            if !encode(encoder, footage, trajectories.clone(), &cache, &header, report, stop)? {
+                return Ok(None);
+            }
+            found = Features::read(&cache, &header)?;
+        }
+        let found = found.with_context(|| format!("{} changed meanwhile", cache.display()))?;
+        match &mut all {
+            Some(all) => all.append(found),
+            None => all = Some(found),
+        }
+    }
+    Ok(all)
+}
+
+/// Identifies how frames look, from a few of them: scenes and their drawing are no part of a dataset's trajectories.
+fn looks(footage: &Footage, trajectories: &Range<usize>) -> anyhow::Result<String> {
+    let mut hash = Sha256::new();
+    let mut renderer = Renderer::new(House::FRAME);
+    for trajectory in trajectories.clone().step_by(trajectories.len().div_ceil(LOOKED_AT).max(1)) {
+        hash.update(&renderer.draw(footage.scene(trajectory)?, &footage.trajectories[trajectory].start).rgb);
+    }
+    Ok(format!("{:x}", hash.finalize())[..8].to_string())
+}
+
+/// Computes the map of every frame of some trajectories into `folder`, a thread a core, each drawing and encoding whole trajectories.
+/// What an interrupted call left is taken up. Returns false when it was stopped.
+///
+/// # Errors
+/// When a frame cannot be drawn or the file not be written.
+pub fn encode(
+    encoder: &dyn FrameEncoder,
+    footage: &Footage,
+    trajectories: Range<usize>,
+    folder: &Path,
+    header: &Header,
+    report: &mut dyn Report,
+    stop: &AtomicBool,
+) -> anyhow::Result<bool> {
+    let mut writer = Writer::open(folder, header.clone())?;
+    let frames_until = |end: usize| footage.frames_of(&(trajectories.start..end)) as u64;
+    let mut written = trajectories.start;
+    while written < trajectories.end && frames_until(written + 1) <= writer.maps() {
+        written += 1;
+    }
+    writer.keep(frames_until(written))?;
+    let next = AtomicUsize::new(written);
+    let threads = rayon::current_num_threads();
+    let whole = device::threads();
+    let (sender, receiver) = sync_channel(2 * threads);
+    let result = std::thread::scope(|scope| {
+        for _ in 0..threads {
+            let (encoder, sender, next, end) = (encoder.twin(), sender.clone(), &next, trajectories.end);
+            scope.spawn(move || {
+                // The threads are one a core; libtorch should not start more.
+                device::set_threads(1);
+                let mut renderer = Renderer::new(House::FRAME);
+                while !stop.load(Ordering::Relaxed) {
+                    let trajectory = next.fetch_add(1, Ordering::Relaxed);
+                    let done = trajectory >= end;
+                    if done || sender.send((trajectory, maps(&*encoder, footage, trajectory, &mut renderer))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut waiting = BTreeMap::new();
+        for (trajectory, maps) in receiver {
+            waiting.insert(trajectory, maps?);
+            while let Some(maps) = waiting.remove(&written) {
+                writer.add(&maps)?;
+                written += 1;
+                report.step(&Scalars::new("features", frames_until(written), header.maps))?;
+            }
+        }
+        anyhow::Ok(written == trajectories.end)
+    });
+    device::set_threads(whole);
+    let finished = result?;
+    if finished {
+        writer.finish()?;
+    }
+    Ok(finished)
+}
+
+/// The maps of a trajectory's frames: little-endian 16-bit floats.
+fn maps(
+    encoder: &dyn FrameEncoder,
+    footage: &Footage,
+    trajectory: usize,
+    renderer: &mut Renderer,
+) -> anyhow::Result<Vec<u8>> {
+    let (mut images, mut bytes) = (Vec::with_capacity(BATCH), Vec::new());
+    footage.replay(trajectory, |scene, world, _| {
+        images.push(encoder.image(renderer.draw(scene, world)));
+        if images.len() == BATCH {
+            add_half(&encoder.encode(&images), &mut bytes)?;
+            images.clear();
+        }
+        Ok(())
+    })?;
+    if !images.is_empty() {
+        add_half(&encoder.encode(&images), &mut bytes)?;
+    }
+    Ok(bytes)
+}
+
+/// Appends a tensor's numbers as 16-bit floats.
+fn add_half(tensor: &Tensor, bytes: &mut Vec<u8>) -> anyhow::Result<()> {
+    let half = tensor.to_device(Device::Cpu).to_kind(Kind::Half).contiguous();
+    let filled = bytes.len();
+    bytes.resize(filled + half.numel() * 2, 0);
+    half.f_copy_data_u8(&mut bytes[filled..], half.numel())?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nets::visual::{VisualEncoder, VisualSpec};
+    use crate::train::visual::testing::{Notes, footage};
+    use tch::nn;
+
+    fn encoder() -> impl FrameEncoder {
+        tch::manual_seed(2);
+        let store = nn::VarStore::new(Device::Cpu);
+        let spec = VisualSpec { input: 112, channels: vec![4, 4, 8, 16] };
+        VisualEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
+    }
+
+    fn header() -> Header {
+        Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 10, numbers: 16 * 49 }
+    }
+
+    #[test]
+    fn every_frame_gets_its_map() {
+        let _chance = crate::nets::testing::chance();
+        let (footage, encoder, folder) = (footage(), encoder(), tempfile::tempdir().unwrap());
+        let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(false));
+        assert!(encode(&encoder, &footage, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        let features = Features::read(folder.path(), &header()).unwrap().unwrap();
+        let map = |frame| {
+            let mut bytes = Vec::new();
+            features.gather_all([frame].into_iter(), &mut bytes).unwrap();
+            bytes
+        };
+        assert_eq!(features.len(), 10);
+        // Both trajectories start in one state, and four turns lead back to it.
+        assert_eq!(map(0), map(5));
+        assert_eq!(map(1), map(8));
+        assert_ne!(map(0), map(1));
+        assert_eq!(notes.0.iter().map(|note| note.step).collect::<Vec<_>>(), [5, 10]);
+    }
+
+    #[test]
+    fn an_encoding_that_was_cut_off_goes_on_at_a_whole_trajectory() {
+        let _chance = crate::nets::testing::chance();
+        let (footage, encoder) = (footage(), encoder());
+        let stop = AtomicBool::new(false);
+        let run = |folder: &Path, notes: &mut Notes| {
+            encode(&encoder, &footage, 0..2, folder, &header(), notes, &stop).unwrap();
+            std::fs::read(folder.join(header().file_name())).unwrap()
+        };
+        let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let bytes = run(whole.path(), &mut Notes(Vec::new()));
+        let part = parts.path().join(header().file_name() + ".part");
+        std::fs::write(&part, &bytes[..bytes.len() * 7 / 10]).unwrap();
+        let mut notes = Notes(Vec::new());
+        assert!(bytes == run(parts.path(), &mut notes));
+        assert_eq!(notes.0.len(), 1, "only the second trajectory is computed");
+    }
+
+    #[test]
+    fn when_it_is_stopped_nothing_is_put_in_place() {
+        let _chance = crate::nets::testing::chance();
+        let (footage, encoder, folder) = (footage(), encoder(), tempfile::tempdir().unwrap());
+        let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(true));
+        assert!(!encode(&encoder, &footage, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        assert!(Features::read(folder.path(), &header()).unwrap().is_none());
+    }
+}

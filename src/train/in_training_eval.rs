@@ -1,0 +1,98 @@
+//! Trials: while it trains, an agent plays some tasks of a set, and its curve shows what losses do not.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use tch::Device;
+
+use super::metrics::Scalars;
+use crate::agent::learned::SharedEmbedder;
+use crate::agent::{LearnedPolicy, LearnedTeam, Team};
+use crate::data::taskset;
+use crate::episode::scenes::Scenes;
+use crate::eval::evaluation::Evaluation;
+use crate::eval::executor::MakeTeam;
+use crate::eval::options::Options;
+use crate::house::grading::Grading;
+
+/// Which tasks are tried, and when.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trials {
+    /// The task file.
+    pub tasks: PathBuf,
+    /// Only that many tasks, from the first.
+    pub limit: Option<usize>,
+    /// Steps between two trials; each is held when the training is saved next.
+    pub every: u64,
+}
+
+impl Trials {
+    /// Whether a trial is held at the save at `step`, when the save before it was at `before`.
+    pub fn are_due(&self, before: u64, step: u64) -> bool {
+        step / self.every.max(1) > before / self.every.max(1)
+    }
+
+    /// The tasks, ready to be played in the checkpoint in `folder`.
+    ///
+    /// # Errors
+    /// When the task file or a scene cannot be read.
+    pub fn prepare(&self) -> anyhow::Result<Evaluation> {
+        let set = taskset::read(&self.tasks)?;
+        let options = Options { limit: self.limit, ..Options::plain(Grading::Class) };
+        Evaluation::prepare(&set, Scenes::of(&self.tasks, &set.value), options, "agent", None)
+            .with_context(|| self.tasks.display().to_string())
+    }
+}
+
+/// Lets the checkpoint in `folder` play, and puts its success rate and mean completed subtasks among the scalars as
+/// `trial_success` and `trial_completed`. Nothing when it was stopped meanwhile.
+///
+/// # Errors
+/// When the checkpoint cannot be read. An episode that fails counts as no success.
+pub fn hold(
+    evaluation: &Evaluation,
+    folder: &Path,
+    sentences: &SharedEmbedder,
+    device: Device,
+    stop: &Arc<AtomicBool>,
+    scalars: &mut Scalars,
+) -> anyhow::Result<()> {
+    let (folder, sentences) = (folder.to_owned(), sentences.clone());
+    let make_team: Arc<MakeTeam> = Arc::new(move || -> anyhow::Result<Box<dyn Team>> {
+        let policy = LearnedPolicy::load(&folder, sentences.clone(), device)?;
+        Ok(Box::new(LearnedTeam::new(policy, LearnedTeam::SEATS)))
+    });
+    let (mut episodes, mut successes, mut completed) = (0u32, 0u32, 0u32);
+    evaluation.play(&evaluation.all(), &make_team, stop, &mut |episode| {
+        episodes += 1;
+        successes += u32::from(episode.success);
+        completed += episode.completed;
+        Ok(())
+    })?;
+    if episodes > 0 && !stop.load(Ordering::Relaxed) {
+        scalars.set("trial_success", f64::from(successes) / f64::from(episodes));
+        scalars.set("trial_completed", f64::from(completed) / f64::from(episodes));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_is_held_at_the_first_save_after_each_so_many_steps() {
+        let trials = Trials { tasks: "t.json".into(), limit: None, every: 300 };
+        let mut before = 0;
+        let mut held = Vec::new();
+        for saved in [200, 400, 600, 800, 850] {
+            if trials.are_due(before, saved) {
+                held.push(saved);
+            }
+            before = saved;
+        }
+        assert_eq!(held, [400, 600]);
+    }
+}

@@ -1,0 +1,207 @@
+//! Measures a policy in generated houses that no training saw: one-skill tasks, and whether it follows what it is told.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::metrics::{Report, Scalars};
+use super::preset::Appraisal;
+use crate::agent::{Policy, RandomPolicy};
+use crate::domain::task::SceneRef;
+use crate::domain::{Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
+use crate::episode::rollout::{End, Rollout};
+use crate::house::expert::Expert;
+use crate::house::grading::{Grader, Grading};
+use crate::house::{House, generate};
+use crate::language::phrases;
+use crate::report::stats;
+
+/// Houses of appraisals have seeds from here on; those of collections lie below.
+const UNSEEN: u64 = 1 << 40;
+
+/// Successes among trials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rate {
+    /// How often it worked.
+    pub successes: usize,
+    /// How often it was tried.
+    pub trials: usize,
+}
+
+impl Rate {
+    fn count(&mut self, success: bool) {
+        self.successes += usize::from(success);
+        self.trials += 1;
+    }
+}
+
+impl std::fmt::Display for Rate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let share = 100.0 * self.successes as f64 / self.trials.max(1) as f64;
+        let [low, high] = stats::wilson(self.successes, self.trials).map(|end| 100.0 * end);
+        write!(f, "{share:.1} % ({} of {}, 95 % interval {low:.0} to {high:.0} %)", self.successes, self.trials)
+    }
+}
+
+/// What an appraisal found.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Findings {
+    /// One-skill tasks that the policy solved.
+    pub agent: Rate,
+    /// The same tasks, solved by chance.
+    pub random: Rate,
+    /// The policy's rate for each kind of skill.
+    pub by_skill: BTreeMap<String, Rate>,
+    /// Of two objects in view, the instruction names one: how often the policy picks up that one first.
+    pub named: Rate,
+    /// How often it picks up the other one.
+    pub other: Rate,
+    /// From one and the same start: how often it picks up first the one and, with the instruction swapped, the other.
+    pub swapped: Rate,
+}
+
+/// Measures a policy.
+///
+/// # Errors
+/// When the policy fails.
+pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn Report) -> anyhow::Result<Findings> {
+    let mut findings = Findings::default();
+    let mut chance = RandomPolicy::new();
+    let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
+    let mut number = 0;
+    while findings.agent.trials < appraisal.tasks {
+        let (reference, scene, world) = unseen(appraisal.seed, number);
+        number += 1;
+        let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
+        let start = task.start.clone().unwrap_or(world);
+        let solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
+            let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+            let house = House::new(scene.clone(), start.clone());
+            let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon));
+            policy.begin(number);
+            while rollout.end().is_none() {
+                rollout.step(policy)?;
+            }
+            Ok(rollout.end() == Some(End::Success))
+        };
+        let solved = solve(policy)?;
+        findings.agent.count(solved);
+        findings.random.count(solve(&mut chance)?);
+        if let Some(subtask) = task.subtasks.first() {
+            findings.by_skill.entry(format!("{:?}", subtask.skill)).or_default().count(solved);
+        }
+        report.step(&Scalars::new("tasks", findings.agent.trials as u64, appraisal.tasks as u64))?;
+    }
+    while findings.swapped.trials < appraisal.swaps {
+        let (_, scene, world) = unseen(appraisal.seed + 1, number);
+        number += 1;
+        let Some(case) = pair(&scene, &world, &mut rng) else { continue };
+        let mut right = [false; 2];
+        for (told, right) in right.iter_mut().enumerate() {
+            let first = case.first_pickup(policy, told, &mut rng)?;
+            *right = first == Some(case.objects[told]);
+            findings.named.count(*right);
+            findings.other.count(first == Some(case.objects[1 - told]));
+        }
+        findings.swapped.count(right == [true; 2]);
+        report.step(&Scalars::new("swaps", findings.swapped.trials as u64, appraisal.swaps as u64))?;
+    }
+    Ok(findings)
+}
+
+fn unseen(seed: u64, number: u64) -> (SceneRef, Arc<Scene>, World) {
+    let (room, seed) = (Room::ALL[(number % 4) as usize], UNSEEN + seed * 1_000_000 + number);
+    let (scene, world) = generate::house(room, seed);
+    (SceneRef::Generated { room, seed }, Arc::new(scene), world)
+}
+
+/// A start from which two objects of different classes are in view, each the only one of its class there.
+struct Pair {
+    scene: Arc<Scene>,
+    world: World,
+    objects: [Class; 2],
+    /// Twice the expert's steps to each.
+    horizons: [u32; 2],
+}
+
+/// Places that are tried in a house.
+const TRIES: usize = 20;
+
+fn pair(scene: &Arc<Scene>, world: &World, rng: &mut ChaCha8Rng) -> Option<Pair> {
+    for _ in 0..TRIES {
+        let mut world = world.clone();
+        let cell = scene.cells[rng.random_range(0..scene.cells.len())];
+        world.agent = Pose { cell, heading: Heading::from_quarters(rng.random_range(0..4)), horizon: 30 };
+        let mut house = House::new(scene.clone(), world.clone());
+        let mut counts: BTreeMap<Class, usize> = BTreeMap::new();
+        for sighting in &house.view().sightings.clone() {
+            if let Instance::Object(index) = sighting.instance
+                && let Some(object) = world.object(index)
+                && object.class.info().pickupable
+            {
+                *counts.entry(object.class).or_default() += 1;
+            }
+        }
+        let single: Vec<Class> = counts.into_iter().filter(|(_, count)| *count == 1).map(|(class, _)| class).collect();
+        if single.len() < 2 {
+            continue;
+        }
+        let first = rng.random_range(0..single.len());
+        let second = (first + rng.random_range(1..single.len())) % single.len();
+        let objects = [single[first], single[second]];
+        let horizon = |class: Class| expert_steps(scene, &world, class).map(|steps| 2 * steps);
+        if let (Some(one), Some(other)) = (horizon(objects[0]), horizon(objects[1])) {
+            return Some(Pair { scene: scene.clone(), world, objects, horizons: [one, other] });
+        }
+    }
+    None
+}
+
+fn pickup(class: Class) -> ([Role; 1], [Subtask; 1]) {
+    let role = Role { class, slice: false, bound: None, expert: None };
+    ([role], [Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None }])
+}
+
+fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> {
+    const TOO_MANY: u32 = 60;
+    let (roles, subtasks) = pickup(class);
+    let grader = Grader::new(Grading::Class, &roles, &subtasks, None);
+    let house = House::new(scene.clone(), world.clone());
+    let mut rollout = Rollout::new(house, String::new(), Some(grader), Some(TOO_MANY));
+    let mut expert = Expert::new();
+    while rollout.end().is_none() {
+        let grader = rollout.grader.as_ref()?;
+        let action = expert.next(&mut rollout.house, grader).ok()?;
+        rollout.act(action);
+    }
+    (rollout.end() == Some(End::Success)).then_some(rollout.steps())
+}
+
+impl Pair {
+    /// The class that the policy picks up first when it is told to take one of the two.
+    fn first_pickup(
+        &self,
+        policy: &mut dyn Policy,
+        told: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> anyhow::Result<Option<Class>> {
+        let (roles, subtasks) = pickup(self.objects[told]);
+        let instruction = phrases::sentence(&roles, &subtasks[0], rng);
+        let house = House::new(self.scene.clone(), self.world.clone());
+        let mut rollout = Rollout::new(house, instruction, None, Some(self.horizons[told]));
+        policy.begin(told as u64);
+        while rollout.end().is_none() {
+            rollout.step(policy)?;
+            let world = rollout.house.world();
+            if let Some(object) = world.held.and_then(|index| world.object(index)) {
+                return Ok(Some(object.class));
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,211 @@
+//! Trains the visual encoder on drawn frames of a dataset.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::ensure;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tch::{Kind, Tensor, nn};
+
+use super::frame_store::Footage;
+use super::metrics::{Report, Scalars};
+use super::perception_targets::{MARKS, Sight};
+use super::preset::Preset;
+use super::training_state::State;
+use crate::algo::learner::Learner;
+use crate::domain::Class;
+use crate::house::House;
+use crate::house::render::Renderer;
+use crate::nets::perception_heads::{Known, SightHeads};
+use crate::nets::visual::{SIDE, VisualEncoder};
+
+/// Frames on which the encoder is measured while it trains.
+const MEASURED: usize = 256;
+
+/// Trains an encoder up to the preset's last step, from where `state` left off if it is there. Returns false when it was stopped;
+/// its state is saved then.
+///
+/// # Errors
+/// When a state cannot be read or written, or a frame not be drawn.
+pub fn train(
+    store: &nn::VarStore,
+    encoder: &VisualEncoder,
+    footage: &Footage,
+    preset: &Preset,
+    state: State<'_>,
+    report: &mut dyn Report,
+    stop: &AtomicBool,
+) -> anyhow::Result<bool> {
+    let heads = SightHeads::new(&(store.root() / "heads"), encoder.spec().features(), MARKS as i64);
+    let training = &preset.visual_training;
+    let mut learner = Learner::new(store, training.optimisation.clone(), preset.seed);
+    if let Some((step, tensors)) = state.read()? {
+        learner.take_up(state.path, step, &tensors)?;
+    }
+    let apart = footage.kept_apart(preset.hold_out);
+    ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
+    let drawn = |step, count, held_out| {
+        frames(footage, preset.seed, step, count, &|frame| apart[footage.trajectory_of(frame)] == held_out)
+    };
+    let held_out = if apart.contains(&true) { drawn(0, MEASURED, true) } else { Vec::new() };
+    while !learner.is_done() {
+        if stop.load(Ordering::Relaxed) {
+            state.write(learner.step(), &learner.state())?;
+            return Ok(false);
+        }
+        let (images, known) = batch(footage, encoder, &drawn(learner.step() + 1, training.optimisation.batch, false))?;
+        learner.begin_step();
+        let loss = heads.loss(&encoder.forward_with(preset.precision, &images, true), &known, training.positive_weight);
+        learner.minimise(&loss.total());
+        let mut scalars = Scalars::new("visual", learner.step(), training.optimisation.steps);
+        if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
+            scalars.add("marks", &loss.marks);
+            scalars.add("depth", &loss.depth);
+            scalars.add("held", &loss.held);
+        }
+        if (learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done()) && !held_out.is_empty() {
+            measure(encoder, &heads, footage, &held_out, &mut scalars)?;
+        }
+        report.step(&scalars)?;
+        if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
+            state.write(learner.step(), &learner.state())?;
+        }
+    }
+    Ok(true)
+}
+
+fn measure(
+    encoder: &VisualEncoder,
+    heads: &SightHeads,
+    footage: &Footage,
+    held_out: &[usize],
+    scalars: &mut Scalars,
+) -> anyhow::Result<()> {
+    let (images, known) = batch(footage, encoder, held_out)?;
+    tch::no_grad(|| {
+        let maps = encoder.forward(&images, false);
+        for (name, from, to) in [("classes", 0, Class::VOCABULARY), ("possible", Class::VOCABULARY, MARKS - 1)] {
+            let [both, holds, told, held] = heads.counts(&maps, &known, from as i64, to as i64);
+            scalars.set(&format!("held_out_{name}_recall"), both / holds.max(1.0));
+            scalars.set(&format!("held_out_{name}_precision"), both / told.max(1.0));
+            scalars.set("held_out_held_accuracy", held / held_out.len().max(1) as f64);
+        }
+    });
+    Ok(())
+}
+
+/// The frames of a step, of those that are wanted: a function of the seed and the step. There has to be one.
+fn frames(footage: &Footage, seed: u64, step: u64, count: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5157);
+    rng.set_stream(step);
+    std::iter::repeat_with(|| rng.random_range(0..footage.frames()))
+        .filter(|&frame| wanted(frame))
+        .take(count)
+        .collect()
+}
+
+/// Draws frames: what the encoder reads and what is known of them.
+fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, Known)> {
+    let spec = encoder.spec();
+    let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, Sight)> {
+        let (scene, world) = footage.state(frame)?;
+        let frame = renderer.draw(scene, &world);
+        Ok((spec.image(frame), Sight::of(scene, &world, frame)))
+    };
+    let drawn: Vec<(Vec<u8>, Sight)> =
+        frames.par_iter().map_init(|| Renderer::new(House::FRAME), draw).collect::<anyhow::Result<_>>()?;
+    let n = drawn.len() as i64;
+    let (images, sights): (Vec<Vec<u8>>, Vec<Sight>) = drawn.into_iter().unzip();
+    let side = encoder.spec().input;
+    let held: Vec<i64> = sights.iter().map(|sight| i64::from(sight.held)).collect();
+    let gather = |part: fn(&Sight) -> &[u8]| sights.iter().flat_map(part).copied().collect::<Vec<u8>>();
+    let depth: Vec<f32> = sights.iter().flat_map(|sight| sight.depth.iter().copied()).collect();
+    let device = encoder.device();
+    let known = Known {
+        marks: Tensor::from_slice(&gather(|sight| &sight.marks))
+            .view([n, MARKS as i64, SIDE, SIDE])
+            .to_device(device)
+            .to_kind(Kind::Float),
+        depth: Tensor::from_slice(&depth).view([n, 1, SIDE, SIDE]).to_device(device),
+        held: Tensor::from_slice(&held).to_device(device),
+    };
+    Ok((Tensor::from_slice(&images.concat()).view([n, 3, side, side]), known))
+}
+
+/// Footage for tests.
+#[cfg(test)]
+pub mod testing {
+    use super::*;
+    use crate::data::dataset;
+    use crate::data::dataset::Dataset;
+    use crate::domain::{Action, ActionType, Trajectory, trajectory};
+    use crate::house::testing::kitchen;
+
+    /// Two turns around in the test kitchen.
+    pub fn footage() -> Footage {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, start) = kitchen();
+        let mut writer = crate::data::dataset::Writer::new(folder.path()).unwrap();
+        writer.scene(&scene).unwrap();
+        for (id, turn) in [("left", ActionType::RotateLeft), ("right", ActionType::RotateRight)] {
+            let trajectory = Trajectory {
+                start: start.clone(),
+                actions: vec![Action::navigate(turn); 4],
+                ..trajectory::testing::empty(id, &scene.name)
+            };
+            writer.trajectory(&trajectory).unwrap();
+        }
+        writer.finish(&dataset::testing::manifest(1, &[])).unwrap();
+        Footage::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
+    }
+
+    /// Notes what is reported.
+    pub struct Notes(pub Vec<Scalars>);
+
+    impl Report for Notes {
+        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+            self.0.push(scalars.clone());
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::testing::{Notes, footage};
+    use super::*;
+    use crate::nets::precision::Precision;
+    use tch::Device;
+
+    #[test]
+    fn the_encoder_learns_what_a_few_frames_show() {
+        let _chance = crate::nets::testing::chance();
+        let footage = footage();
+        assert_eq!(footage.frames(), 10);
+        let mut preset = Preset::named("l-bc").unwrap();
+        preset.visual.channels = vec![4, 4, 8, 16];
+        preset.visual_training.optimisation.batch = 8;
+        preset.visual_training.optimisation.schedule.warmup_steps = 2;
+        (preset.report_every, preset.save_every) = (1, 100);
+        let mut losses = |precision, steps| -> Vec<f64> {
+            preset.precision = precision;
+            preset.visual_training.optimisation.steps = steps;
+            tch::manual_seed(2);
+            let store = nn::VarStore::new(Device::Cpu);
+            let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
+            let folder = tempfile::tempdir().unwrap();
+            let (path, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
+            let state = State { path: &path, identity: &BTreeMap::new() };
+            let mut notes = Notes(Vec::new());
+            assert!(train(&store, &encoder, &footage, &preset, state, &mut notes, &stop).unwrap());
+            notes.0.iter().map(|scalars| scalars.values["marks"]).collect()
+        };
+        let (full, mixed) = (losses(Precision::Full, 90), losses(Precision::Mixed, 2));
+        assert!(full[89] < 0.5 * full[0], "{} then {}", full[0], full[89]);
+        assert!(mixed[0] != full[0] && (mixed[0] - full[0]).abs() < 0.01 * full[0], "{} and {}", mixed[0], full[0]);
+        assert!(mixed[1].is_finite());
+    }
+}
