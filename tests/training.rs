@@ -102,9 +102,10 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
     }
     assert!(sprint.read("agent/README.md").contains("implicit Q-learning with skills chained"));
     let config: serde_json::Value = serde_json::from_str(&sprint.read("agent/config.json")).unwrap();
-    assert_eq!(config["balance"]["strength"], 0.5, "as the preset has it");
-    assert_eq!(config["weighing"], 10.0, "likewise");
-    let shares: f64 = config["balance"]["shares"].as_array().unwrap().iter().filter_map(|share| share.as_f64()).sum();
+    assert_eq!(config["logit_adjustment"]["strength"], 0.5, "as the preset has it");
+    assert_eq!(config["advantage_scale"], 10.0, "likewise");
+    let shares: f64 =
+        config["logit_adjustment"]["shares"].as_array().unwrap().iter().filter_map(|share| share.as_f64()).sum();
     assert!((shares - 1.0).abs() < 1e-3, "{config}");
     done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
     assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
@@ -134,25 +135,32 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     assert!(sprint.read("both/README.md").contains("the mean of 2 checkpoints'"), "{}", sprint.read("both/README.md"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));
-    done(&sprint, "average agent --balance 0.2 --out lighter --appraise 1");
+    done(&sprint, "average agent --logit_adjustment 0.2 --out lighter --appraise 1");
     assert!(sprint.read("lighter/config.json").contains("\"strength\": 0.2"), "{}", sprint.read("lighter/config.json"));
     assert!(sprint.read("lighter/README.md").contains("20 % of what is merely frequent"));
-    let refused = sprint.run("average agent --balance 2 --out none").stderr;
-    assert!(refused.contains("--balance 2 for agent: balance.strength is 2, which is not a share"), "{refused}");
-    done(&sprint, "average agent --weighing 2.5 --out wiser --appraise 1");
-    assert!(sprint.read("wiser/config.json").contains("\"weighing\": 2.5"), "{}", sprint.read("wiser/config.json"));
+    let refused = sprint.run("average agent --logit_adjustment 2 --out none").stderr;
+    assert!(
+        refused.contains("--logit_adjustment 2 for agent: logit_adjustment.strength is 2, which is not a share"),
+        "{refused}"
+    );
+    done(&sprint, "average agent --advantage_scale 2.5 --out wiser --appraise 1");
+    assert!(
+        sprint.read("wiser/config.json").contains("\"advantage_scale\": 2.5"),
+        "{}",
+        sprint.read("wiser/config.json")
+    );
     assert!(
         sprint.read("wiser/README.md").contains("exp(2.5 A) times as likely"),
         "{}",
         sprint.read("wiser/README.md")
     );
-    let refused = sprint.run("average agent --weighing=-1 --out none").stderr;
-    assert!(refused.contains("--weighing -1 for agent: weighing is -1, which is no weight"), "{refused}");
+    let refused = sprint.run("average agent --advantage_scale=-1 --out none").stderr;
+    assert!(refused.contains("--advantage_scale -1 for agent: advantage_scale is -1, which is no weight"), "{refused}");
     let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
-    let refused = sprint.run(&format!("average {first} --balance 0.2 --out none")).stderr;
+    let refused = sprint.run(&format!("average {first} --logit_adjustment 0.2 --out none")).stderr;
     assert!(refused.contains("how often each action was shown was not noted"), "{refused}");
-    let refused = sprint.run(&format!("average {first} --weighing 2 --out none")).stderr;
-    assert!(refused.contains("weighing needs a critic, and there is none"), "{refused}");
+    let refused = sprint.run(&format!("average {first} --advantage_scale 2 --out none")).stderr;
+    assert!(refused.contains("advantage_scale needs a critic, and there is none"), "{refused}");
     let config = sprint.read("agent/config.json");
     let digest = config.split("\"digest\": \"").nth(1).unwrap()[..64].to_string();
     std::fs::write(sprint.path("agent/config.json"), config.replace(&digest, "strange")).unwrap();

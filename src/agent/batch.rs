@@ -8,9 +8,9 @@ use tch::{Device, Kind, Tensor};
 use super::checkpoint::Networks;
 use super::conditioning;
 use super::config::Config;
-use super::frame_history::{Memory, SharedEmbedder};
+use super::frame_history::{FrameHistory, SharedEmbedder};
 use super::learned::LearnedPolicy;
-use super::policy::Situation;
+use super::policy::Observation;
 use super::select::Heads;
 use super::team::{Decisions, Team};
 use crate::nets::frozen::FrameEncoder;
@@ -25,7 +25,7 @@ pub struct LearnedTeam {
     sentences: SharedEmbedder,
     device: Device,
     samples: bool,
-    seats: Vec<Memory>,
+    seats: Vec<FrameHistory>,
     /// What an empty seat shows.
     blank: Vec<u8>,
 }
@@ -38,13 +38,13 @@ impl LearnedTeam {
     pub fn new(agent: LearnedPolicy, seats: usize) -> LearnedTeam {
         let LearnedPolicy { name, config, networks, sight, sentences, device, samples, memory: _ } = agent;
         let blank = vec![0; 3 * sight.side() * sight.side()];
-        let seats = (0..seats.max(1)).map(|_| Memory::default()).collect();
+        let seats = (0..seats.max(1)).map(|_| FrameHistory::default()).collect();
         LearnedTeam { name, config, networks, sight, sentences, device, samples, seats, blank }
     }
 
     /// The maps [seats, features, 7, 7] of what each seat sees now.
-    fn see(&mut self, situations: &mut [Option<Situation<'_>>]) -> Tensor {
-        let image = |(situation, memory): (&mut Option<Situation<'_>>, &mut Memory)| match situation {
+    fn see(&mut self, situations: &mut [Option<Observation<'_>>]) -> Tensor {
+        let image = |(situation, memory): (&mut Option<Observation<'_>>, &mut FrameHistory)| match situation {
             Some(here) => {
                 let image = self.sight.image(here.house.frame());
                 memory.look(&image, here.step);
@@ -70,7 +70,7 @@ impl Team for LearnedTeam {
         self.seats[seat].begin(seed);
     }
 
-    fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+    fn decide(&mut self, situations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
         anyhow::ensure!(situations.len() == self.seats.len(), "{} situations are not one a seat", situations.len());
         let maps = self.see(situations);
         let (history, features) = (self.config.policy.history, self.config.features());
@@ -97,7 +97,7 @@ impl Team for LearnedTeam {
             Ok((width, Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu))?))
         };
         let ((kinds, mut actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
-        actions.chunks_exact_mut(kinds).for_each(|row| self.config.balance(row));
+        actions.chunks_exact_mut(kinds).for_each(|row| self.config.logit_adjustment(row));
         let mut decided = Vec::with_capacity(situations.len());
         for (seat, situation) in situations.iter_mut().enumerate() {
             let Some(here) = situation else {
@@ -111,7 +111,7 @@ impl Team for LearnedTeam {
             let heads = Heads {
                 actions: &actions[seat * kinds..][..kinds],
                 objects: &objects[seat * classes..][..classes],
-                weighing: self.config.weighing(values.as_ref()),
+                advantage_scale: self.config.advantage_scale(values.as_ref()),
             };
             decided.push(Some(Ok(self.seats[seat].decide(&heads, &candidates, self.samples))));
         }
@@ -125,8 +125,8 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::agent::logit_adjustment::Balance;
-    use crate::agent::{Mind, Policy};
+    use crate::agent::logit_adjustment::LogitAdjustment;
+    use crate::agent::{ActionDistribution, Policy};
     use crate::domain::{ActionType, Heading};
     use crate::house::House;
     use crate::house::testing::kitchen_house;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     /// What the agent thinks in one seat in ten steps, with these other seats taken.
-    fn minds(team: &mut LearnedTeam, seat: usize, others: &[usize]) -> Vec<Mind> {
+    fn minds(team: &mut LearnedTeam, seat: usize, others: &[usize]) -> Vec<ActionDistribution> {
         let mut houses: Vec<Option<House>> = (0..team.seats()).map(|_| None).collect();
         for &other in others {
             houses[other] = Some(turned(Heading::ALL[other % 4]));
@@ -160,10 +160,10 @@ mod tests {
         let mut minds = Vec::new();
         for step in 0..10 {
             let told = ["Take the mug.", "Slice the bread.", "Open the fridge."];
-            let mut situations: Vec<Option<Situation<'_>>> = Vec::new();
+            let mut situations: Vec<Option<Observation<'_>>> = Vec::new();
             for (place, house) in houses.iter_mut().enumerate() {
                 let instruction = if place == seat { "Put the apple in the sink." } else { told[place % 3] };
-                situations.push(house.as_mut().map(|house| Situation { house, instruction, step, grader: None }));
+                situations.push(house.as_mut().map(|house| Observation { house, instruction, step, grader: None }));
             }
             let decisions = team.decide(&mut situations).unwrap();
             for (place, decision) in decisions.into_iter().enumerate() {
@@ -187,7 +187,7 @@ mod tests {
                 eprintln!("skipped: the shipped agents need their sentence encoder");
                 return;
             };
-            agent.config.weighing = agent.networks.critic.is_some().then_some(10.0);
+            agent.config.advantage_scale = agent.networks.critic.is_some().then_some(10.0);
             let mut team = LearnedTeam::new(agent, LearnedTeam::SEATS);
             for seat in [0, 5] {
                 let alone = minds(&mut team, seat, &[]);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     /// What a shipped agent thinks first, in one seat of a team; alone it must think the same.
-    fn first_thought(name: &str, change: impl Fn(&mut Config)) -> Option<Mind> {
+    fn first_thought(name: &str, change: impl Fn(&mut Config)) -> Option<ActionDistribution> {
         let (mut one, mut agent) = (shipped(name)?, shipped(name)?);
         change(&mut one.config);
         change(&mut agent.config);
@@ -208,7 +208,7 @@ mod tests {
         let mut house = turned(Heading::West);
         one.begin(3);
         let mut here =
-            Situation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
+            Observation { house: &mut house, instruction: "Put the apple in the sink.", step: 0, grader: None };
         let alone = one.decide(&mut here).unwrap().mind.unwrap();
         // Another shape of the pass may round otherwise, no more.
         for (a, b) in together.actions.iter().zip(alone.actions) {
@@ -221,8 +221,8 @@ mod tests {
     fn several_at_once_think_what_one_alone_thinks() {
         let mut ahead = Vec::new();
         let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
-        for balance in [None, Some(Balance { strength: 0.5, shares })] {
-            let Some(mind) = first_thought("first", |config| config.balance = balance.clone()) else {
+        for logit_adjustment in [None, Some(LogitAdjustment { strength: 0.5, shares })] {
+            let Some(mind) = first_thought("first", |config| config.logit_adjustment = logit_adjustment.clone()) else {
                 eprintln!("skipped: the shipped agent needs its sentence encoder");
                 return;
             };
@@ -235,7 +235,8 @@ mod tests {
 
     #[test]
     fn an_agent_that_weighs_by_its_critic_thinks_otherwise_than_by_its_policy_alone() {
-        let [alone, weighed] = [None, Some(10.0)].map(|weight| first_thought("sprint", |it| it.weighing = weight));
+        let [alone, weighed] =
+            [None, Some(10.0)].map(|weight| first_thought("sprint", |it| it.advantage_scale = weight));
         let (Some(alone), Some(weighed)) = (alone, weighed) else {
             eprintln!("skipped: the shipped agent needs its sentence encoder");
             return;

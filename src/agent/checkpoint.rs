@@ -9,16 +9,16 @@ use super::config::Config;
 use super::value_estimates::Values;
 use crate::data::json;
 use crate::house::view::Candidate;
-use crate::nets::critic::{Critic, CriticSpec, Senses};
+use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
 use crate::nets::policy::{PolicyNet, PolicySpec};
-use crate::nets::visual_encoder::Eyes;
+use crate::nets::visual_encoder::VisualEncoder;
 use crate::nets::weights::{self, Form};
 
 /// A policy's networks with the stores that own their weights.
 #[derive(Debug)]
 pub struct Networks {
     /// Sees.
-    pub eyes: Eyes,
+    pub eyes: VisualEncoder,
     /// Decides.
     pub policy: PolicyNet,
     /// The policy's weights.
@@ -42,10 +42,10 @@ pub struct Critics {
 
 impl Networks {
     /// Networks with fresh weights behind the eyes.
-    pub fn new(eyes: Eyes, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
+    pub fn new(eyes: VisualEncoder, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
         let policy_store = nn::VarStore::new(device);
         let features = eyes.features();
-        let senses = Senses { channels: policy.history * features, told: policy.embedding, goal: policy.goal };
+        let senses = CriticInputs { channels: policy.history * features, told: policy.embedding, goal: policy.goal };
         Networks {
             eyes,
             policy: PolicyNet::new(&policy_store.root(), policy, features),
@@ -73,7 +73,7 @@ impl Networks {
         told: &Tensor,
         candidates: &[Candidate],
     ) -> anyhow::Result<Option<Values>> {
-        match (&self.critic, config.weighing) {
+        match (&self.critic, config.advantage_scale) {
             (Some(critic), Some(_)) => Values::of(&critic.online, observation, told, candidates).map(Some),
             _ => Ok(None),
         }

@@ -7,7 +7,7 @@ use tch::{Device, Kind, Tensor};
 use super::config::Config;
 use super::frame_history::SharedEmbedder;
 use super::goal;
-use super::policy::{Reading, Situation};
+use super::policy::{Observation, Reading};
 use crate::house::House;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
@@ -23,7 +23,7 @@ const WORDS: usize = 128;
 /// # Errors
 /// When the sentence encoder fails, or an agent that is shown its goal has no task to take it from.
 pub fn told(
-    situation: &Situation<'_>,
+    situation: &Observation<'_>,
     config: &Config,
     visual: &dyn FrameEncoder,
     sentences: &SharedEmbedder,
@@ -73,7 +73,7 @@ pub fn nothing(config: &Config, device: Device) -> Tensor {
     }
 }
 
-fn shown(situation: &Situation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
+fn shown(situation: &Observation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
     let see = |world| visual.image(House::new(Arc::clone(situation.house.scene()), world).frame());
     let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
     let missing = history - images.len();

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tch::Device;
 
-use super::logit_adjustment::Balance;
-use super::value_estimates::{Values, Weighing};
+use super::logit_adjustment::LogitAdjustment;
+use super::value_estimates::{AdvantageScale, Values};
 use crate::domain::{ActionType, Class};
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::critic::CriticSpec;
@@ -17,7 +17,7 @@ use crate::nets::precision::Precision;
 use crate::nets::resnet18;
 use crate::nets::sentence::SentenceEncoder;
 use crate::nets::visual::VisualSpec;
-use crate::nets::visual_encoder::Eyes;
+use crate::nets::visual_encoder::VisualEncoder;
 
 /// The classes and actions that a policy's heads stand for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,10 +123,10 @@ pub struct Config {
     pub words: Option<Vec<String>>,
     /// What of the actions' frequency does not count when it decides; absent where all does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub balance: Option<Balance>,
-    /// How much the critic's advantages count when it decides, see [`Weighing`]; absent where the policy decides alone.
+    pub logit_adjustment: Option<LogitAdjustment>,
+    /// How much the critic's advantages count when it decides, see [`AdvantageScale`]; absent where the policy decides alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub weighing: Option<f32>,
+    pub advantage_scale: Option<f32>,
     /// The sentence encoder.
     pub sentence_encoder: SentenceSpec,
     /// Where it comes from.
@@ -193,12 +193,12 @@ impl Config {
     ///
     /// # Errors
     /// When ResNet-18's weights are missing, or others.
-    pub fn eyes(&self, device: Device) -> anyhow::Result<Eyes> {
+    pub fn eyes(&self, device: Device) -> anyhow::Result<VisualEncoder> {
         match (&self.visual, &self.resnet18) {
-            (Some(spec), None) => Ok(Eyes::house(spec, device)),
+            (Some(spec), None) => Ok(VisualEncoder::house(spec, device)),
             (None, Some(digest)) => {
-                let file = Eyes::resnet18_file();
-                let eyes = Eyes::resnet18(&file, device)?;
+                let file = VisualEncoder::resnet18_file();
+                let eyes = VisualEncoder::resnet18(&file, device)?;
                 let found = eyes.frozen()?.digest().to_owned();
                 anyhow::ensure!(
                     found == *digest,
@@ -231,9 +231,9 @@ impl Config {
     }
 
     /// Balances the logits of the action head, where the agent's are.
-    pub fn balance(&self, logits: &mut [f32]) {
-        if let Some(balance) = &self.balance {
-            balance.apply(logits);
+    pub fn logit_adjustment(&self, logits: &mut [f32]) {
+        if let Some(logit_adjustment) = &self.logit_adjustment {
+            logit_adjustment.apply(logits);
         }
     }
 
@@ -241,33 +241,33 @@ impl Config {
     ///
     /// # Errors
     /// When the strength is no share, or it is not known how frequent each action is.
-    pub fn set_balance(&mut self, strength: f32) -> anyhow::Result<()> {
-        let balance = self.balance.as_mut();
-        let balance =
-            balance.context("balance is missing: how often each action was shown was not noted, so train anew")?;
-        balance.strength = strength;
-        balance.check().map_err(anyhow::Error::msg)
+    pub fn set_logit_adjustment(&mut self, strength: f32) -> anyhow::Result<()> {
+        let logit_adjustment = self.logit_adjustment.as_mut();
+        let logit_adjustment = logit_adjustment
+            .context("logit_adjustment is missing: how often each action was shown was not noted, so train anew")?;
+        logit_adjustment.strength = strength;
+        logit_adjustment.check().map_err(anyhow::Error::msg)
     }
 
     /// Lets the critic's advantages count so much from now on; 0: the policy decides alone.
     ///
     /// # Errors
     /// When that is no weight, or there is no critic.
-    pub fn set_weighing(&mut self, weight: f32) -> anyhow::Result<()> {
-        self.weighing = (weight != 0.0).then_some(weight);
-        self.check_weighing()
+    pub fn set_advantage_scale(&mut self, weight: f32) -> anyhow::Result<()> {
+        self.advantage_scale = (weight != 0.0).then_some(weight);
+        self.check_advantage_scale()
     }
 
-    fn check_weighing(&self) -> anyhow::Result<()> {
-        let Some(weight) = self.weighing else { return Ok(()) };
-        anyhow::ensure!(weight.is_finite() && weight > 0.0, "weighing is {weight}, which is no weight");
-        anyhow::ensure!(self.critic.is_some(), "weighing needs a critic, and there is none");
+    fn check_advantage_scale(&self) -> anyhow::Result<()> {
+        let Some(weight) = self.advantage_scale else { return Ok(()) };
+        anyhow::ensure!(weight.is_finite() && weight > 0.0, "advantage_scale is {weight}, which is no weight");
+        anyhow::ensure!(self.critic.is_some(), "advantage_scale needs a critic, and there is none");
         Ok(())
     }
 
     /// How values weigh the policy.
-    pub fn weighing<'a>(&self, values: Option<&'a Values>) -> Option<Weighing<'a>> {
-        values.zip(self.weighing).map(|(values, weight)| Weighing { values, weight })
+    pub fn advantage_scale<'a>(&self, values: Option<&'a Values>) -> Option<AdvantageScale<'a>> {
+        values.zip(self.advantage_scale).map(|(values, weight)| AdvantageScale { values, weight })
     }
 
     /// Features in each of the 7 x 7 places of a map.
@@ -289,10 +289,10 @@ impl Config {
             "an agent sees through either visual or resnet18, not both or none"
         );
         self.check_words()?;
-        if let Some(balance) = &self.balance {
-            balance.check().map_err(anyhow::Error::msg)?;
+        if let Some(logit_adjustment) = &self.logit_adjustment {
+            logit_adjustment.check().map_err(anyhow::Error::msg)?;
         }
-        self.check_weighing()
+        self.check_advantage_scale()
     }
 
     /// An agent that attends to words has a number for each that it knows, and neither a critic nor a goal to be shown.
@@ -335,8 +335,8 @@ pub(super) mod tests {
             method: None,
             critic: None,
             words: None,
-            balance: None,
-            weighing: None,
+            logit_adjustment: None,
+            advantage_scale: None,
             sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
             provenance: Provenance {
                 preset: "test".into(),

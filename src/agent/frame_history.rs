@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tch::Tensor;
 
-use super::loop_guard::Rounds;
+use super::loop_guard::LoopGuard;
 use super::policy::Decision;
 use super::select::{self, Heads, Selection};
 use crate::house::view::Candidate;
@@ -18,34 +18,34 @@ pub type SharedEmbedder = Arc<Mutex<Embedder>>;
 
 /// The last frames, what would lead in rounds, what was told, and chance.
 #[derive(Debug)]
-pub struct Memory {
+pub struct FrameHistory {
     /// The maps of the last frames, oldest first, and the step that the last one belongs to.
     seen: VecDeque<Tensor>,
     seen_at: Option<u32>,
     last_image: Vec<u8>,
-    rounds: Rounds,
+    rounds: LoopGuard,
     /// The instruction that was read last, with what the networks take for it.
     read: Option<(String, Tensor)>,
     rng: ChaCha8Rng,
 }
 
-impl Default for Memory {
-    fn default() -> Memory {
-        Memory {
+impl Default for FrameHistory {
+    fn default() -> FrameHistory {
+        FrameHistory {
             seen: VecDeque::new(),
             seen_at: None,
             last_image: Vec::new(),
-            rounds: Rounds::default(),
+            rounds: LoopGuard::default(),
             read: None,
             rng: ChaCha8Rng::seed_from_u64(0),
         }
     }
 }
 
-impl Clone for Memory {
+impl Clone for FrameHistory {
     /// The maps and what was told are shared, not copied: nothing ever writes into them.
-    fn clone(&self) -> Memory {
-        Memory {
+    fn clone(&self) -> FrameHistory {
+        FrameHistory {
             seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
             seen_at: self.seen_at,
             last_image: self.last_image.clone(),
@@ -56,12 +56,12 @@ impl Clone for Memory {
     }
 }
 
-impl Memory {
+impl FrameHistory {
     /// Forgets the past: a new episode starts.
     pub fn begin(&mut self, seed: u64) {
         self.seen.clear();
         self.last_image.clear();
-        self.rounds = Rounds::default();
+        self.rounds = LoopGuard::default();
         self.seen_at = None;
         // The next episode's goal may look different, whatever its instruction.
         self.read = None;
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn nothing_that_leads_in_rounds_is_chosen_until_another_instruction_is_given() {
         use ActionType::{MoveAhead, RotateLeft, RotateRight};
-        let mut memory = Memory::default();
+        let mut memory = FrameHistory::default();
         memory.begin(1);
         let mut leave = |text: &str, step: u32| {
             drop(memory.told(text, || Ok(map(0.0))).unwrap());
@@ -156,14 +156,14 @@ mod tests {
 
     #[test]
     fn a_copy_goes_on_exactly_as_the_original_does() {
-        let mut memory = Memory::default();
+        let mut memory = FrameHistory::default();
         memory.begin(5);
         for step in 0..3u8 {
             memory.look(&[step], u32::from(step));
             let _ = memory.observe(map(f32::from(step)), u32::from(step), 5);
         }
         let copy = memory.clone();
-        let go_on = |mut memory: Memory| {
+        let go_on = |mut memory: FrameHistory| {
             let mut trace = Vec::new();
             for step in 3..12u8 {
                 memory.look(&[step / 4], u32::from(step));

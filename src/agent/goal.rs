@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 
-use super::policy::Situation;
+use super::policy::Observation;
 use crate::domain::World;
 use crate::house::House;
 use crate::house::expert::Expert;
@@ -16,7 +16,7 @@ const LONGEST: usize = 1000;
 ///
 /// # Errors
 /// When there is no task, or the expert sees no way.
-pub fn end_states(situation: &Situation<'_>, count: usize) -> anyhow::Result<Vec<World>> {
+pub fn end_states(situation: &Observation<'_>, count: usize) -> anyhow::Result<Vec<World>> {
     let grader = situation.grader.context("the agent is shown its goal, which a task has; it reads no instructions")?;
     let (mut grader, mut expert) = (grader.clone(), Expert::new());
     let mut house = House::new(Arc::clone(situation.house.scene()), situation.house.world().clone());

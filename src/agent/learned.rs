@@ -8,9 +8,9 @@ use tch::{Device, Tensor};
 use super::checkpoint::Networks;
 use super::conditioning;
 use super::config::Config;
-use super::frame_history::Memory;
+use super::frame_history::FrameHistory;
 pub use super::frame_history::SharedEmbedder;
-use super::policy::{Carried, Decision, Policy, Reading, Situation};
+use super::policy::{Decision, Observation, Policy, PolicyState, Reading};
 use super::select::Heads;
 use super::value_estimates::Values;
 use crate::nets::frozen::FrameEncoder;
@@ -25,7 +25,7 @@ pub struct LearnedPolicy {
     pub(super) sentences: SharedEmbedder,
     pub(super) device: Device,
     pub(super) samples: bool,
-    pub(super) memory: Memory,
+    pub(super) memory: FrameHistory,
 }
 
 impl LearnedPolicy {
@@ -56,7 +56,7 @@ impl LearnedPolicy {
         device: Device,
     ) -> anyhow::Result<LearnedPolicy> {
         let sight = networks.eyes.frozen()?;
-        let memory = Memory::default();
+        let memory = FrameHistory::default();
         Ok(LearnedPolicy { name, config, networks, sight, sentences, device, samples: false, memory })
     }
 
@@ -66,7 +66,7 @@ impl LearnedPolicy {
     }
 
     /// The last frames' maps as one observation, and what the agent is told.
-    fn perceive(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
+    fn perceive(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
         let image = self.sight.image(situation.house.frame());
         let map = self.memory.map_of(&image).unwrap_or_else(|| self.sight.encode(std::slice::from_ref(&image)));
         self.memory.look(&image, situation.step);
@@ -85,24 +85,28 @@ impl Policy for LearnedPolicy {
         self.memory.begin(seed);
     }
 
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
         let (observation, told) = self.perceive(situation)?;
         let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &told, false));
         let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
         let (mut actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
-        self.config.balance(&mut actions);
+        self.config.logit_adjustment(&mut actions);
         let candidates = situation.house.candidates();
         let values = self.networks.advice(&self.config, &observation, &told, &candidates)?;
-        let heads = Heads { actions: &actions, objects: &objects, weighing: self.config.weighing(values.as_ref()) };
+        let heads = Heads {
+            actions: &actions,
+            objects: &objects,
+            advantage_scale: self.config.advantage_scale(values.as_ref()),
+        };
         Ok(self.memory.decide(&heads, &candidates, self.samples))
     }
 
-    fn carried(&self) -> Carried {
-        Carried::Frames(Box::new(self.memory.clone()))
+    fn carried(&self) -> PolicyState {
+        PolicyState::Frames(Box::new(self.memory.clone()))
     }
 
-    fn put_back(&mut self, carried: Carried) {
-        if let Carried::Frames(memory) = carried {
+    fn put_back(&mut self, carried: PolicyState) {
+        if let PolicyState::Frames(memory) = carried {
             self.memory = *memory;
         }
     }
@@ -115,7 +119,7 @@ impl Policy for LearnedPolicy {
         conditioning::reading(instruction, &self.config, &self.sentences)
     }
 
-    fn values(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
+    fn values(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {
         if self.networks.critic.is_none() {
             return Ok(None);
         }
@@ -174,7 +178,7 @@ mod tests {
         let Some(mut agent) = agent(None) else { return };
         agent.begin(1);
         let mut house = kitchen_house();
-        let mut situation = Situation { house: &mut house, instruction: "take the mug", step: 0, grader: None };
+        let mut situation = Observation { house: &mut house, instruction: "take the mug", step: 0, grader: None };
         let decision = agent.decide(&mut situation).unwrap();
         let values = agent.values(&mut situation).unwrap().unwrap();
         assert_eq!(agent.decide(&mut situation).unwrap().action, decision.action);
@@ -203,7 +207,7 @@ mod tests {
         agent.begin(1);
         let mut house = kitchen_house();
         let mut decide = |grader: Option<&Grader>| {
-            agent.decide(&mut Situation { house: &mut house, instruction: "", step: 0, grader }).map(|_| ())
+            agent.decide(&mut Observation { house: &mut house, instruction: "", step: 0, grader }).map(|_| ())
         };
         assert!(decide(None).unwrap_err().to_string().contains("which a task has"));
         let grader = Grader::new(Grading::default(), &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);

@@ -9,14 +9,14 @@ use crate::domain::ActionType;
 /// How often each action was shown, and how much of that is taken off when an agent decides.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Balance {
+pub struct LogitAdjustment {
     /// The share of the log shares that is taken off: 0 none, 1 all, as if every action had been shown alike.
     pub strength: f32,
     /// Each action's share of the labels, in the order of the action head; 0 where it never was.
     pub shares: Vec<f32>,
 }
 
-impl Balance {
+impl LogitAdjustment {
     /// Takes what is frequent off the logits of the action head; those of the most frequent action stay as they are, since
     /// only differences count, and so does one that was never shown, of which nothing is known.
     pub fn apply(&self, logits: &mut [f32]) {
@@ -34,14 +34,14 @@ impl Balance {
     /// When the strength is no share, or there is not one share for each action.
     pub fn check(&self) -> Result<(), String> {
         if !(0.0..=1.0).contains(&self.strength) {
-            return Err(format!("balance.strength is {}, which is not a share", self.strength));
+            return Err(format!("logit_adjustment.strength is {}, which is not a share", self.strength));
         }
         let (found, wanted) = (self.shares.len(), ActionType::COUNT);
         if found != wanted {
-            return Err(format!("balance.shares has {found} numbers, not {wanted}"));
+            return Err(format!("logit_adjustment.shares has {found} numbers, not {wanted}"));
         }
         match self.shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-            Some(share) => Err(format!("balance.shares has {share}, which is not a share")),
+            Some(share) => Err(format!("logit_adjustment.shares has {share}, which is not a share")),
             None => Ok(()),
         }
     }
@@ -51,21 +51,21 @@ impl Balance {
 mod tests {
     use super::*;
 
-    fn balance(strength: f32) -> Balance {
+    fn logit_adjustment(strength: f32) -> LogitAdjustment {
         let mut shares = vec![0.05; ActionType::COUNT];
         shares[0] = 0.45;
-        Balance { strength, shares }
+        LogitAdjustment { strength, shares }
     }
 
     /// Logits of an agent that knows nothing but how often actions were shown.
     fn knowing_only_shares() -> Vec<f32> {
-        balance(0.0).shares.iter().map(|share| share.ln()).collect()
+        logit_adjustment(0.0).shares.iter().map(|share| share.ln()).collect()
     }
 
     #[test]
     fn at_full_strength_what_is_merely_frequent_counts_for_nothing() {
         let mut logits = knowing_only_shares();
-        balance(1.0).apply(&mut logits);
+        logit_adjustment(1.0).apply(&mut logits);
         assert!(logits.iter().all(|logit| (logit - logits[0]).abs() < 1e-6), "{logits:?}");
     }
 
@@ -75,19 +75,19 @@ mod tests {
         let with_evidence = |strength| {
             let mut logits = knowing_only_shares();
             logits[1] += 1.0;
-            balance(strength).apply(&mut logits);
+            logit_adjustment(strength).apply(&mut logits);
             logits
         };
         assert!(with_evidence(0.0)[1] < with_evidence(0.0)[0]);
         assert!(with_evidence(0.6)[1] > with_evidence(0.6)[0]);
         let mut untouched = knowing_only_shares();
-        balance(0.0).apply(&mut untouched);
+        logit_adjustment(0.0).apply(&mut untouched);
         assert_eq!(untouched, knowing_only_shares());
     }
 
     #[test]
     fn an_action_that_was_never_shown_gains_nothing() {
-        let mut unseen = balance(1.0);
+        let mut unseen = logit_adjustment(1.0);
         unseen.shares[3] = 0.0;
         let mut logits = vec![0.0; ActionType::COUNT];
         unseen.apply(&mut logits);
@@ -98,11 +98,12 @@ mod tests {
 
     #[test]
     fn what_no_training_could_have_seen_is_refused_in_words() {
-        balance(0.4).check().unwrap();
-        let refused = |strength, shares: &[f32]| Balance { strength, shares: shares.to_vec() }.check().unwrap_err();
-        assert_eq!(refused(1.5, &[0.1; 12]), "balance.strength is 1.5, which is not a share");
-        assert_eq!(refused(f32::NAN, &[0.1; 12]), "balance.strength is NaN, which is not a share");
-        assert_eq!(refused(0.5, &[0.1; 11]), "balance.shares has 11 numbers, not 12");
-        assert_eq!(refused(0.5, &[-0.5; 12]), "balance.shares has -0.5, which is not a share");
+        logit_adjustment(0.4).check().unwrap();
+        let refused =
+            |strength, shares: &[f32]| LogitAdjustment { strength, shares: shares.to_vec() }.check().unwrap_err();
+        assert_eq!(refused(1.5, &[0.1; 12]), "logit_adjustment.strength is 1.5, which is not a share");
+        assert_eq!(refused(f32::NAN, &[0.1; 12]), "logit_adjustment.strength is NaN, which is not a share");
+        assert_eq!(refused(0.5, &[0.1; 11]), "logit_adjustment.shares has 11 numbers, not 12");
+        assert_eq!(refused(0.5, &[-0.5; 12]), "logit_adjustment.shares has -0.5, which is not a share");
     }
 }

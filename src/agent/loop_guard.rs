@@ -16,7 +16,7 @@ type Way = (ActionType, Option<Class>);
 ///   the agent stands before, a round that it goes, a door that it opens and shuts.
 /// * What it has put down it does not take up again before it has acted on something else.
 #[derive(Clone, Debug, Default)]
-pub struct Rounds {
+pub struct LoopGuard {
     /// How each view was left since something was last moved, by the view's digest.
     left_by: HashMap<u64, Vec<Way>>,
     last: Option<(ActionType, Option<Candidate>)>,
@@ -24,7 +24,7 @@ pub struct Rounds {
     put_down: Option<Instance>,
 }
 
-impl Rounds {
+impl LoopGuard {
     /// Another instruction may lead the same way again.
     pub fn allow_all(&mut self) {
         self.left_by.clear();
@@ -85,7 +85,7 @@ mod tests {
 
     #[derive(Default)]
     struct Walk {
-        rounds: Rounds,
+        rounds: LoopGuard,
         view: Vec<u8>,
     }
 

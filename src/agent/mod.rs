@@ -21,7 +21,7 @@ pub mod team;
 pub use batch::LearnedTeam;
 pub use experts::expert::ExpertPolicy;
 pub use learned::LearnedPolicy;
-pub use policy::{Carried, Decision, Mind, Policy, Reading, Situation};
+pub use policy::{ActionDistribution, Decision, Observation, Policy, PolicyState, Reading};
 pub use random::RandomPolicy;
 pub use team::{Solo, Team};
 pub use value_estimates::Values;

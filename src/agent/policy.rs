@@ -2,7 +2,7 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::frame_history::Memory;
+use super::frame_history::FrameHistory;
 use super::value_estimates::Values;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::expert::Plan;
@@ -11,7 +11,7 @@ use crate::house::session::House;
 use crate::house::view::Candidate;
 
 /// What a policy decides from.
-pub struct Situation<'a> {
+pub struct Observation<'a> {
     /// The house; looking draws the frame once.
     pub house: &'a mut House,
     /// What is asked.
@@ -28,12 +28,12 @@ pub struct Decision {
     /// What to do.
     pub action: Action,
     /// The distribution behind it, where the policy has one.
-    pub mind: Option<Mind>,
+    pub mind: Option<ActionDistribution>,
 }
 
 /// A policy's distribution over what it could do now.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mind {
+pub struct ActionDistribution {
     /// Probability of each action in the order of [`ActionType::ALL`], balanced, weighed and masked; `None` where masked.
     pub actions: [Option<f32>; ActionType::COUNT],
     /// Object classes by falling probability (before restriction to candidates and weighing), with whether one of that class
@@ -47,7 +47,7 @@ pub struct Mind {
     pub greedy: Action,
 }
 
-impl Mind {
+impl ActionDistribution {
     /// The distribution over everything that could be done now: navigation, and each interaction with each class that is a
     /// candidate of it, in the order of actions. Sums to 1.
     pub fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
@@ -89,7 +89,7 @@ pub struct Reading {
 
 /// What a policy carries from one step to the next. Put back, it decides as it did then, bit for bit.
 #[derive(Clone, Debug, Default)]
-pub enum Carried {
+pub enum PolicyState {
     /// Nothing.
     #[default]
     Nothing,
@@ -98,7 +98,7 @@ pub enum Carried {
     /// What it is about to do.
     Plan(Box<Plan>),
     /// The last frames, and its chance.
-    Frames(Box<Memory>),
+    Frames(Box<FrameHistory>),
 }
 
 /// Something that acts: a trained agent, the expert, chance.
@@ -113,15 +113,15 @@ pub trait Policy: Send {
     ///
     /// # Errors
     /// When the policy cannot go on (the expert sees no way, a forward pass fails); the episode then ends with that reason.
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision>;
+    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision>;
 
     /// What it carries now.
-    fn carried(&self) -> Carried {
-        Carried::Nothing
+    fn carried(&self) -> PolicyState {
+        PolicyState::Nothing
     }
 
     /// Takes back what it carried at another step.
-    fn put_back(&mut self, _carried: Carried) {}
+    fn put_back(&mut self, _carried: PolicyState) {}
 
     /// Whether it draws its actions by chance instead of taking the likeliest, where it can do either.
     fn set_sampling(&mut self, _samples: bool) {}
@@ -135,7 +135,7 @@ pub trait Policy: Send {
     ///
     /// # Errors
     /// When a forward pass fails.
-    fn values(&mut self, _situation: &mut Situation<'_>) -> anyhow::Result<Option<Values>> {
+    fn values(&mut self, _situation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {
         Ok(None)
     }
 }

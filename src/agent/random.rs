@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::policy::{Carried, Decision, Mind, Policy, Situation};
+use super::policy::{ActionDistribution, Decision, Observation, Policy, PolicyState};
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{self, Candidate};
 
@@ -44,7 +44,7 @@ impl Policy for RandomPolicy {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
     }
 
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
         let candidates = situation.house.candidates();
         let possible: Vec<ActionType> = ActionType::ALL
             .into_iter()
@@ -56,7 +56,7 @@ impl Policy for RandomPolicy {
         let target = named.choose(&mut self.rng).and_then(|&class| view::nearest(&candidates, kind, class));
         let action = Action { kind, target: target.map(|candidate| candidate.instance) };
         let chance = 1.0 / possible.len() as f32;
-        let mind = Mind {
+        let mind = ActionDistribution {
             actions: ActionType::ALL.map(|kind| possible.contains(&kind).then_some(chance)),
             objects: named.iter().map(|&class| (class, 1.0 / named.len() as f32, true)).collect(),
             choices: Vec::new(),
@@ -66,12 +66,12 @@ impl Policy for RandomPolicy {
         Ok(Decision { action, mind: Some(mind) })
     }
 
-    fn carried(&self) -> Carried {
-        Carried::Chance(Box::new(self.rng.clone()))
+    fn carried(&self) -> PolicyState {
+        PolicyState::Chance(Box::new(self.rng.clone()))
     }
 
-    fn put_back(&mut self, carried: Carried) {
-        if let Carried::Chance(rng) = carried {
+    fn put_back(&mut self, carried: PolicyState) {
+        if let PolicyState::Chance(rng) = carried {
             self.rng = *rng;
         }
     }
@@ -88,7 +88,7 @@ mod tests {
         let mut house = kitchen_house();
         let mut interactions = 0;
         for _ in 0..150 {
-            let mut situation = Situation { house: &mut house, instruction: "", step: 0, grader: None };
+            let mut situation = Observation { house: &mut house, instruction: "", step: 0, grader: None };
             let action = policy.decide(&mut situation).unwrap().action;
             let outcome = house.step(action);
             if action.target.is_some() {

@@ -6,8 +6,8 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::policy::{Decision, Mind};
-use super::value_estimates::Weighing;
+use super::policy::{ActionDistribution, Decision};
+use super::value_estimates::AdvantageScale;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
 
@@ -27,18 +27,18 @@ pub struct Heads<'a> {
     /// Logits of the 82 classes.
     pub objects: &'a [f32],
     /// What the critic has to say; absent where the policy decides alone.
-    pub weighing: Option<Weighing<'a>>,
+    pub advantage_scale: Option<AdvantageScale<'a>>,
 }
 
 impl<'a> Heads<'a> {
     /// A policy's logits alone.
     pub fn of(actions: &'a [f32], objects: &'a [f32]) -> Heads<'a> {
-        Heads { actions, objects, weighing: None }
+        Heads { actions, objects, advantage_scale: None }
     }
 
     fn factor(&self, kind: ActionType, class: Option<usize>) -> f32 {
         let class = class.and_then(Class::from_index);
-        self.weighing.map_or(1.0, |weighing| weighing.factor(kind, class))
+        self.advantage_scale.map_or(1.0, |advantage_scale| advantage_scale.factor(kind, class))
     }
 }
 
@@ -65,7 +65,7 @@ pub fn decide(heads: &Heads<'_>, candidates: &[Candidate], tried: &[ActionType],
         probabilities[index] = Some(share);
     }
     let entropy = -shares.iter().filter(|&&p| p > 0.0).map(|p| p * p.ln()).sum::<f32>();
-    let mind = Mind {
+    let mind = ActionDistribution {
         actions: probabilities,
         objects: ranking(heads.objects, candidates, shown, &open, &shares),
         choices: open.iter().flat_map(|&index| choices(ActionType::ALL[index], heads, candidates)).collect(),
@@ -278,11 +278,11 @@ mod tests {
         };
         let (logits, classes) = ([0.0; ActionType::COUNT], [0.0; Class::VOCABULARY]);
         let alone = Heads::of(&logits, &classes);
-        let weighed = Heads { weighing: Some(Weighing { values: &values, weight: 1.0 }), ..alone };
+        let weighed = Heads { advantage_scale: Some(AdvantageScale { values: &values, weight: 1.0 }), ..alone };
         let [before, after] = [alone, weighed].map(|heads| decide(&heads, &candidates, &[], Selection::Greedy).mind);
         let (before, after) = (before.unwrap(), after.unwrap());
         let times = |kind: ActionType| {
-            let odds = |mind: &Mind| mind.actions[kind.index()].unwrap() / mind.actions[1].unwrap();
+            let odds = |mind: &ActionDistribution| mind.actions[kind.index()].unwrap() / mind.actions[1].unwrap();
             odds(&after) / odds(&before)
         };
         assert!(
@@ -300,7 +300,11 @@ mod tests {
         let taken = |index| Action::interact(ActionType::Pickup, Instance::Object(index));
         assert_eq!((pick(&alone), pick(&weighed)), (taken(4), taken(4)));
         let mug = objects("Mug");
-        let weight = |weight| Heads { objects: &mug, weighing: Some(Weighing { values: &values, weight }), ..alone };
+        let weight = |weight| Heads {
+            objects: &mug,
+            advantage_scale: Some(AdvantageScale { values: &values, weight }),
+            ..alone
+        };
         assert_eq!(
             [1.0, 9.0].map(|times| pick(&weight(times))),
             [taken(3), taken(4)],

@@ -1,6 +1,6 @@
 //! The seam between the evaluator and whatever acts in several episodes at once.
 
-use super::policy::{Decision, Policy, Situation};
+use super::policy::{Decision, Observation, Policy};
 
 /// A decision for each situation; `None` where a seat is empty.
 pub type Decisions = Vec<Option<anyhow::Result<Decision>>>;
@@ -21,7 +21,7 @@ pub trait Team: Send {
     ///
     /// # Errors
     /// Where all fail together (a forward pass); a seat's own failure is in its place among the decisions.
-    fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions>;
+    fn decide(&mut self, situations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions>;
 }
 
 /// A policy that acts in one episode at a time.
@@ -40,7 +40,7 @@ impl Team for Solo {
         self.0.begin(seed);
     }
 
-    fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+    fn decide(&mut self, situations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
         Ok(situations.iter_mut().map(|situation| situation.as_mut().map(|here| self.0.decide(here))).collect())
     }
 }

@@ -49,7 +49,7 @@ impl Values {
             (kind.index() as i64, class.map_or(0, |class| class.index() as i64))
         };
         let pairs: Vec<(i64, i64)> = possible.iter().map(index).collect();
-        let (value, q) = critic.appraise(observation, told, &pairs);
+        let (value, q) = critic.evaluate_actions(observation, told, &pairs);
         let q = Vec::<f32>::try_from(q.to_device(Device::Cpu))?;
         let choices = possible.into_iter().zip(q).map(|((kind, class), q)| ChoiceValue { kind, class, q }).collect();
         Ok(Values { state: value.double_value(&[0]) as f32, choices })
@@ -70,14 +70,14 @@ impl Values {
 /// as the weight that is where its policy extraction ends: the best of its loss is the demonstrated policy times exp(temperature
 /// x A) (Peng et al., 2019, equation 9), which a network of few updates is far from.
 #[derive(Clone, Copy, Debug)]
-pub struct Weighing<'a> {
+pub struct AdvantageScale<'a> {
     /// The values.
     pub values: &'a Values,
     /// How much they count.
     pub weight: f32,
 }
 
-impl Weighing<'_> {
+impl AdvantageScale<'_> {
     /// How many times as likely a choice becomes; 1 where nothing is known of it.
     pub fn factor(&self, kind: ActionType, class: Option<Class>) -> f32 {
         self.values.advantage(kind, class).map_or(1.0, |advantage| (self.weight * advantage).exp())

@@ -52,15 +52,15 @@ const BASE: &str = "";
 /// Equation 4: A told z_B.
 pub(super) const CHAIN: &str = "chain";
 /// Equation 5: A told "A. B.".
-pub(super) const LEAD: &str = "lead";
+pub(super) const AGG_A: &str = "lead";
 /// Equation 5: B told "A. B.".
-const FOLLOW: &str = "follow";
+const AGG_B: &str = "follow";
 
 /// A part to be: its name and weight, the transitions, what they are told, and where they end.
 type Row<'a> = (&'static str, f64, &'a Transitions, &'a Tensor, &'a Tensor);
 
 /// Items that are averaged by themselves.
-pub(super) struct Part {
+pub(super) struct Segment {
     /// Which it is; empty for the base.
     pub name: &'static str,
     start: i64,
@@ -69,7 +69,7 @@ pub(super) struct Part {
     pub weight: f64,
 }
 
-impl Part {
+impl Segment {
     /// This part of a tensor over all items.
     pub fn of(&self, all: &Tensor) -> Tensor {
         all.narrow(0, self.start, self.len)
@@ -92,7 +92,7 @@ impl Part {
 }
 
 /// The items of several parts, one after the other.
-pub(super) fn of_all(parts: &[&Part], all: &Tensor) -> Tensor {
+pub(super) fn of_all(parts: &[&Segment], all: &Tensor) -> Tensor {
     let adjacent = parts.windows(2).all(|pair| pair[0].end() == pair[1].start);
     match parts.first() {
         Some(first) if adjacent => all.narrow(0, first.start, parts.iter().map(|part| part.len).sum()),
@@ -102,7 +102,7 @@ pub(super) fn of_all(parts: &[&Part], all: &Tensor) -> Tensor {
 
 impl Batch {
     /// The batch and its relabelled copies, one after the other, seen with `precision`.
-    pub(super) fn relabelled(&self, chaining: Option<&Chaining>, precision: Precision) -> (Transitions, Vec<Part>) {
+    pub(super) fn relabelled(&self, chaining: Option<&Chaining>, precision: Precision) -> (Transitions, Vec<Segment>) {
         let base = &self.base;
         let mut rows: Vec<Row<'_>> = vec![(BASE, 1.0, base, &base.told, &base.terminal)];
         if let (Some(pairs), Some(chaining)) = (&self.pairs, chaining) {
@@ -110,8 +110,8 @@ impl Batch {
             rows.push((CHAIN, share * chaining.chain, first, &first.told, &pairs.cut));
             if let Some((told, second)) = &pairs.joint {
                 let share = share * chaining.aggregate / 2.0;
-                rows.push((LEAD, share, first, told, &first.terminal));
-                rows.push((FOLLOW, share, second, &second.told, &second.terminal));
+                rows.push((AGG_A, share, first, told, &first.terminal));
+                rows.push((AGG_B, share, second, &second.told, &second.terminal));
             }
         }
         let cat = |of: &dyn Fn(&Row<'_>) -> Tensor| match &rows[..] {
@@ -133,7 +133,7 @@ impl Batch {
         let part = |&(name, weight, _, _, terminal): &Row<'_>| {
             let len = terminal.size()[0];
             start += len;
-            Part { name, start: start - len, len, weight }
+            Segment { name, start: start - len, len, weight }
         };
         let parts = rows.iter().map(part).collect();
         (all, parts)

@@ -6,7 +6,7 @@ use crate::nets::policy::Logits;
 
 /// How surprising each item's demonstration is, both [n]; the second is 0 where no class is to be named.
 #[derive(Debug)]
-pub struct Surprise {
+pub struct NegLogLikelihood {
     /// Cross-entropy of the action head.
     pub action: Tensor,
     /// Cross-entropy of the object head.
@@ -14,11 +14,11 @@ pub struct Surprise {
 }
 
 /// How well `logits` tell the demonstrated `actions` [n] and the `named` classes [n] (indices, 0 for none).
-pub fn surprise(logits: &Logits, actions: &Tensor, named: &Tensor) -> Surprise {
+pub fn surprise(logits: &Logits, actions: &Tensor, named: &Tensor) -> NegLogLikelihood {
     let of = |logits: &Tensor, labels: &Tensor| {
         -logits.log_softmax(-1, Kind::Float).gather(1, &labels.unsqueeze(1), false).squeeze_dim(1)
     };
-    Surprise { action: of(&logits.actions, actions), object: of(&logits.objects, named) * naming(named) }
+    NegLogLikelihood { action: of(&logits.actions, actions), object: of(&logits.objects, named) * naming(named) }
 }
 
 /// 1 where a class is to be named, [n].

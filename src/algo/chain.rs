@@ -15,7 +15,7 @@ pub struct Chaining {
     /// Which transitions of A equation 4 ends at.
     pub cut: Cut,
     /// What stands for the worth of a state to B.
-    pub worth: Worth,
+    pub worth: Bootstrap,
     /// Whether the worth is clipped to 0..1, where every return lies.
     pub clip: bool,
     /// What the policy learns from; the critic learns from both equations.
@@ -87,7 +87,7 @@ impl Cut {
 /// What stands for the worth of the state that A ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Worth {
+pub enum Bootstrap {
     /// V(s′, z_B): of the state after A's last action. The paper's implementation.
     NextValue,
     /// V(s, z_B): of the state before it.
@@ -98,23 +98,23 @@ pub enum Worth {
 
 /// A transition's reward and whether it ends the episode, both [n].
 #[derive(Debug)]
-pub struct Ends {
+pub struct RewardDone {
     /// r.
     pub reward: Tensor,
     /// d, 0 or 1.
     pub terminal: Tensor,
 }
 
-impl Ends {
+impl RewardDone {
     /// A demonstrated skill: reward 1 on the transition into the span's last state, which ends it. Also equation 5's B.
-    pub fn of_skill(terminal: &Tensor) -> Ends {
-        Ends { reward: terminal.shallow_clone(), terminal: terminal.shallow_clone() }
+    pub fn of_skill(terminal: &Tensor) -> RewardDone {
+        RewardDone { reward: terminal.shallow_clone(), terminal: terminal.shallow_clone() }
     }
 
     /// Equation 4: A told z_B, cut where `cut` is 1; the cut is worth what B can make of it. Equation 5's A, told "A. B.": the
     /// cut is the span's own end.
-    pub fn chained(cut: &Tensor, worth: &Tensor) -> Ends {
-        Ends { reward: cut * worth, terminal: cut.shallow_clone() }
+    pub fn chained(cut: &Tensor, worth: &Tensor) -> RewardDone {
+        RewardDone { reward: cut * worth, terminal: cut.shallow_clone() }
     }
 }
 
@@ -133,9 +133,9 @@ mod tests {
     #[test]
     fn rewards_by_hand() {
         let (d, worth) = (Tensor::from_slice(&[0.0f32, 1.0, 1.0]), Tensor::from_slice(&[0.7f32, 1.3, 0.4]));
-        let base = Ends::of_skill(&d);
+        let base = RewardDone::of_skill(&d);
         assert_eq!(Vec::<f32>::try_from(base.reward).unwrap(), [0.0, 1.0, 1.0]);
-        let chained = Ends::chained(&d, &as_reward(&worth, true));
+        let chained = RewardDone::chained(&d, &as_reward(&worth, true));
         assert_eq!(Vec::<f32>::try_from(chained.reward).unwrap(), [0.0, 1.0, 0.4]);
         assert_eq!(Vec::<f32>::try_from(as_reward(&worth, false)).unwrap(), [0.7, 1.3, 0.4]);
     }
@@ -165,14 +165,15 @@ mod tests {
         let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 1.0).unwrap();
         for _ in 0..200 {
             let worth = as_reward(&at(&value, &row(first, 1), 1), true);
-            let mut parts = vec![(row(first, 0), Ends::of_skill(&ends)), (row(second, 1), Ends::of_skill(&ends))];
+            let mut parts =
+                vec![(row(first, 0), RewardDone::of_skill(&ends)), (row(second, 1), RewardDone::of_skill(&ends))];
             if chaining {
-                parts.push((row(first, 1), Ends::chained(&ends, &worth)));
-                parts.push((row(first, 2), Ends::chained(&ends, &worth)));
-                parts.push((row(second, 2), Ends::of_skill(&ends)));
+                parts.push((row(first, 1), RewardDone::chained(&ends, &worth)));
+                parts.push((row(first, 2), RewardDone::chained(&ends, &worth)));
+                parts.push((row(second, 2), RewardDone::of_skill(&ends)));
             }
             let mut loss = Tensor::from(0.0f32);
-            for (place, Ends { reward, terminal }) in &parts {
+            for (place, RewardDone { reward, terminal }) in &parts {
                 let target = iql::q_target(reward, terminal, &at(&value, place, 1), DISCOUNT);
                 loss += iql::q_loss(&at(&q, place, 0), &target).mean(Kind::Float);
                 loss += iql::value_loss(&at(&value, place, 0), &at(&q, place, 0), 0.5).mean(Kind::Float);

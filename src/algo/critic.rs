@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use tch::{Kind, Tensor, nn};
 
-use super::batch::{CHAIN, LEAD, Part, Transitions};
-use super::chain::{self, Chaining, Ends, Worth};
-use super::iql::{self, Iql, Tracking};
+use super::batch::{AGG_A, CHAIN, Segment, Transitions};
+use super::chain::{self, Bootstrap, Chaining, RewardDone};
+use super::iql::{self, Iql, PolyakTarget};
 use super::learner::{Learner, Optimisation};
 use super::terms::Terms;
-use crate::nets::critic::{Critic, Judgement};
+use crate::nets::critic::{Critic, CriticValues};
 use crate::nets::weights::{self, Tensors};
 
 /// The critic under training.
@@ -18,7 +18,7 @@ pub struct CriticLearner<'a> {
     target: &'a Critic,
     target_store: &'a nn::VarStore,
     learner: Learner<'a>,
-    tracking: Tracking,
+    tracking: PolyakTarget,
     iql: Iql,
 }
 
@@ -31,7 +31,7 @@ impl<'a> CriticLearner<'a> {
         iql: Iql,
         seed: u64,
     ) -> CriticLearner<'a> {
-        let mut tracking = Tracking::new(store, target_store);
+        let mut tracking = PolyakTarget::new(store, target_store);
         tracking.follow(1.0);
         CriticLearner { online, target, target_store, learner: Learner::new(store, optimisation, seed), tracking, iql }
     }
@@ -64,24 +64,24 @@ impl<'a> CriticLearner<'a> {
     }
 
     /// What it makes of them now.
-    pub(super) fn judge(&self, all: &Transitions, parts: &[Part], chaining: Option<&Chaining>) -> Judged {
+    pub(super) fn evaluate(&self, all: &Transitions, parts: &[Segment], chaining: Option<&Chaining>) -> Judged {
         let next = all.next.as_ref().unwrap_or(&all.observation);
-        let target_q = self.target.least_q(&all.observation, &all.told, &all.actions, &all.objects);
+        let target_q = self.target.min_q(&all.observation, &all.told, &all.actions, &all.objects);
         let next_value = self.online.value(next, &all.told);
-        let judgement = self.online.judge(&all.observation, &all.told, &all.actions, &all.objects);
+        let judgement = self.online.evaluate(&all.observation, &all.told, &all.actions, &all.objects);
         let worth = parts.iter().find(|part| part.name == CHAIN).zip(chaining).map(|(part, chaining)| {
             let worth = match chaining.worth {
-                Worth::NextValue => part.of(&next_value),
-                Worth::PresentValue => part.of(&judgement.baseline),
-                Worth::TargetQ => part.of(&target_q),
+                Bootstrap::NextValue => part.of(&next_value),
+                Bootstrap::PresentValue => part.of(&judgement.baseline),
+                Bootstrap::TargetQ => part.of(&target_q),
             };
             chain::as_reward(&worth, chaining.clip)
         });
         let rewards: Vec<Tensor> = parts
             .iter()
             .map(|part| match (part.name, &worth) {
-                (CHAIN | LEAD, Some(worth)) => Ends::chained(&part.of(&all.terminal), worth).reward,
-                _ => Ends::of_skill(&part.of(&all.terminal)).reward,
+                (CHAIN | AGG_A, Some(worth)) => RewardDone::chained(&part.of(&all.terminal), worth).reward,
+                _ => RewardDone::of_skill(&part.of(&all.terminal)).reward,
             })
             .collect();
         let bootstrap = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
@@ -93,7 +93,7 @@ impl<'a> CriticLearner<'a> {
 
 /// What the critic makes of all items.
 pub(super) struct Judged {
-    judgement: Judgement,
+    judgement: CriticValues,
     /// min Q̄.
     target_q: Tensor,
     /// r + (1 − d) γ V(s′).
@@ -107,11 +107,11 @@ pub(super) struct Judged {
 impl Judged {
     /// The losses of V and both Q, averaged part by part over what was taken, and weighed: what would have been right led
     /// nowhere, so the policy alone learns from it.
-    pub fn loss(&self, parts: &[Part], terms: &mut Terms) -> Tensor {
+    pub fn loss(&self, parts: &[Segment], terms: &mut Terms) -> Tensor {
         let value = iql::value_loss(&self.judgement.value, &self.target_q, self.expectile);
         let [one, other] = [0, 1].map(|k| iql::q_loss(&self.judgement.q[k], &self.bootstrap));
         let q = one + other;
-        let part_loss = |part: &Part| {
+        let part_loss = |part: &Segment| {
             let taken = part.of(&self.taken);
             let count = taken.sum(Kind::Float).clamp_min(1.0);
             let [value, q] = [&value, &q].map(|loss| (part.of(loss) * &taken).sum(Kind::Float) / &count);
@@ -123,7 +123,7 @@ impl Judged {
     }
 
     /// Weights and values, those of chaining by their parts' names.
-    pub fn describe(&self, parts: &[Part], numbers: &mut BTreeMap<String, f64>) {
+    pub fn describe(&self, parts: &[Segment], numbers: &mut BTreeMap<String, f64>) {
         let value = &self.judgement.baseline;
         for part in parts {
             let found = [

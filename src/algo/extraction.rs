@@ -2,7 +2,7 @@
 
 use tch::{Kind, Tensor};
 
-use super::batch::{CHAIN, Part, Transitions, of_all};
+use super::batch::{CHAIN, Segment, Transitions, of_all};
 use super::bc;
 use super::chain::{Chaining, Extracted, Normalised};
 use super::terms::Terms;
@@ -10,14 +10,14 @@ use crate::nets::policy::Logits;
 
 /// Parts that go through the policy together.
 pub(super) struct Pass<'a> {
-    parts: Vec<&'a Part>,
+    parts: Vec<&'a Segment>,
     /// Whether they are normalised by their own statistics, these are kept up, and units are dropped.
     pub train: bool,
 }
 
 impl<'a> Pass<'a> {
     /// What the policy learns from: the demonstrated items, the first of `parts`, and of the others what `chaining` says.
-    pub fn all(parts: &'a [Part], chaining: Option<&Chaining>) -> Vec<Pass<'a>> {
+    pub fn all(parts: &'a [Segment], chaining: Option<&Chaining>) -> Vec<Pass<'a>> {
         let (base, rest) = parts.split_at(1);
         let mut passes = vec![Pass { parts: base.iter().collect(), train: true }];
         let Some(chaining) = chaining else { return passes };
@@ -48,10 +48,10 @@ pub(super) fn loss(
     let weigh =
         |surprise: Tensor| weights.map_or_else(|| surprise.shallow_clone(), |weights| &surprise * pass.of(weights));
     let named = pass.of(&all.named);
-    let bc::Surprise { action, object } = bc::surprise(logits, &pass.of(&all.actions), &named);
+    let bc::NegLogLikelihood { action, object } = bc::surprise(logits, &pass.of(&all.actions), &named);
     let (action, object, naming) = (weigh(action), weigh(object), bc::naming(&named));
     let mut start = 0;
-    let part_loss = |part: &&Part| {
+    let part_loss = |part: &&Segment| {
         let of = |numbers: &Tensor| numbers.narrow(0, start, part.len());
         let action = of(&action).mean(Kind::Float);
         let object = of(&object).sum(Kind::Float) / of(&naming).sum(Kind::Float).clamp_min(1.0);

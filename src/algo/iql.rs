@@ -25,7 +25,7 @@ pub struct Iql {
     /// How many times the advantage enters the exponent by which the agent weighs its policy when it decides. The paper's
     /// agent decides by its policy alone: 0.
     #[serde(default)]
-    pub weighing: f64,
+    pub advantage_scale: f64,
 }
 
 impl Iql {
@@ -34,12 +34,14 @@ impl Iql {
     /// # Errors
     /// Names the field of `iql` that is out of its bounds.
     pub fn check(&self) -> anyhow::Result<()> {
-        let Iql { discount, expectile, temperature, weight_cap, target_rate, warmup_share, weighing } = *self;
+        let Iql { discount, expectile, temperature, weight_cap, target_rate, warmup_share, advantage_scale } = *self;
         for (field, share) in [("discount", discount), ("target_rate", target_rate), ("warmup_share", warmup_share)] {
             anyhow::ensure!((0.0..=1.0).contains(&share), "iql.{field} is {share}, which is not a share");
         }
         anyhow::ensure!(0.0 < expectile && expectile < 1.0, "iql.expectile is {expectile}, not between 0 and 1");
-        for (field, weight) in [("temperature", temperature), ("weight_cap", weight_cap), ("weighing", weighing)] {
+        for (field, weight) in
+            [("temperature", temperature), ("weight_cap", weight_cap), ("advantage_scale", advantage_scale)]
+        {
             anyhow::ensure!(weight.is_finite() && weight >= 0.0, "iql.{field} is {weight}, which is no weight");
         }
         Ok(())
@@ -70,17 +72,17 @@ pub fn advantage_weights(q: &Tensor, value: &Tensor, temperature: f64, cap: f64)
 }
 
 /// A target network that follows another one: Polyak averaging.
-pub struct Tracking {
+pub struct PolyakTarget {
     pairs: Vec<(Tensor, Tensor)>,
 }
 
-impl Tracking {
+impl PolyakTarget {
     /// Follows `online` with `target`, two stores of one network. Weights are averaged; statistics of batch norms, which are
     /// averages already, are copied.
-    pub fn new(online: &nn::VarStore, target: &nn::VarStore) -> Tracking {
+    pub fn new(online: &nn::VarStore, target: &nn::VarStore) -> PolyakTarget {
         let mut targets = target.variables();
         let pair = |(name, tensor): (String, Tensor)| Some((tensor, targets.remove(&name)?));
-        Tracking { pairs: online.variables().into_iter().filter_map(pair).collect() }
+        PolyakTarget { pairs: online.variables().into_iter().filter_map(pair).collect() }
     }
 
     /// Moves the target by `rate` of what separates it from the followed network.
@@ -215,7 +217,7 @@ mod tests {
             let _ = tch::no_grad(|| store.variables()["mean"].shallow_clone().fill_(value));
             store
         });
-        Tracking::new(&online, &target).follow(0.005);
+        PolyakTarget::new(&online, &target).follow(0.005);
         assert!((target.variables()["weight"].double_value(&[0]) - 1.005).abs() < 1e-6);
         assert_eq!(target.variables()["mean"].double_value(&[0]), 2.0);
     }

@@ -1,4 +1,4 @@
-//! One update, in the paper's order: relabel, judge, one policy step, one critic step, the target follows.
+//! One update, in the paper's order: relabel, evaluate, one policy step, one critic step, the target follows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -61,7 +61,7 @@ impl<'a> Update<'a> {
         self.learner.begin_step();
         let (all, parts) = batch.relabelled(self.chaining.as_ref(), self.precision);
         let mut terms = Terms::default();
-        let judged = self.critic.as_ref().map(|critic| critic.judge(&all, &parts, self.chaining.as_ref()));
+        let judged = self.critic.as_ref().map(|critic| critic.evaluate(&all, &parts, self.chaining.as_ref()));
         // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
         let (passes, weights) = match &self.critic {
             Some(critic) if critic.is_warming_up() => (Pass::all(&parts, None), None),
@@ -121,10 +121,10 @@ mod tests {
     use super::*;
     use crate::algo::adamw::AdamWConfig;
     use crate::algo::batch::{Pairs, Transitions};
-    use crate::algo::chain::{Cut, Extracted, Normalised, Pairs as Source, Worth};
+    use crate::algo::chain::{Bootstrap, Cut, Extracted, Normalised, Pairs as Source};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
-    use crate::nets::critic::{Critic, CriticSpec, Senses};
+    use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
     use crate::nets::policy::PolicySpec;
     use crate::nets::visual::SIDE;
 
@@ -161,7 +161,7 @@ mod tests {
             object_embedding: 2,
             shared_trunk: true,
         };
-        let senses = Senses { channels: STATES, told: TEXTS, goal: None };
+        let senses = CriticInputs { channels: STATES, told: TEXTS, goal: None };
         Nets {
             policy: PolicyNet::new(&policy_store.root(), &policy, STATES),
             store: policy_store,
@@ -177,14 +177,14 @@ mod tests {
         weight_cap: 100.0,
         target_rate: 0.05,
         warmup_share: 0.0,
-        weighing: 0.0,
+        advantage_scale: 0.0,
     };
 
     const CHAINING: Chaining = Chaining {
         pairs: Source::Pool(1),
         batch: 4,
         cut: Cut::Uniform,
-        worth: Worth::NextValue,
+        worth: Bootstrap::NextValue,
         clip: true,
         extracted: Extracted::Both,
         normalised: Normalised::Together,
@@ -285,7 +285,7 @@ mod tests {
         }
         let four = transitions(&CHAIN_OF_TWO);
         let (q, v, policy) = solution();
-        let found = nets.target.0.least_q(&four.observation, &four.told, &four.actions, &four.objects);
+        let found = nets.target.0.min_q(&four.observation, &four.told, &four.actions, &four.objects);
         let values = nets.online.0.value(&four.observation, &four.told);
         let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.told, false));
         let shares = logits.actions.softmax(-1, Kind::Double);

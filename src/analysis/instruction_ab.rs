@@ -109,7 +109,7 @@ fn divergence(one: &[Share], two: &[Share]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::agent::{Mind, Situation};
+    use crate::agent::{ActionDistribution, Observation};
     use crate::domain::Action;
     use crate::house::testing::kitchen_house;
 
@@ -123,7 +123,7 @@ mod tests {
 
         fn begin(&mut self, _seed: u64) {}
 
-        fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+        fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
             let left = situation.instruction.contains("left");
             let mut actions = [None; ActionType::COUNT];
             let likely = if left { ActionType::RotateLeft } else { ActionType::RotateRight };
@@ -131,7 +131,13 @@ mod tests {
             let action = Action::navigate(likely);
             Ok(Decision {
                 action,
-                mind: Some(Mind { actions, objects: vec![], choices: vec![], entropy: 0.0, greedy: action }),
+                mind: Some(ActionDistribution {
+                    actions,
+                    objects: vec![],
+                    choices: vec![],
+                    entropy: 0.0,
+                    greedy: action,
+                }),
             })
         }
     }

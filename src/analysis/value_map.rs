@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::agent::{Policy, Situation};
+use crate::agent::{Observation, Policy};
 use crate::domain::{Cell, Heading, Scene, World};
 use crate::house::House;
 
@@ -37,14 +37,14 @@ impl Measure {
 
 /// One cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Height {
+pub struct CellValue {
     /// Where.
     pub cell: Cell,
     /// The value looking each way, in the order of [`Heading::ALL`].
     pub values: [f32; 4],
 }
 
-impl Height {
+impl CellValue {
     /// The value looking one way; without one, the highest and the way it looks.
     pub fn facing(&self, heading: Option<Heading>) -> (Heading, f32) {
         let each = Heading::ALL.into_iter().zip(self.values).filter(|(one, _)| heading.is_none_or(|only| only == *one));
@@ -54,18 +54,18 @@ impl Height {
 
 /// What was found so far.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Landscape {
+pub struct ValueMap {
     /// What the agent was told.
     pub instruction: String,
     /// What was measured.
     pub measure: Measure,
     /// The cells that are done.
-    pub heights: Vec<Height>,
+    pub heights: Vec<CellValue>,
     /// How many cells there are.
     pub of: usize,
 }
 
-impl Landscape {
+impl ValueMap {
     /// The lowest and the highest value, looking one way or the best.
     pub fn range(&self, heading: Option<Heading>) -> Option<(f32, f32)> {
         let values = self.heights.iter().map(|height| height.facing(heading).1);
@@ -91,11 +91,11 @@ pub fn survey(
     world: &World,
     instruction: &str,
     stop: &AtomicBool,
-    visit: &mut dyn FnMut(&Landscape) -> bool,
-) -> anyhow::Result<Landscape> {
+    visit: &mut dyn FnMut(&ValueMap) -> bool,
+) -> anyhow::Result<ValueMap> {
     let mut house = House::new(scene.clone(), world.clone());
     let (instruction, of) = (instruction.to_string(), scene.cells.len());
-    let mut found = Landscape { instruction, measure: Measure::Confidence, heights: Vec::with_capacity(of), of };
+    let mut found = ValueMap { instruction, measure: Measure::Confidence, heights: Vec::with_capacity(of), of };
     // From where the agent is outwards: what matters most comes first.
     let mut cells = scene.cells.clone();
     let here = world.agent.cell;
@@ -110,7 +110,8 @@ pub fn survey(
             (there.agent.cell, there.agent.heading) = (cell, heading);
             house.restore(there);
             policy.begin(0);
-            let mut situation = Situation { house: &mut house, instruction: &found.instruction, step: 0, grader: None };
+            let mut situation =
+                Observation { house: &mut house, instruction: &found.instruction, step: 0, grader: None };
             let decision = policy.decide(&mut situation)?;
             *height = match policy.values(&mut situation)? {
                 Some(values) => {
@@ -120,7 +121,7 @@ pub fn survey(
                 None => decision.mind.map_or(0.0, |mind| mind.actions.into_iter().flatten().fold(0.0, f32::max)),
             };
         }
-        found.heights.push(Height { cell, values });
+        found.heights.push(CellValue { cell, values });
         if !visit(&found) {
             break;
         }
@@ -136,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_cell_is_worth_what_it_is_in_its_best_heading_or_in_one() {
-        let height = Height { cell: Cell::default(), values: [0.1, 0.7, 0.3, 0.7] };
+        let height = CellValue { cell: Cell::default(), values: [0.1, 0.7, 0.3, 0.7] };
         assert_eq!(height.facing(None), (Heading::East, 0.7));
         assert_eq!(height.facing(Some(Heading::South)), (Heading::South, 0.3));
     }

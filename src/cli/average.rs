@@ -25,10 +25,10 @@ pub struct Average {
     checkpoints: Vec<PathBuf>,
     /// How much of what is merely frequent it takes off its actions' logits when it decides, 0 to 1 [default: as the first]
     #[arg(long, value_name = "STRENGTH")]
-    balance: Option<f32>,
+    logit_adjustment: Option<f32>,
     /// How much its critic's advantages count when it decides; 0: its policy decides alone [default: as the first]
     #[arg(long, value_name = "WEIGHT")]
-    weighing: Option<f32>,
+    advantage_scale: Option<f32>,
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -50,11 +50,13 @@ impl Average {
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;
         let first = self.checkpoints[0].display();
-        if let Some(strength) = self.balance {
-            config.set_balance(strength).with_context(|| format!("--balance {strength} for {first}"))?;
+        if let Some(strength) = self.logit_adjustment {
+            config
+                .set_logit_adjustment(strength)
+                .with_context(|| format!("--logit_adjustment {strength} for {first}"))?;
         }
-        if let Some(weight) = self.weighing {
-            config.set_weighing(weight).with_context(|| format!("--weighing {weight} for {first}"))?;
+        if let Some(weight) = self.advantage_scale {
+            config.set_advantage_scale(weight).with_context(|| format!("--advantage_scale {weight} for {first}"))?;
         }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;

@@ -12,7 +12,7 @@ use super::stop;
 use super::streams::say;
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
-use crate::house::expert::Pace;
+use crate::house::expert::TurnTiming;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -64,7 +64,7 @@ enum Where {
 #[derive(Clone, Copy, ValueEnum)]
 enum Who {
     /// Turns around until it has seen what it goes for
-    Seeker,
+    ScanningExpert,
     /// Goes straight for things, seen or not, as ALFRED's planner did
     Expert,
 }
@@ -94,10 +94,10 @@ impl Collect {
             None => Source::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations },
         };
         let demonstrator = match self.demonstrator {
-            Who::Seeker => Demonstrator::Seeker,
+            Who::ScanningExpert => Demonstrator::ScanningExpert,
             Who::Expert => Demonstrator::Expert,
         };
-        let pace = if self.prompt { Pace::Prompt } else { Pace::Steady };
+        let pace = if self.prompt { TurnTiming::Early } else { TurnTiming::Late };
         let manner = Manner { demonstrator, pace, noise: self.noise };
         let collection = Collection { out: self.out, source, seed: self.seed, manner, learner };
         let stop = stop::on_signals()?;

@@ -15,7 +15,7 @@ use crate::nets::device::best_device;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::resnet18::ResNet18;
 use crate::train::feature_cache::features;
-use crate::train::frame_store::Footage;
+use crate::train::frame_store::FrameStore;
 
 /// Encodes datasets.
 #[derive(Args)]
@@ -46,11 +46,11 @@ impl Encode {
     pub fn run(self) -> anyhow::Result<Ending> {
         let encoder = self.encoder.load()?;
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
-        let footage = Footage::open(&datasets)?;
+        let frame_store = FrameStore::open(&datasets)?;
         let stop = stop::on_signals()?;
         let mut bars = Bars::new();
         let begun = std::time::Instant::now();
-        let features = features(&*encoder, &datasets, &footage, &mut bars, &stop)?;
+        let features = features(&*encoder, &datasets, &frame_store, &mut bars, &stop)?;
         bars.end();
         let Some(features) = features else {
             say("stopped; the same command goes on from here");

@@ -12,9 +12,9 @@ use super::{Ending, logging, policies};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
 use crate::episode::scenes::Scenes;
-use crate::explore::episode_source::{Openings, Start};
+use crate::explore::episode_source::{EpisodeSource, Start};
 use crate::explore::plain;
-use crate::explore::session::Engine;
+use crate::explore::session::Session;
 use crate::tui::config::Config;
 use crate::tui::graphics::Protocol;
 use crate::tui::screen;
@@ -84,7 +84,7 @@ impl Display {
         self,
         kind: PolicyKind,
         manual: bool,
-        open: impl FnOnce() -> anyhow::Result<Engine> + Send + 'static,
+        open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
     ) -> anyhow::Result<Ending> {
         if self.plain {
             let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
@@ -178,11 +178,11 @@ impl Explore {
 }
 
 impl Origin {
-    fn engine(&self, kind: PolicyKind) -> anyhow::Result<Engine> {
+    fn engine(&self, kind: PolicyKind) -> anyhow::Result<Session> {
         let (start, scenes) = self.start()?;
-        let openings = Openings::new(start, self.seed, scenes);
+        let openings = EpisodeSource::new(start, self.seed, scenes);
         let policies = Policies::new(policies::agents(self.checkpoint.as_deref()));
-        Engine::new(openings, policies, kind, self.instruction.as_deref())
+        Session::new(openings, policies, kind, self.instruction.as_deref())
     }
 
     fn start(&self) -> anyhow::Result<(Start, Scenes)> {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Ending, open::Reference, streams};
-use crate::episode::frames::Recording;
+use crate::episode::frames::FrameSequence;
 use crate::report::export;
 
 /// Which episode, and into which files.
@@ -32,7 +32,7 @@ impl Export {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let episode = &recorded.episodes[reference.episode];
         let (_, task, setting) = recorded.setting(episode)?;
-        let recording = Recording::of(&setting, task, episode)?;
+        let recording = FrameSequence::of(&setting, task, episode)?;
         let mut out = streams::out();
         for path in &self.out {
             let size = export::write(&recording, reference.step.unwrap_or(0), path)?;

@@ -9,8 +9,8 @@ use super::{Ending, explore::Display, policies};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
 use crate::eval::verify::Recorded;
-use crate::explore::episode_source::{Openings, Start};
-use crate::explore::session::Engine;
+use crate::explore::episode_source::{EpisodeSource, Start};
+use crate::explore::session::Session;
 
 /// Which episode, and how to show it.
 #[derive(Args)]
@@ -84,12 +84,12 @@ impl Open {
         let kind = kind_of(&acts);
         let checkpoint = self.checkpoint.clone();
         let explored = recorded.manifest.policy == "explored";
-        let open = move || -> anyhow::Result<Engine> {
+        let open = move || -> anyhow::Result<Session> {
             let scenes = recorded.scenes;
             let start = Start::Tasks { tasks: vec![task], index: 0 };
             let policies = Policies::new(policies::agents(checkpoint.as_deref()));
-            let openings = Openings::new(start, 0, scenes);
-            let mut engine = Engine::new(openings, policies, kind, None)?;
+            let openings = EpisodeSource::new(start, 0, scenes);
+            let mut engine = Session::new(openings, policies, kind, None)?;
             if explored {
                 engine.unlimited();
             }
@@ -117,7 +117,7 @@ fn kind_of(author: &Author) -> PolicyKind {
 }
 
 /// Loads the policy that acted: for an agent the checkpoint of the same hash.
-fn summon(engine: &mut Engine, kind: PolicyKind, author: &Author) -> anyhow::Result<()> {
+fn summon(engine: &mut Session, kind: PolicyKind, author: &Author) -> anyhow::Result<()> {
     if kind != PolicyKind::Agent {
         return engine.choose(kind);
     }

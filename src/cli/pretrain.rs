@@ -14,7 +14,7 @@ use crate::agent::learned::SharedEmbedder;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::train::in_training_eval::Trials;
+use crate::train::in_training_eval::InTrainingEval;
 use crate::train::preset::Preset;
 use crate::train::pretrain::{Pretraining, Trained};
 
@@ -90,7 +90,11 @@ impl Pretrain {
             visual_from: self.visual_from,
             policy_from: self.policy_from,
             critic_from: self.critic_from,
-            trials: self.trials.map(|tasks| Trials { tasks, limit: self.trials_limit, every: self.trials_every }),
+            trials: self.trials.map(|tasks| InTrainingEval {
+                tasks,
+                limit: self.trials_limit,
+                every: self.trials_every,
+            }),
             sentences: sentences.clone(),
             sentence_encoder: name(&folder),
             device,

@@ -14,7 +14,7 @@ use crate::language::instruction;
 
 /// An episode with the state after every step.
 #[derive(Clone, Debug)]
-pub struct Recording {
+pub struct FrameSequence {
     /// Task, scene and result in a line.
     pub title: String,
     /// Where it was.
@@ -66,12 +66,12 @@ impl Camera {
     }
 }
 
-impl Recording {
+impl FrameSequence {
     /// Takes the steps of an episode again, by the rules alone.
     ///
     /// # Errors
     /// When a step does not come to what was recorded.
-    pub fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<Recording> {
+    pub fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<FrameSequence> {
         let mut house = House::new(setting.scene.clone(), setting.world.clone());
         let subtasks: Vec<String> = task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect();
         let mut told = instruction::normalise(&episode.instruction);
@@ -114,7 +114,7 @@ impl Recording {
             (false, of) => format!("{} of {of} subtasks", episode.completed),
         };
         let title = format!("{} in {}, {} steps: {result}", episode.task, setting.scene.name, episode.steps);
-        Ok(Recording { title, scene: setting.scene.clone(), subtasks, shots })
+        Ok(FrameSequence { title, scene: setting.scene.clone(), subtasks, shots })
     }
 
     /// What the agent was told first.
@@ -137,7 +137,7 @@ pub(crate) mod tests {
     use crate::house::testing::kitchen;
 
     /// A few turns in the kitchen; one subtask is said to be done.
-    pub(crate) fn recording() -> Recording {
+    pub(crate) fn recording() -> FrameSequence {
         let (scene, world) = kitchen();
         let setting = Setting { scene, world };
         let mut task = crate::data::taskset::tests::sample_set().tasks.remove(0);
@@ -168,7 +168,7 @@ pub(crate) mod tests {
             trace,
             ..Episode::default()
         };
-        Recording::of(&setting, &task, &episode).unwrap()
+        FrameSequence::of(&setting, &task, &episode).unwrap()
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::language::{instruction, phrases};
 /// Whose words the agent hears.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Wording {
+pub enum InstructionVariant {
     /// The task's own.
     #[default]
     Own,
@@ -27,24 +27,29 @@ pub enum Wording {
     Paraphrased,
 }
 
-impl Wording {
+impl InstructionVariant {
     /// Every wording, the task's own first.
-    pub const ALL: [Wording; 5] =
-        [Wording::Own, Wording::Swapped, Wording::Emptied, Wording::Shuffled, Wording::Paraphrased];
+    pub const ALL: [InstructionVariant; 5] = [
+        InstructionVariant::Own,
+        InstructionVariant::Swapped,
+        InstructionVariant::Emptied,
+        InstructionVariant::Shuffled,
+        InstructionVariant::Paraphrased,
+    ];
 
     /// Whether it is the task's own.
     pub fn is_own(&self) -> bool {
-        *self == Wording::Own
+        *self == InstructionVariant::Own
     }
 
     /// What it is called in files and reports.
     pub fn name(self) -> &'static str {
         match self {
-            Wording::Own => "own",
-            Wording::Swapped => "swapped",
-            Wording::Emptied => "emptied",
-            Wording::Shuffled => "shuffled",
-            Wording::Paraphrased => "paraphrased",
+            InstructionVariant::Own => "own",
+            InstructionVariant::Swapped => "swapped",
+            InstructionVariant::Emptied => "emptied",
+            InstructionVariant::Shuffled => "shuffled",
+            InstructionVariant::Paraphrased => "paraphrased",
         }
     }
 }
@@ -59,16 +64,16 @@ pub fn told(task: &Task, step_by_step: bool) -> String {
 }
 
 /// What the agent is told of the task at `index`; `chance` drives what is drawn.
-pub fn say(tasks: &[Task], index: usize, wording: Wording, step_by_step: bool, chance: u64) -> String {
+pub fn say(tasks: &[Task], index: usize, wording: InstructionVariant, step_by_step: bool, chance: u64) -> String {
     let task = &tasks[index];
     let own = told(task, step_by_step);
     let mut rng = ChaCha8Rng::seed_from_u64(chance);
     match wording {
-        Wording::Own => own,
-        Wording::Swapped => swapped(tasks, index, step_by_step).unwrap_or(own),
-        Wording::Emptied => String::new(),
-        Wording::Shuffled => shuffled(&own, &mut rng),
-        Wording::Paraphrased => {
+        InstructionVariant::Own => own,
+        InstructionVariant::Swapped => swapped(tasks, index, step_by_step).unwrap_or(own),
+        InstructionVariant::Emptied => String::new(),
+        InstructionVariant::Shuffled => shuffled(&own, &mut rng),
+        InstructionVariant::Paraphrased => {
             let mut said = String::new();
             // The grammar has dozens of ways to say a thing; a handful of draws finds one that differs.
             for _ in 0..20 {
@@ -120,20 +125,20 @@ mod tests {
         let mut tasks = sample_set().tasks;
         tasks[1].instruction = "Heat the potato.".into();
         let say = |wording, chance| say(&tasks, 0, wording, false, chance);
-        assert_eq!(say(Wording::Own, 1), "Put the apple in the fridge.");
-        assert_eq!(say(Wording::Swapped, 1), "Heat the potato.");
-        assert_eq!(say(Wording::Emptied, 1), "");
+        assert_eq!(say(InstructionVariant::Own, 1), "Put the apple in the fridge.");
+        assert_eq!(say(InstructionVariant::Swapped, 1), "Heat the potato.");
+        assert_eq!(say(InstructionVariant::Emptied, 1), "");
         let mut words: Vec<String> =
-            say(Wording::Shuffled, 1).to_lowercase().replace('.', "").split(' ').map(String::from).collect();
+            say(InstructionVariant::Shuffled, 1).to_lowercase().replace('.', "").split(' ').map(String::from).collect();
         words.sort();
         assert_eq!(words, ["apple", "fridge", "in", "put", "the", "the"]);
         for chance in 0..20 {
-            for wording in [Wording::Shuffled, Wording::Paraphrased] {
+            for wording in [InstructionVariant::Shuffled, InstructionVariant::Paraphrased] {
                 assert_eq!(say(wording, chance), say(wording, chance));
-                assert_ne!(say(wording, chance), say(Wording::Own, chance), "{wording:?}");
+                assert_ne!(say(wording, chance), say(InstructionVariant::Own, chance), "{wording:?}");
             }
         }
-        assert!(say(Wording::Paraphrased, 3).to_lowercase().contains("apple"));
+        assert!(say(InstructionVariant::Paraphrased, 3).to_lowercase().contains("apple"));
     }
 
     #[test]

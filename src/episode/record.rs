@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::failure::Failure;
-use super::instruction_variant::Wording;
+use super::instruction_variant::InstructionVariant;
 use super::rollout::{Rollout, Tick};
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Class};
@@ -18,8 +18,8 @@ pub struct Episode {
     /// Which of the run's seeds.
     pub seed: u64,
     /// Whose words the agent heard.
-    #[serde(default, skip_serializing_if = "Wording::is_own")]
-    pub wording: Wording,
+    #[serde(default, skip_serializing_if = "InstructionVariant::is_own")]
+    pub wording: InstructionVariant,
     /// The subtask from which the agent acted; the expert did those before.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub from: u32,
@@ -58,7 +58,7 @@ pub struct Key {
     /// Which seed.
     pub seed: u64,
     /// Whose words.
-    pub wording: Wording,
+    pub wording: InstructionVariant,
     /// From which subtask.
     pub from: u32,
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::agent::{Decision, Policy, Situation};
+use crate::agent::{Decision, Observation, Policy};
 use crate::domain::{Action, World};
 use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
@@ -71,8 +71,8 @@ impl Rollout {
     }
 
     /// What a policy decides from now.
-    pub fn situation(&mut self) -> Situation<'_> {
-        Situation {
+    pub fn situation(&mut self) -> Observation<'_> {
+        Observation {
             house: &mut self.house,
             instruction: &self.instruction,
             step: self.steps,

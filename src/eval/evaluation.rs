@@ -14,7 +14,7 @@ use crate::episode::record::{Episode, Key};
 use crate::episode::scenes::Scenes;
 use crate::house::grading::Grading;
 use crate::report::summary::Summary;
-use crate::run_dir::episode_spec::{Booking, bookings};
+use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
 use crate::run_dir::manifest::Manifest;
 use crate::run_dir::writer::RunFolder;
 
@@ -101,15 +101,15 @@ impl Evaluation {
     }
 
     /// Every episode of the run, or of its share, in order.
-    pub fn all(&self) -> Vec<Booking> {
-        let all = bookings(&self.manifest, &self.tasks);
+    pub fn all(&self) -> Vec<EpisodeSpec> {
+        let all = episode_specs(&self.manifest, &self.tasks);
         let own = self.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
         all[own].to_vec()
     }
 
     /// What tells an episode apart from the others.
-    pub fn key(&self, booking: &Booking) -> Key {
-        booking.key(&self.tasks)
+    pub fn key(&self, spec: &EpisodeSpec) -> Key {
+        spec.key(&self.tasks)
     }
 
     /// Plays these episodes on several threads; `sink` takes each, in their order.
@@ -120,7 +120,7 @@ impl Evaluation {
     /// When a team cannot be made, or `sink` fails.
     pub fn play(
         &self,
-        wanted: &[Booking],
+        wanted: &[EpisodeSpec],
         make_team: &Arc<MakeTeam>,
         stop: &Arc<AtomicBool>,
         sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
@@ -170,18 +170,18 @@ pub fn evaluate(
     let mut episodes: BTreeMap<Key, Episode> =
         std::mem::take(&mut folder.earlier).into_iter().map(|episode| (episode.key(), episode)).collect();
     let mut wanted = Vec::new();
-    for booking in &all {
-        match episodes.get(&evaluation.key(booking)) {
-            None => wanted.push(*booking),
+    for spec in &all {
+        match episodes.get(&evaluation.key(spec)) {
+            None => wanted.push(*spec),
             // What failed before is begun anew as often as is asked now.
             Some(found) if found.error.is_some() && found.attempts <= evaluation.options.retries => {
-                wanted.push(Booking { attempts: found.attempts, ..*booking });
+                wanted.push(EpisodeSpec { attempts: found.attempts, ..*spec });
             }
             Some(_) => {}
         }
     }
     let mut state = Progress { of: all.len(), ..Progress::default() };
-    let again: Vec<Key> = wanted.iter().map(|booking| evaluation.key(booking)).collect();
+    let again: Vec<Key> = wanted.iter().map(|spec| evaluation.key(spec)).collect();
     for key in &again {
         episodes.remove(key);
     }
@@ -203,8 +203,13 @@ pub fn evaluate(
 ///
 /// # Errors
 /// When the folder cannot be read or written to.
-pub fn finish(manifest: &Manifest, tasks: &[Task], all: &[Booking], folder: &mut RunFolder) -> anyhow::Result<Summary> {
-    let order: Vec<Key> = all.iter().map(|booking| booking.key(tasks)).collect();
+pub fn finish(
+    manifest: &Manifest,
+    tasks: &[Task],
+    all: &[EpisodeSpec],
+    folder: &mut RunFolder,
+) -> anyhow::Result<Summary> {
+    let order: Vec<Key> = all.iter().map(|spec| spec.key(tasks)).collect();
     let (episodes, hash) = folder.result(&order)?;
     let mut summary = Summary::of(manifest, tasks, &episodes, episodes.len() < all.len());
     summary.episodes_hash = hash;
@@ -221,7 +226,7 @@ pub(crate) mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::agent::{Decision, Policy, Situation, Solo, Team};
+    use crate::agent::{Decision, Observation, Policy, Solo, Team};
     use crate::data::{json, taskset};
     use crate::domain::task::SceneRef;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
@@ -251,7 +256,7 @@ pub(crate) mod tests {
             self.steps = 0;
         }
 
-        fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+        fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
             self.steps += 1;
             assert!(!(self.panics && self.steps == 4), "out of legs");
             anyhow::ensure!(!(self.fails && self.steps == 6), "no way to the mug");

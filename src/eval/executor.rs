@@ -15,12 +15,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 
 use super::evaluation::Evaluation;
-use super::in_flight::Watch;
-use super::work_queue::Queues;
-use super::worker::Table;
+use super::in_flight::Watchdog;
+use super::work_queue::WorkQueue;
+use super::worker::Worker;
 use crate::agent::Team;
 use crate::episode::record::Episode;
-use crate::run_dir::episode_spec::Booking;
+use crate::run_dir::episode_spec::EpisodeSpec;
 
 /// Makes a team; every table has one of its own.
 pub type MakeTeam = dyn Fn() -> anyhow::Result<Box<dyn Team>> + Send + Sync;
@@ -31,14 +31,14 @@ const GLANCE: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// What all tables share.
-pub(crate) struct Play {
+pub(crate) struct Executor {
     pub evaluation: Evaluation,
     pub make_team: Arc<MakeTeam>,
     /// Set from outside: what is under way is dropped.
     pub stop: Arc<AtomicBool>,
     /// Set when nobody takes the episodes any more.
     pub give_up: AtomicBool,
-    pub queues: Queues,
+    pub queues: WorkQueue,
     teller: Mutex<Sender<Note>>,
 }
 
@@ -50,7 +50,7 @@ pub(crate) enum Note {
     Done(usize),
 }
 
-impl Play {
+impl Executor {
     /// Tells the thread that waits; false when nobody waits any more.
     pub fn tell(&self, note: Note) -> bool {
         self.teller.lock().unwrap_or_else(PoisonError::into_inner).send(note).is_ok()
@@ -58,18 +58,18 @@ impl Play {
 }
 
 /// The tables of a play, and what is waited for.
-struct Tables {
-    play: Arc<Play>,
+struct WorkerPool {
+    play: Arc<Executor>,
     seats: usize,
     receiver: Receiver<Note>,
     /// By their numbers; nothing where a table is done or was left behind.
-    tables: Vec<Option<(Arc<Watch>, JoinHandle<()>)>>,
+    tables: Vec<Option<(Arc<Watchdog>, JoinHandle<()>)>>,
 }
 
 /// Plays what is wanted; `sink` takes each episode, in that order.
 pub(crate) fn play(
     evaluation: &Evaluation,
-    wanted: &[Booking],
+    wanted: &[EpisodeSpec],
     make_team: &Arc<MakeTeam>,
     stop: &Arc<AtomicBool>,
     sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
@@ -84,15 +84,15 @@ pub(crate) fn play(
     let others = (1..count).map(|_| make_team());
     let teams = std::iter::once(Ok(first)).chain(others).collect::<anyhow::Result<Vec<_>>>()?;
     let (sender, receiver) = mpsc::channel();
-    let play = Arc::new(Play {
+    let play = Arc::new(Executor {
         evaluation: evaluation.clone(),
         make_team: make_team.clone(),
         stop: stop.clone(),
         give_up: AtomicBool::new(false),
-        queues: Queues::new(wanted, seats),
+        queues: WorkQueue::new(wanted, seats),
         teller: Mutex::new(sender),
     });
-    let mut tables = Tables { play: play.clone(), seats, receiver, tables: Vec::new() };
+    let mut tables = WorkerPool { play: play.clone(), seats, receiver, tables: Vec::new() };
     for team in teams {
         tables.open(Some(team))?;
     }
@@ -110,15 +110,15 @@ pub(crate) fn play(
     Ok(())
 }
 
-impl Tables {
+impl WorkerPool {
     /// Opens a table; without a team it makes one.
     fn open(&mut self, team: Option<Box<dyn Team>>) -> anyhow::Result<()> {
-        let (watch, number) = (Arc::new(Watch::new(self.seats)), self.tables.len());
+        let (watch, number) = (Arc::new(Watchdog::new(self.seats)), self.tables.len());
         let (play, watched) = (self.play.clone(), watch.clone());
         let serve = move || {
             // Dropped last, after a panic too.
             let _done = Done { play: play.clone(), number };
-            Table::new(play, watched, team).serve();
+            Worker::new(play, watched, team).serve();
         };
         let thread = std::thread::Builder::new().name(format!("table {number}")).spawn(serve);
         self.tables.push(Some((watch, thread.context("a thread could not be started")?)));
@@ -165,7 +165,7 @@ impl Tables {
                     None => over.push((only.at, only.clone().close(&self.play.evaluation))),
                 }
             } else {
-                self.play.queues.play_alone(left.iter().map(|underway| (underway.at, underway.booking)));
+                self.play.queues.play_alone(left.iter().map(|in_flight| (in_flight.at, in_flight.spec)));
             }
             self.open(None)?;
         }
@@ -193,7 +193,7 @@ impl Tables {
 
 /// Says that a table is done.
 struct Done {
-    play: Arc<Play>,
+    play: Arc<Executor>,
     number: usize,
 }
 
@@ -210,7 +210,7 @@ mod tests {
 
     use super::*;
     use crate::agent::team::Decisions;
-    use crate::agent::{Decision, Policy, Situation, Solo};
+    use crate::agent::{Decision, Observation, Policy, Solo};
     use crate::domain::{Action, ActionType};
     use crate::eval::evaluation::tests::{Ran, Walker, options, run};
     use crate::eval::options::Options;
@@ -235,7 +235,7 @@ mod tests {
             self.seats[seat].begin(seed);
         }
 
-        fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+        fn decide(&mut self, situations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
             let troubled =
                 situations.iter().flatten().any(|here| here.instruction.contains(self.trouble) && here.step == 3);
             assert!(!(troubled && self.panics), "the table broke");
@@ -293,7 +293,7 @@ mod tests {
             fn begin(&mut self, seed: u64) {
                 self.0.begin(seed);
             }
-            fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+            fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
                 let mut left = self.1.lock().unwrap();
                 if *left > 0 {
                     *left -= 1;
@@ -357,7 +357,7 @@ mod tests {
 
         fn begin(&mut self, _seat: usize, _seed: u64) {}
 
-        fn decide(&mut self, situations: &mut [Option<Situation<'_>>]) -> anyhow::Result<Decisions> {
+        fn decide(&mut self, situations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
             while situations.iter().flatten().any(|here| here.instruction.contains(self.trouble) && here.step == 3) {
                 std::thread::sleep(Duration::from_millis(100));
             }

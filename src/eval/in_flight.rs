@@ -7,44 +7,38 @@ use std::time::{Duration, Instant};
 use super::evaluation::Evaluation;
 use crate::episode::record::Episode;
 use crate::episode::{failure, instruction_variant};
-use crate::run_dir::episode_spec::Booking;
+use crate::run_dir::episode_spec::EpisodeSpec;
 
 /// An episode under way, as far as it is recorded.
 #[derive(Clone, Debug)]
-pub(crate) struct Underway {
+pub(crate) struct InFlight {
     /// Its position among what is wanted.
     pub at: usize,
     /// Which one it is.
-    pub booking: Booking,
+    pub spec: EpisodeSpec,
     /// Since when it is played.
     pub began: Instant,
     /// What was recorded so far.
     pub episode: Episode,
 }
 
-impl Underway {
+impl InFlight {
     /// Before the first step.
-    pub fn new(evaluation: &Evaluation, at: usize, booking: Booking) -> Underway {
-        let task = &evaluation.tasks[booking.task];
-        let chance = crate::run_dir::episode_spec::policy_seed(booking.task, booking.seed);
+    pub fn new(evaluation: &Evaluation, at: usize, spec: EpisodeSpec) -> InFlight {
+        let task = &evaluation.tasks[spec.task];
+        let chance = crate::run_dir::episode_spec::policy_seed(spec.task, spec.seed);
         let step_by_step = evaluation.options.step_by_step;
         let episode = Episode {
             task: task.id.clone(),
-            seed: booking.seed,
-            wording: booking.wording,
-            from: booking.from,
-            instruction: instruction_variant::say(
-                &evaluation.tasks,
-                booking.task,
-                booking.wording,
-                step_by_step,
-                chance,
-            ),
-            of: (task.subtasks.len() as u32).saturating_sub(booking.from),
-            attempts: booking.attempts + 1,
+            seed: spec.seed,
+            wording: spec.wording,
+            from: spec.from,
+            instruction: instruction_variant::say(&evaluation.tasks, spec.task, spec.wording, step_by_step, chance),
+            of: (task.subtasks.len() as u32).saturating_sub(spec.from),
+            attempts: spec.attempts + 1,
             ..Episode::default()
         };
-        Underway { at, booking, began: Instant::now(), episode }
+        InFlight { at, spec, began: Instant::now(), episode }
     }
 
     /// Ends it with an error, unless it has one.
@@ -53,10 +47,10 @@ impl Underway {
     }
 
     /// The booking of another attempt, where an error is to be tried again.
-    pub fn again(&self, evaluation: &Evaluation) -> Option<Booking> {
+    pub fn again(&self, evaluation: &Evaluation) -> Option<EpisodeSpec> {
         let tried = self.episode.attempts;
         let again = self.episode.error.is_some() && tried <= evaluation.options.retries;
-        again.then_some(Booking { attempts: tried, ..self.booking })
+        again.then_some(EpisodeSpec { attempts: tried, ..self.spec })
     }
 
     /// The record of what it came to.
@@ -67,7 +61,7 @@ impl Underway {
         episode.completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
         episode.success = episode.error.is_none() && episode.completed == episode.of;
         if !episode.success && episode.error.is_none() {
-            let task = &evaluation.tasks[self.booking.task];
+            let task = &evaluation.tasks[self.spec.task];
             // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
             let class = guarded(|| {
                 let setting = evaluation.scenes.setting(task)?;
@@ -94,35 +88,35 @@ pub(crate) fn guarded<T>(run: impl FnOnce() -> anyhow::Result<T>) -> Result<T, S
 
 /// What is under way at a table, seat by seat. The table writes it, the thread that waits for the table reads it.
 #[derive(Debug)]
-pub(crate) struct Watch {
-    state: Mutex<State>,
+pub(crate) struct Watchdog {
+    state: Mutex<WatchdogState>,
 }
 
 #[derive(Debug)]
-pub(crate) struct State {
+pub(crate) struct WatchdogState {
     /// Seat by seat.
-    pub seats: Vec<Option<Underway>>,
+    pub seats: Vec<Option<InFlight>>,
     /// Nobody waits for this table any more: it must record nothing.
     pub is_left: bool,
 }
 
-impl Watch {
+impl Watchdog {
     /// Over a table with empty seats.
-    pub fn new(seats: usize) -> Watch {
-        Watch { state: Mutex::new(State { seats: vec![None; seats], is_left: false }) }
+    pub fn new(seats: usize) -> Watchdog {
+        Watchdog { state: Mutex::new(WatchdogState { seats: vec![None; seats], is_left: false }) }
     }
 
     /// What is under way now. A table that panicked while it wrote leaves its last whole record.
-    pub fn lock(&self) -> MutexGuard<'_, State> {
+    pub fn lock(&self) -> MutexGuard<'_, WatchdogState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes a table's episodes away from it when one has taken so much longer than `limit` that the table must hang within
     /// one step: between two steps it looks at the time itself.
-    pub fn leave_if_hanging(&self, limit: Duration) -> Option<Vec<Underway>> {
+    pub fn leave_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
         let patience = limit + (limit / 10).max(Duration::from_secs(1));
         let mut state = self.lock();
-        if state.is_left || !state.seats.iter().flatten().any(|underway| underway.began.elapsed() >= patience) {
+        if state.is_left || !state.seats.iter().flatten().any(|in_flight| in_flight.began.elapsed() >= patience) {
             return None;
         }
         state.is_left = true;

@@ -9,7 +9,7 @@ use super::evaluation::finish;
 use super::tasks::sample;
 use crate::episode::record::Key;
 use crate::report::summary::Summary;
-use crate::run_dir::episode_spec::bookings;
+use crate::run_dir::episode_spec::episode_specs;
 use crate::run_dir::manifest::Manifest;
 use crate::run_dir::reader::FinishedRun;
 use crate::run_dir::shard::Shard;
@@ -69,9 +69,9 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
     ensure!(missing.is_empty(), "missing shares: {}; play them with eval --shard", missing.join(", "));
     let file = first.path.join(RunFolder::TASKS);
     let (set, episodes) = (first.set.clone(), runs.values().map(|run| run.episodes.len()).sum::<usize>());
-    let all = bookings(&manifest, &set.tasks);
+    let all = episode_specs(&manifest, &set.tasks);
     for run in runs.values() {
-        let (found, wanted) = (run.episodes.len(), run.bookings().len());
+        let (found, wanted) = (run.episodes.len(), run.episode_specs().len());
         ensure!(
             found == wanted,
             "{} has {found} of its {wanted} episodes; the same eval command with --shard completes it",
@@ -85,8 +85,8 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
         folder.earlier.iter().map(crate::episode::record::Episode::key).collect();
     for run in runs.values() {
         let mut by_key: BTreeMap<Key, _> = run.episodes.iter().map(|episode| (episode.key(), episode)).collect();
-        for booking in run.bookings() {
-            let key = booking.key(&set.tasks);
+        for spec in run.episode_specs() {
+            let key = spec.key(&set.tasks);
             let episode =
                 by_key.remove(&key).with_context(|| format!("{}: no episode of {key}", run.path.display()))?;
             if !there.contains(&key) {

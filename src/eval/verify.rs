@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use serde::Serialize;
 
-use crate::agent::{Carried, Policy};
+use crate::agent::{Policy, PolicyState};
 use crate::data::json;
 use crate::domain::{Action, Task, TaskSet};
 use crate::episode::branches::{FRAMES, Moment, look_back};
@@ -242,7 +242,7 @@ impl Again<'_> {
                     self.verdict.choices += 1;
                 }
             }
-            past.push_front(Moment::of(&rollout, &author, Carried::Nothing));
+            past.push_front(Moment::of(&rollout, &author, PolicyState::Nothing));
             past.truncate(FRAMES - 1);
             if let Some(found) = self.act(&mut rollout, number, recorded) {
                 return Ok(Some(found));
@@ -278,11 +278,11 @@ mod tests {
     use crate::domain::{ActionType, Class, Role, SkillKind, Subtask};
     use crate::episode::branches::{Taken, Tree};
     use crate::explore::session_export;
-    use crate::explore::session_export::Explored;
+    use crate::explore::session_export::SessionExport;
     use crate::house::testing::kitchen;
 
     /// A random walk of eight steps in the kitchen; the fourth and fifth by hand, with another instruction from the sixth on.
-    fn walked() -> Explored {
+    fn walked() -> SessionExport {
         let (scene, world) = kitchen();
         let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
         let mut task = session_export::ungraded(crate::domain::task::SceneRef::Named(scene.name.clone()));
@@ -317,14 +317,14 @@ mod tests {
             let moment = Moment::of(&rollout, &random, policy.carried());
             tree.grow(taken, || moment, String::new);
         }
-        Explored { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }
+        SessionExport { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }
     }
 
     fn random(author: &Author) -> anyhow::Result<Option<Box<dyn Policy>>> {
         Ok((author.policy == "random").then(|| Box::new(RandomPolicy::new()) as Box<dyn Policy>))
     }
 
-    fn verified(explored: &Explored) -> Verdict {
+    fn verified(explored: &SessionExport) -> Verdict {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         session_export::write(explored, &path).unwrap();

@@ -4,35 +4,35 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::run_dir::episode_spec::Booking;
+use crate::run_dir::episode_spec::EpisodeSpec;
 
 /// What is wanted, by seat.
-pub(crate) struct Queues {
-    by_seat: Vec<Vec<(usize, Booking)>>,
+pub(crate) struct WorkQueue {
+    by_seat: Vec<Vec<(usize, EpisodeSpec)>>,
     next: Vec<AtomicUsize>,
     /// Episodes that a failure of a whole team interrupted: each is played again with nobody beside it, which shows whose the
     /// failure was.
-    alone: Mutex<VecDeque<(usize, Booking)>>,
+    alone: Mutex<VecDeque<(usize, EpisodeSpec)>>,
 }
 
-impl Queues {
+impl WorkQueue {
     /// By the seats of their places in the run.
-    pub fn new(wanted: &[Booking], seats: usize) -> Queues {
+    pub fn new(wanted: &[EpisodeSpec], seats: usize) -> WorkQueue {
         let mut by_seat = vec![Vec::new(); seats];
-        for (at, booking) in wanted.iter().enumerate() {
-            by_seat[booking.place % seats].push((at, *booking));
+        for (at, spec) in wanted.iter().enumerate() {
+            by_seat[spec.place % seats].push((at, *spec));
         }
-        Queues { by_seat, next: (0..seats).map(|_| AtomicUsize::new(0)).collect(), alone: Mutex::default() }
+        WorkQueue { by_seat, next: (0..seats).map(|_| AtomicUsize::new(0)).collect(), alone: Mutex::default() }
     }
 
     /// The next episode for a seat.
-    pub fn next(&self, seat: usize) -> Option<(usize, Booking)> {
+    pub fn next(&self, seat: usize) -> Option<(usize, EpisodeSpec)> {
         let at = self.next[seat].fetch_add(1, Ordering::Relaxed);
         self.by_seat[seat].get(at).copied()
     }
 
     /// Has these played again with nobody beside them.
-    pub fn play_alone(&self, interrupted: impl Iterator<Item = (usize, Booking)>) {
+    pub fn play_alone(&self, interrupted: impl Iterator<Item = (usize, EpisodeSpec)>) {
         self.alone.lock().unwrap_or_else(PoisonError::into_inner).extend(interrupted);
     }
 
@@ -42,7 +42,7 @@ impl Queues {
     }
 
     /// The next of those.
-    pub fn next_alone(&self) -> Option<(usize, Booking)> {
+    pub fn next_alone(&self) -> Option<(usize, EpisodeSpec)> {
         self.alone.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
     }
 }

@@ -5,19 +5,19 @@ use std::sync::atomic::Ordering;
 
 use anyhow::Context;
 
-use super::executor::{Note, Play};
-use super::in_flight::{Underway, Watch, guarded};
+use super::executor::{Executor, Note};
+use super::in_flight::{InFlight, Watchdog, guarded};
 use crate::agent::{Decision, ExpertPolicy, Policy, Team};
 use crate::episode::record::{Episode, Step};
 use crate::episode::rollout::Rollout;
 use crate::house::House;
 use crate::house::grading::Grader;
-use crate::run_dir::episode_spec::{Booking, policy_seed};
+use crate::run_dir::episode_spec::{EpisodeSpec, policy_seed};
 
 /// A table. Episodes sit at it; what is recorded of them stands in the watch.
-pub(crate) struct Table {
-    play: Arc<Play>,
-    watch: Arc<Watch>,
+pub(crate) struct Worker {
+    play: Arc<Executor>,
+    watch: Arc<Watchdog>,
     team: Option<Box<dyn Team>>,
     rollouts: Vec<Option<Rollout>>,
     /// Who sits here is to be played with nobody beside it.
@@ -27,10 +27,10 @@ pub(crate) struct Table {
 /// Nobody waits for this table any more.
 struct Left;
 
-impl Table {
-    pub fn new(play: Arc<Play>, watch: Arc<Watch>, team: Option<Box<dyn Team>>) -> Table {
+impl Worker {
+    pub fn new(play: Arc<Executor>, watch: Arc<Watchdog>, team: Option<Box<dyn Team>>) -> Worker {
         let seats = watch.lock().seats.len();
-        Table { play, watch, team, rollouts: (0..seats).map(|_| None).collect(), is_alone: false }
+        Worker { play, watch, team, rollouts: (0..seats).map(|_| None).collect(), is_alone: false }
     }
 
     /// Plays what is wanted until there is nothing left, or nobody waits for it any more.
@@ -52,15 +52,15 @@ impl Table {
             self.step()?;
         }
         for seat in over {
-            let Some(underway) = self.record(|seats| seats[seat].clone())? else { continue };
-            if let Some(again) = underway.again(&self.play.evaluation) {
-                self.sit(seat, underway.at, again)?;
+            let Some(in_flight) = self.record(|seats| seats[seat].clone())? else { continue };
+            if let Some(again) = in_flight.again(&self.play.evaluation) {
+                self.sit(seat, in_flight.at, again)?;
                 continue;
             }
             // Why it fell short is found while it still sits, so that somebody waits for that too.
-            let at = underway.at;
+            let at = in_flight.at;
             let evaluation = &self.play.evaluation;
-            let episode = underway.close(evaluation);
+            let episode = in_flight.close(evaluation);
             self.rollouts[seat] = None;
             if self.record(|seats| seats[seat].take())?.is_some() && !self.play.tell(Note::Over(at, episode)) {
                 return Ok(false);
@@ -70,7 +70,7 @@ impl Table {
     }
 
     /// Reads or writes what is recorded, unless nobody waits for it any more.
-    fn record<T>(&self, change: impl FnOnce(&mut Vec<Option<Underway>>) -> T) -> Result<T, Left> {
+    fn record<T>(&self, change: impl FnOnce(&mut Vec<Option<InFlight>>) -> T) -> Result<T, Left> {
         let mut state = self.watch.lock();
         if state.is_left { Err(Left) } else { Ok(change(&mut state.seats)) }
     }
@@ -84,7 +84,7 @@ impl Table {
         let ended = |seat: usize| self.rollouts[seat].as_ref().is_none_or(|rollout| rollout.end().is_some());
         self.record(|seats| {
             let is_over = |seat: &usize| {
-                seats[*seat].as_ref().is_some_and(|underway| underway.episode.error.is_some() || ended(*seat))
+                seats[*seat].as_ref().is_some_and(|in_flight| in_flight.episode.error.is_some() || ended(*seat))
             };
             (0..seats.len()).filter(is_over).collect()
         })
@@ -97,36 +97,36 @@ impl Table {
         if self.is_alone || (self.play.queues.someone_waits_alone() && !is_empty) {
             return Ok(());
         }
-        if let Some((at, booking)) = self.play.queues.next_alone() {
+        if let Some((at, spec)) = self.play.queues.next_alone() {
             self.is_alone = true;
-            return self.sit(booking.place % seats, at, booking);
+            return self.sit(spec.place % seats, at, spec);
         }
         for seat in 0..seats {
             if self.record(|seats| seats[seat].is_none())?
-                && let Some((at, booking)) = self.play.queues.next(seat)
+                && let Some((at, spec)) = self.play.queues.next(seat)
             {
-                self.sit(seat, at, booking)?;
+                self.sit(seat, at, spec)?;
             }
         }
         Ok(())
     }
 
     /// Sets an episode to its start; an error is recorded in it.
-    fn sit(&mut self, seat: usize, at: usize, booking: Booking) -> Result<(), Left> {
+    fn sit(&mut self, seat: usize, at: usize, spec: EpisodeSpec) -> Result<(), Left> {
         let play = self.play.clone();
-        let underway = Underway::new(&play.evaluation, at, booking);
-        let mut episode = underway.episode.clone();
-        self.record(|seats| seats[seat] = Some(underway))?;
+        let in_flight = InFlight::new(&play.evaluation, at, spec);
+        let mut episode = in_flight.episode.clone();
+        self.record(|seats| seats[seat] = Some(in_flight))?;
         self.rollouts[seat] = None;
         let ready = guarded(|| {
-            self.rollouts[seat] = Some(begin(&play, booking, &mut episode)?);
-            self.team()?.begin(seat, policy_seed(booking.task, booking.seed));
+            self.rollouts[seat] = Some(begin(&play, spec, &mut episode)?);
+            self.team()?.begin(seat, policy_seed(spec.task, spec.seed));
             Ok(())
         });
         episode.error = ready.err();
         self.record(|seats| {
-            if let Some(underway) = &mut seats[seat] {
-                underway.episode = episode;
+            if let Some(in_flight) = &mut seats[seat] {
+                in_flight.episode = episode;
             }
         })
     }
@@ -165,9 +165,9 @@ impl Table {
             // Whatever state a failure left the team in is not carried on.
             Err(problem) if self.rollouts.iter().flatten().count() == 1 => self.fail_all(&problem),
             Err(_) => {
-                let begun: Vec<Underway> = self.record(|seats| seats.iter_mut().filter_map(Option::take).collect())?;
+                let begun: Vec<InFlight> = self.record(|seats| seats.iter_mut().filter_map(Option::take).collect())?;
                 self.rollouts.iter_mut().for_each(|rollout| *rollout = None);
-                self.play.queues.play_alone(begun.iter().map(|underway| (underway.at, underway.booking)));
+                self.play.queues.play_alone(begun.iter().map(|in_flight| (in_flight.at, in_flight.spec)));
                 Ok(())
             }
         }
@@ -182,32 +182,32 @@ impl Table {
         });
         let (limit, goes_on) = (self.play.evaluation.options.timeout, rollout.end().is_none());
         self.record(|seats| {
-            let Some(underway) = &mut seats[seat] else { return };
+            let Some(in_flight) = &mut seats[seat] else { return };
             match taken {
-                Ok(step) => underway.episode.trace.push(step),
-                Err(problem) => underway.fail(&problem),
+                Ok(step) => in_flight.episode.trace.push(step),
+                Err(problem) => in_flight.fail(&problem),
             }
-            if let Some(limit) = limit.filter(|&limit| goes_on && underway.began.elapsed() >= limit) {
-                underway.fail(&format!("timed out: it took longer than {} s", limit.as_secs_f64()));
+            if let Some(limit) = limit.filter(|&limit| goes_on && in_flight.began.elapsed() >= limit) {
+                in_flight.fail(&format!("timed out: it took longer than {} s", limit.as_secs_f64()));
             }
         })
     }
 
     fn fail_all(&mut self, problem: &str) -> Result<(), Left> {
-        self.record(|seats| seats.iter_mut().flatten().for_each(|underway| underway.fail(problem)))
+        self.record(|seats| seats.iter_mut().flatten().for_each(|in_flight| in_flight.fail(problem)))
     }
 }
 
 /// Sets an episode to its start.
-fn begin(play: &Play, booking: Booking, episode: &mut Episode) -> anyhow::Result<Rollout> {
-    let task = &play.evaluation.tasks[booking.task];
+fn begin(play: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyhow::Result<Rollout> {
+    let task = &play.evaluation.tasks[spec.task];
     let setting = play.evaluation.scenes.setting(task)?;
     episode.start_hash = setting.world.digest();
     let grader = Grader::new(play.evaluation.options.grading, &task.roles, &task.subtasks, task.goal.as_ref());
     let house = House::new(setting.scene, setting.world);
     let mut rollout = Rollout::new(house, episode.instruction.clone(), Some(grader), Some(task.horizon));
-    if booking.from > 0 {
-        lead(&mut rollout, booking.from, episode)?;
+    if spec.from > 0 {
+        lead(&mut rollout, spec.from, episode)?;
         rollout.horizon = Some(episode.prefix + task.horizon);
     }
     Ok(rollout)

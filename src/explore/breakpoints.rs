@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::agent::{Mind, Values};
+use crate::agent::{ActionDistribution, Values};
 use crate::domain::Class;
 
 /// When to stop.
@@ -106,7 +106,7 @@ impl fmt::Display for Condition {
 }
 
 /// By how much the best choice leads the second: in Q where there are critics, else in probability.
-pub fn gap(mind: Option<&Mind>, values: Option<&Values>) -> Option<f32> {
+pub fn gap(mind: Option<&ActionDistribution>, values: Option<&Values>) -> Option<f32> {
     let mut found: Vec<f32> = match (values, mind) {
         (Some(values), _) => values.choices.iter().map(|choice| choice.q).collect(),
         (None, Some(mind)) => mind.actions.iter().flatten().copied().collect(),

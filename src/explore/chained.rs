@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::worker::Report;
 use crate::agent::Policy;
 use crate::agent::registry::Who;
-use crate::analysis::chain::{Chain, Draws, Play, Trials, trials};
+use crate::analysis::chain::{Chain, ChainRun, Draws, LinkSuccess, trials};
 
 /// What is known of a chain so far, followed by one policy.
 #[derive(Clone, Debug, Default)]
@@ -19,11 +19,11 @@ pub struct Chained {
     /// Subtasks of a task grade them.
     pub graded: bool,
     /// Told link by link.
-    pub by_link: Option<Play>,
+    pub by_link: Option<ChainRun>,
     /// Told all at once.
-    pub as_one: Option<Play>,
+    pub as_one: Option<ChainRun>,
     /// How often each link was done from both entries.
-    pub trials: Option<Trials>,
+    pub trials: Option<LinkSuccess>,
 }
 
 impl Chained {

@@ -1,7 +1,7 @@
 //! Everything that could be done now, as rows of a table: how likely, how good.
 
 use super::session::Snapshot;
-use crate::agent::{Decision, Mind, Values};
+use crate::agent::{ActionDistribution, Decision, Values};
 use crate::domain::{Action, ActionType, Class};
 
 /// A thing that could be done now.
@@ -86,7 +86,7 @@ pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sor
 
 /// The choices of a policy without a distribution.
 fn legal(now: &Snapshot) -> Vec<(ActionType, Option<Class>, f32)> {
-    let uniform = Mind {
+    let uniform = ActionDistribution {
         actions: [None; ActionType::COUNT],
         objects: Vec::new(),
         choices: Vec::new(),

@@ -48,7 +48,7 @@ pub enum Start {
 }
 
 /// The sequence of episodes.
-pub struct Openings {
+pub struct EpisodeSource {
     start: Start,
     seed: u64,
     scenes: Scenes,
@@ -57,10 +57,10 @@ pub struct Openings {
 /// How many subtasks a task in a generated house has.
 const LENGTH: usize = 2;
 
-impl Openings {
+impl EpisodeSource {
     /// Episodes from `start` on; `scenes` holds those that tasks name.
-    pub fn new(start: Start, seed: u64, scenes: Scenes) -> Openings {
-        Openings { start, seed, scenes }
+    pub fn new(start: Start, seed: u64, scenes: Scenes) -> EpisodeSource {
+        EpisodeSource { start, seed, scenes }
     }
 
     /// The seed of the present episode.

@@ -22,7 +22,7 @@ use crate::run_dir::writer::RunFolder;
 
 /// The tasks and episodes of an exploration, a branch each.
 #[derive(Clone, Debug)]
-pub struct Explored {
+pub struct SessionExport {
     /// Where it was.
     pub scene: Arc<Scene>,
     /// What was asked at the start, under each branch's name.
@@ -40,7 +40,7 @@ const MOST: u32 = 1000;
 ///
 /// # Errors
 /// When the folder holds something else, or cannot be written to.
-pub fn write(explored: &Explored, path: &Path) -> anyhow::Result<()> {
+pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     ensure!(!path.join(RunFolder::MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let set = TaskSet {

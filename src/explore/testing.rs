@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::episode_source::{Openings, Start};
-use super::session::{Engine, Snapshot};
+use super::episode_source::{EpisodeSource, Start};
+use super::session::{Session, Snapshot};
 use super::worker::Report;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::agent::value_estimates::ChoiceValue;
-use crate::agent::{Decision, Mind, Values};
+use crate::agent::{ActionDistribution, Decision, Values};
 use crate::domain::task::SceneRef;
 use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask, Trajectory};
 use crate::episode::scenes::Scenes;
@@ -15,7 +15,7 @@ use crate::house::testing::{kitchen, named};
 use crate::house::view::{Candidate, Frame, Sighting, View, code};
 
 /// An engine in the kitchen with the task to put a mug into the sink.
-pub fn engine() -> Engine {
+pub fn engine() -> Session {
     let (scene, world) = kitchen();
     let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
     let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };
@@ -37,13 +37,13 @@ pub fn engine() -> Engine {
         choices: vec![],
     };
     let start = Start::Recorded { scene, trajectories: vec![trajectory] };
-    let openings = Openings::new(start, 5, Scenes::in_folder(None));
+    let openings = EpisodeSource::new(start, 5, Scenes::in_folder(None));
     let policies = Policies::new(Vec::new());
-    Engine::new(openings, policies, PolicyKind::Random, None).unwrap()
+    Session::new(openings, policies, PolicyKind::Random, None).unwrap()
 }
 
 /// The engine's state with a made-up frame: a mug on a table before a wall.
-pub fn snapshot(engine: &mut Engine) -> Snapshot {
+pub fn snapshot(engine: &mut Session) -> Snapshot {
     let mut now = engine.snapshot();
     let (scene, world) = (&now.scene, &now.world);
     let seen = ["DiningTable", "Mug", "Plate", "Fridge"].map(|name| named(scene, world, name));
@@ -107,7 +107,10 @@ pub fn thought(now: &Snapshot) -> Report {
     let choices = [ActionType::Pickup, ActionType::Open].into_iter().flat_map(weighs).collect();
     let action = now.candidates[0].action();
     Report::Thought(
-        Decision { action, mind: Some(Mind { actions, objects, choices, entropy: 1.13, greedy: action }) },
+        Decision {
+            action,
+            mind: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),
+        },
         "Pickup Mug".into(),
         None,
     )

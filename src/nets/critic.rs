@@ -52,7 +52,7 @@ impl CriticSpec {
 
 /// What a critic is told and sees: its inputs' sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Senses {
+pub struct CriticInputs {
     /// Channels of an observation.
     pub channels: i64,
     /// Numbers in a sentence embedding, or that a goal is turned into.
@@ -93,7 +93,7 @@ impl QHead {
 
 /// A critic's opinion of a batch in training.
 #[derive(Debug)]
-pub struct Judgement {
+pub struct CriticValues {
     /// Both Q, each [n].
     pub q: [Tensor; 2],
     /// V [n].
@@ -113,7 +113,7 @@ pub struct Critic {
 
 impl Critic {
     /// A critic with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, senses: Senses) -> Critic {
+    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, senses: CriticInputs) -> Critic {
         let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
         let over = |channels| Convolutions { channels, halved: spec.halved };
         let trunk = |name: &&str| Trunk::new(&(path / *name), senses.channels, over(&spec.channels), Some(senses.told));
@@ -140,12 +140,12 @@ impl Critic {
 
     /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` [n]
     /// (class indices, 0 for navigation).
-    pub fn judge(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Judgement {
+    pub fn evaluate(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> CriticValues {
         let told = self.telling.forward(told, observation.kind(), true);
         let first = self.input(0, observation, &told, None, true);
         let second = self.input(1, observation, &told, Some(&first), true);
         let third = self.input(2, observation, &told, Some(&first), true);
-        Judgement {
+        CriticValues {
             q: [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, true)),
             value: self.value.forward(&third, true),
             baseline: tch::no_grad(|| self.value.forward(&third, false)),
@@ -153,7 +153,7 @@ impl Critic {
     }
 
     /// min(Q1, Q2) [n], without dropout and without gradient.
-    pub fn least_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
+    pub fn min_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
         tch::no_grad(|| {
             let told = self.telling.forward(told, observation.kind(), false);
             let first = self.input(0, observation, &told, None, false);
@@ -173,7 +173,7 @@ impl Critic {
     }
 
     /// Of one situation, V and min(Q1, Q2) of each (action, object) pair; the situation is looked at once.
-    pub fn appraise(&self, observation: &Tensor, told: &Tensor, pairs: &[(i64, i64)]) -> (Tensor, Tensor) {
+    pub fn evaluate_actions(&self, observation: &Tensor, told: &Tensor, pairs: &[(i64, i64)]) -> (Tensor, Tensor) {
         let column = |of: fn(&(i64, i64)) -> i64| {
             Tensor::from_slice(&pairs.iter().map(of).collect::<Vec<i64>>()).to_device(observation.device())
         };
@@ -208,7 +208,7 @@ mod tests {
             object_embedding: 3,
             shared_trunk,
         };
-        Critic::new(&store.root(), &spec, Senses { channels: 10, told: 5, goal: None })
+        Critic::new(&store.root(), &spec, CriticInputs { channels: 10, told: 5, goal: None })
     }
 
     fn inputs(n: i64) -> (Tensor, Tensor, Tensor, Tensor) {
@@ -225,7 +225,7 @@ mod tests {
         let convolutions = [true, false].map(|shared| {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = critic(&store, shared);
-            let judged = critic.judge(&observation, &told, &actions, &objects);
+            let judged = critic.evaluate(&observation, &told, &actions, &objects);
             assert!([&judged.q[0], &judged.q[1], &judged.value, &judged.baseline].iter().all(|t| t.size() == [3]));
             assert!(judged.value.requires_grad() && !judged.baseline.requires_grad());
             store.variables().keys().filter(|name| name.ends_with("conv.weight")).count()
@@ -242,12 +242,12 @@ mod tests {
             let critic = critic(&store, shared);
             let (observation, told, ..) = inputs(1);
             let pairs = [(0, 0), (5, 2), (5, 40), (9, 81)];
-            let (value, q) = critic.appraise(&observation, &told, &pairs);
+            let (value, q) = critic.evaluate_actions(&observation, &told, &pairs);
             let (actions, objects) = (Tensor::from_slice(&pairs.map(|p| p.0)), Tensor::from_slice(&pairs.map(|p| p.1)));
             let repeat = |tensor: &Tensor| tensor.repeat([&[4i64][..], &vec![1; tensor.dim() - 1]].concat());
             let (many, tellings) = (repeat(&observation), repeat(&told));
             let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-5;
-            assert!(close(&q, &critic.least_q(&many, &tellings, &actions, &objects)));
+            assert!(close(&q, &critic.min_q(&many, &tellings, &actions, &objects)));
             assert!(close(&value, &critic.value(&many, &tellings)));
             assert!((q.max() - q.min()).double_value(&[]) > 1e-4, "the action matters");
         }

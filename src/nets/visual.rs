@@ -107,18 +107,18 @@ impl Stage {
 
 /// From a frame to its feature map.
 #[derive(Debug)]
-pub struct VisualEncoder {
+pub struct HouseEncoder {
     spec: VisualSpec,
     stem: Layer,
     stages: Vec<Stage>,
     device: Device,
 }
 
-impl VisualEncoder {
+impl HouseEncoder {
     /// An encoder with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> VisualEncoder {
+    pub fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> HouseEncoder {
         let stage = |(i, pair): (usize, &[i64])| Stage::new(&(path / format!("stage{}", i + 1)), pair[0], pair[1]);
-        VisualEncoder {
+        HouseEncoder {
             stem: Layer::new(&(path / "stem"), 3, spec.channels[0], 2),
             stages: spec.channels.windows(2).enumerate().map(stage).collect(),
             spec: spec.clone(),
@@ -231,7 +231,7 @@ mod tests {
         tch::manual_seed(3);
         let store = nn::VarStore::new(Device::Cpu);
         let spec = VisualSpec { input: 112, channels: vec![8, 8, 8, 16] };
-        let encoder = VisualEncoder::new(&store.root(), &spec);
+        let encoder = HouseEncoder::new(&store.root(), &spec);
         let images: Vec<Vec<u8>> = (0..3u8).map(|i| vec![40 * i; 3 * 112 * 112]).collect();
         let maps = encoder.encode(&images);
         assert_eq!(maps.size(), [3, 16, SIDE, SIDE]);
@@ -245,7 +245,7 @@ mod tests {
         let spec = VisualSpec { input: 224, channels: vec![2, 2, 2, 2, 3] };
         spec.check().unwrap();
         let store = nn::VarStore::new(Device::Cpu);
-        let maps = VisualEncoder::new(&store.root(), &spec).encode(&[vec![9; 3 * 224 * 224]]);
+        let maps = HouseEncoder::new(&store.root(), &spec).encode(&[vec![9; 3 * 224 * 224]]);
         assert_eq!(maps.size(), [1, 3, SIDE, SIDE]);
         let refused = |input, channels| VisualSpec { input, channels }.check().unwrap_err().to_string();
         assert!(refused(112, vec![2; 5]).contains("visual.input is 112, not 224"));
@@ -257,7 +257,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(5);
         let store = nn::VarStore::new(Device::Cpu);
-        let encoder = VisualEncoder::new(&store.root(), &VisualSpec { input: 112, channels: vec![4, 8, 8, 16] });
+        let encoder = HouseEncoder::new(&store.root(), &VisualSpec { input: 112, channels: vec![4, 8, 8, 16] });
         let noise = Tensor::randint(255, [4, 3, 112, 112], (Kind::Uint8, Device::Cpu));
         // Batch norms that are not the identity.
         for _ in 0..20 {

@@ -8,15 +8,15 @@ use tch::{Device, nn};
 use super::frozen::FrameEncoder;
 use super::home::cache_folder;
 use super::resnet18::{self, ResNet18};
-use super::visual::{VisualEncoder, VisualSpec};
+use super::visual::{HouseEncoder, VisualSpec};
 
 /// A visual encoder with its weights.
 #[derive(Debug)]
-pub enum Eyes {
+pub enum VisualEncoder {
     /// Trained on drawn frames.
     House {
         /// The network.
-        encoder: Box<VisualEncoder>,
+        encoder: Box<HouseEncoder>,
         /// Its weights.
         store: nn::VarStore,
     },
@@ -24,11 +24,11 @@ pub enum Eyes {
     ResNet18(Box<ResNet18>),
 }
 
-impl Eyes {
+impl VisualEncoder {
     /// A House encoder with fresh weights.
-    pub fn house(spec: &VisualSpec, device: Device) -> Eyes {
+    pub fn house(spec: &VisualSpec, device: Device) -> VisualEncoder {
         let store = nn::VarStore::new(device);
-        Eyes::House { encoder: Box::new(VisualEncoder::new(&store.root(), spec)), store }
+        VisualEncoder::House { encoder: Box::new(HouseEncoder::new(&store.root(), spec)), store }
     }
 
     /// Where ResNet-18's weights are looked for.
@@ -40,26 +40,26 @@ impl Eyes {
     ///
     /// # Errors
     /// When the file is missing or holds something else.
-    pub fn resnet18(file: &Path, device: Device) -> anyhow::Result<Eyes> {
+    pub fn resnet18(file: &Path, device: Device) -> anyhow::Result<VisualEncoder> {
         let net = ResNet18::read(file, device).with_context(|| {
             format!("ResNet-18's weights belong in {}: assets/convert_resnet18.py makes that file", file.display())
         })?;
-        Ok(Eyes::ResNet18(Box::new(net)))
+        Ok(VisualEncoder::ResNet18(Box::new(net)))
     }
 
     /// Features in each of a map's 7 x 7 places.
     pub fn features(&self) -> i64 {
         match self {
-            Eyes::House { encoder, .. } => encoder.spec().features(),
-            Eyes::ResNet18(_) => resnet18::FEATURES,
+            VisualEncoder::House { encoder, .. } => encoder.spec().features(),
+            VisualEncoder::ResNet18(_) => resnet18::FEATURES,
         }
     }
 
     /// The weights that a checkpoint keeps.
     pub fn store(&self) -> Option<&nn::VarStore> {
         match self {
-            Eyes::House { store, .. } => Some(store),
-            Eyes::ResNet18(_) => None,
+            VisualEncoder::House { store, .. } => Some(store),
+            VisualEncoder::ResNet18(_) => None,
         }
     }
 
@@ -69,8 +69,8 @@ impl Eyes {
     /// When the weights cannot be read.
     pub fn frozen(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
         match self {
-            Eyes::House { encoder, store } => Ok(Box::new(encoder.frozen(store)?)),
-            Eyes::ResNet18(net) => Ok(net.twin()),
+            VisualEncoder::House { encoder, store } => Ok(Box::new(encoder.frozen(store)?)),
+            VisualEncoder::ResNet18(net) => Ok(net.twin()),
         }
     }
 }
@@ -88,7 +88,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("resnet18.safetensors");
         write_weights(&file);
-        let eyes = Eyes::resnet18(&file, Device::Cpu).unwrap();
+        let eyes = VisualEncoder::resnet18(&file, Device::Cpu).unwrap();
         let (scene, world) = kitchen();
         let sight = eyes.frozen().unwrap();
         let image = sight.image(Renderer::new(300).draw(&scene, &world));
@@ -99,7 +99,8 @@ mod tests {
 
     #[test]
     fn missing_weights_are_told_with_their_place_and_remedy() {
-        let error = format!("{:#}", Eyes::resnet18(Path::new("nowhere/r.safetensors"), Device::Cpu).unwrap_err());
+        let error =
+            format!("{:#}", VisualEncoder::resnet18(Path::new("nowhere/r.safetensors"), Device::Cpu).unwrap_err());
         assert!(error.contains("nowhere/r.safetensors") && error.contains("convert_resnet18.py"), "{error}");
     }
 }

@@ -10,7 +10,7 @@ use super::summary::{Mean, SkillRate};
 use crate::domain::task::SceneRef;
 use crate::domain::{SkillKind, Task};
 use crate::episode::failure::Failure;
-use crate::episode::instruction_variant::Wording;
+use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 
 /// Episodes by task in the set's order, by seed within: sums of floats then do not depend on the order of the episodes.
@@ -58,8 +58,8 @@ pub struct Errored {
     /// The seed.
     pub seed: u64,
     /// Whose words.
-    #[serde(default, skip_serializing_if = "Wording::is_own")]
-    pub wording: Wording,
+    #[serde(default, skip_serializing_if = "InstructionVariant::is_own")]
+    pub wording: InstructionVariant,
     /// From which subtask.
     pub from: u32,
     /// How often it was begun.
@@ -181,9 +181,14 @@ pub fn errored(grouped: &Grouped<'_>) -> Vec<Errored> {
 }
 
 /// Figures by wording.
-pub fn language(grouped: &Grouped<'_>) -> BTreeMap<Wording, Group> {
-    let of = |wording: Wording| grouped.only(|episode| episode.wording == wording && episode.from == 0).group();
-    Wording::ALL.into_iter().map(|wording| (wording, of(wording))).filter(|(_, group)| group.episodes > 0).collect()
+pub fn language(grouped: &Grouped<'_>) -> BTreeMap<InstructionVariant, Group> {
+    let of =
+        |wording: InstructionVariant| grouped.only(|episode| episode.wording == wording && episode.from == 0).group();
+    InstructionVariant::ALL
+        .into_iter()
+        .map(|wording| (wording, of(wording)))
+        .filter(|(_, group)| group.episodes > 0)
+        .collect()
 }
 
 /// Figures by the subtask from which the agent acted.

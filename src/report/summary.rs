@@ -13,7 +13,7 @@ use super::stats::Interval;
 use crate::data::{atomic_file, json};
 use crate::domain::{SkillKind, Task};
 use crate::episode::failure::Failure;
-use crate::episode::instruction_variant::Wording;
+use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 use crate::house::grading::Grading;
 use crate::run_dir::manifest::Manifest;
@@ -117,7 +117,7 @@ pub struct Summary {
     pub errored: Vec<Errored>,
     /// By wording, where a run asked for them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub language: BTreeMap<Wording, Group>,
+    pub language: BTreeMap<InstructionVariant, Group>,
     /// By the subtask from which the agent acted, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub starts: BTreeMap<u32, Start>,

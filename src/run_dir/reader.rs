@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use super::episode_spec::{Booking, bookings};
+use super::episode_spec::{EpisodeSpec, episode_specs};
 use super::manifest::Manifest;
 use super::writer::{RunFolder, read_episodes};
 use crate::data::{json, taskset};
@@ -95,8 +95,8 @@ impl FinishedRun {
     }
 
     /// Every episode that the run, or its share, comes to.
-    pub fn bookings(&self) -> Vec<Booking> {
-        let all = bookings(&self.manifest, &self.set.tasks);
+    pub fn episode_specs(&self) -> Vec<EpisodeSpec> {
+        let all = episode_specs(&self.manifest, &self.set.tasks);
         let own = self.manifest.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
         all[own].to_vec()
     }

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::manifest::Manifest;
 use super::shard::Shard;
-use crate::data::{atomic_file, json};
+use crate::data::json;
 use crate::domain::TaskSet;
 use crate::episode::record::{Episode, Key};
 

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
-use super::training_data::{Material, Told};
+use super::training_data::{ConditioningTable, TrainingData};
 use crate::algo::batch::{Batch, Pairs, Transitions};
 use crate::algo::chain::{Chaining, Pairs as Source};
 use crate::data::items::{Item, Span};
@@ -18,7 +18,7 @@ const GOALS: u64 = 0x90a1;
 
 /// Makes batches of one training.
 pub struct Batches<'a> {
-    material: Material<'a>,
+    material: TrainingData<'a>,
     /// Frames in an observation.
     history: u32,
     /// Whether the next observation is needed too.
@@ -32,7 +32,7 @@ pub struct Batches<'a> {
 impl<'a> Batches<'a> {
     /// Batches of `size` items for networks that see `history` frames on `device`; `judged` says that a critic reads them.
     pub fn new(
-        material: Material<'a>,
+        material: TrainingData<'a>,
         history: i64,
         judged: bool,
         chaining: Option<&'a Chaining>,
@@ -55,7 +55,7 @@ impl<'a> Batches<'a> {
     /// Items of some spans, each told its own text or goal.
     fn draw(&self, spans: &[Span], step: u64, size: usize) -> Vec<Item> {
         let mut items = self.material.items.draw(spans, self.seed, step, size);
-        if let Told::Goals = self.material.told {
+        if let ConditioningTable::Goals = self.material.told {
             let mut rng = self.chance(GOALS, step);
             for item in &mut items {
                 item.end = rng.random_range(self.material.items.goals(item));
@@ -120,8 +120,8 @@ impl<'a> Batches<'a> {
     /// What items are told.
     fn told(&self, items: &[Item]) -> anyhow::Result<Tensor> {
         match &self.material.told {
-            Told::Sentences(rows) => rows.rows(items.iter().map(|item| item.text as usize), self.device),
-            Told::Words(texts) => {
+            ConditioningTable::Sentences(rows) => rows.rows(items.iter().map(|item| item.text as usize), self.device),
+            ConditioningTable::Words(texts) => {
                 let texts: Vec<&[i64]> =
                     items.iter().map(|item| texts.get(item.text as usize).map_or(&[][..], Vec::as_slice)).collect();
                 let longest = texts.iter().map(|text| text.len()).max().unwrap_or(0);
@@ -131,7 +131,7 @@ impl<'a> Batches<'a> {
                 let numbers: Vec<i64> = texts.iter().flat_map(padded).collect();
                 Ok(Tensor::from_slice(&numbers).view([items.len() as i64, longest as i64]).to_device(self.device))
             }
-            Told::Goals => {
+            ConditioningTable::Goals => {
                 let at_goal = |item: &Item| Item { frame: item.end, ..*item };
                 let goals: Vec<Item> = items.iter().map(at_goal).collect();
                 let maps =

@@ -10,7 +10,7 @@ use anyhow::Context;
 use sha2::{Digest, Sha256};
 use tch::{Device, Kind, Tensor};
 
-use super::frame_store::Footage;
+use super::frame_store::FrameStore;
 use super::metrics::{Report, Scalars};
 use crate::data::Dataset;
 use crate::data::features::{Features, Header, Writer};
@@ -33,23 +33,23 @@ const LOOKED_AT: usize = 24;
 pub fn features(
     encoder: &dyn FrameEncoder,
     datasets: &[Dataset],
-    footage: &Footage,
+    frame_store: &FrameStore,
     report: &mut dyn Report,
     stop: &AtomicBool,
 ) -> anyhow::Result<Option<Features>> {
     let mut all: Option<Features> = None;
-    for (dataset, trajectories) in datasets.iter().zip(&footage.parts) {
+    for (dataset, trajectories) in datasets.iter().zip(&frame_store.parts) {
         let header = Header {
             format_version: Header::FORMAT,
             encoder: encoder.digest().to_string(),
-            dataset: format!("{}-{}", dataset.digest()?, looks(footage, trajectories)?),
-            maps: footage.frames_of(trajectories) as u64,
+            dataset: format!("{}-{}", dataset.digest()?, looks(frame_store, trajectories)?),
+            maps: frame_store.frames_of(trajectories) as u64,
             numbers: (encoder.features() * SIDE * SIDE) as u64,
         };
         let cache = dataset.folder().join("cache");
         let mut found = Features::read(&cache, &header)?;
         if found.is_none() {
-            if !encode(encoder, footage, trajectories.clone(), &cache, &header, report, stop)? {
+            if !encode(encoder, frame_store, trajectories.clone(), &cache, &header, report, stop)? {
                 return Ok(None);
             }
             found = Features::read(&cache, &header)?;
@@ -64,11 +64,11 @@ pub fn features(
 }
 
 /// Identifies how frames look, from a few of them: scenes and their drawing are no part of a dataset's trajectories.
-fn looks(footage: &Footage, trajectories: &Range<usize>) -> anyhow::Result<String> {
+fn looks(frame_store: &FrameStore, trajectories: &Range<usize>) -> anyhow::Result<String> {
     let mut hash = Sha256::new();
     let mut renderer = Renderer::new(House::FRAME);
     for trajectory in trajectories.clone().step_by(trajectories.len().div_ceil(LOOKED_AT).max(1)) {
-        hash.update(&renderer.draw(footage.scene(trajectory)?, &footage.trajectories[trajectory].start).rgb);
+        hash.update(&renderer.draw(frame_store.scene(trajectory)?, &frame_store.trajectories[trajectory].start).rgb);
     }
     Ok(format!("{:x}", hash.finalize())[..8].to_string())
 }
@@ -80,7 +80,7 @@ fn looks(footage: &Footage, trajectories: &Range<usize>) -> anyhow::Result<Strin
 /// When a frame cannot be drawn or the file not be written.
 pub fn encode(
     encoder: &dyn FrameEncoder,
-    footage: &Footage,
+    frame_store: &FrameStore,
     trajectories: Range<usize>,
     folder: &Path,
     header: &Header,
@@ -88,7 +88,7 @@ pub fn encode(
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
     let mut writer = Writer::open(folder, header.clone())?;
-    let frames_until = |end: usize| footage.frames_of(&(trajectories.start..end)) as u64;
+    let frames_until = |end: usize| frame_store.frames_of(&(trajectories.start..end)) as u64;
     let mut written = trajectories.start;
     while written < trajectories.end && frames_until(written + 1) <= writer.maps() {
         written += 1;
@@ -108,7 +108,9 @@ pub fn encode(
                 while !stop.load(Ordering::Relaxed) {
                     let trajectory = next.fetch_add(1, Ordering::Relaxed);
                     let done = trajectory >= end;
-                    if done || sender.send((trajectory, maps(&*encoder, footage, trajectory, &mut renderer))).is_err() {
+                    if done
+                        || sender.send((trajectory, maps(&*encoder, frame_store, trajectory, &mut renderer))).is_err()
+                    {
                         break;
                     }
                 }
@@ -137,12 +139,12 @@ pub fn encode(
 /// The maps of a trajectory's frames: little-endian 16-bit floats.
 fn maps(
     encoder: &dyn FrameEncoder,
-    footage: &Footage,
+    frame_store: &FrameStore,
     trajectory: usize,
     renderer: &mut Renderer,
 ) -> anyhow::Result<Vec<u8>> {
     let (mut images, mut bytes) = (Vec::with_capacity(BATCH), Vec::new());
-    footage.replay(trajectory, |scene, world, _| {
+    frame_store.replay(trajectory, |scene, world, _| {
         images.push(encoder.image(renderer.draw(scene, world)));
         if images.len() == BATCH {
             add_half(&encoder.encode(&images), &mut bytes)?;
@@ -168,15 +170,15 @@ fn add_half(tensor: &Tensor, bytes: &mut Vec<u8>) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nets::visual::{VisualEncoder, VisualSpec};
-    use crate::train::visual::testing::{Notes, footage};
+    use crate::nets::visual::{HouseEncoder, VisualSpec};
+    use crate::train::visual::testing::{Notes, frame_store};
     use tch::nn;
 
     fn encoder() -> impl FrameEncoder {
         tch::manual_seed(2);
         let store = nn::VarStore::new(Device::Cpu);
         let spec = VisualSpec { input: 112, channels: vec![4, 4, 8, 16] };
-        VisualEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
+        HouseEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
     }
 
     fn header() -> Header {
@@ -186,9 +188,9 @@ mod tests {
     #[test]
     fn every_frame_gets_its_map() {
         let _chance = crate::nets::testing::chance();
-        let (footage, encoder, folder) = (footage(), encoder(), tempfile::tempdir().unwrap());
+        let (frame_store, encoder, folder) = (frame_store(), encoder(), tempfile::tempdir().unwrap());
         let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(false));
-        assert!(encode(&encoder, &footage, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        assert!(encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
         let features = Features::read(folder.path(), &header()).unwrap().unwrap();
         let map = |frame| {
             let mut bytes = Vec::new();
@@ -206,10 +208,10 @@ mod tests {
     #[test]
     fn an_encoding_that_was_cut_off_goes_on_at_a_whole_trajectory() {
         let _chance = crate::nets::testing::chance();
-        let (footage, encoder) = (footage(), encoder());
+        let (frame_store, encoder) = (frame_store(), encoder());
         let stop = AtomicBool::new(false);
         let run = |folder: &Path, notes: &mut Notes| {
-            encode(&encoder, &footage, 0..2, folder, &header(), notes, &stop).unwrap();
+            encode(&encoder, &frame_store, 0..2, folder, &header(), notes, &stop).unwrap();
             std::fs::read(folder.join(header().file_name())).unwrap()
         };
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -224,9 +226,9 @@ mod tests {
     #[test]
     fn when_it_is_stopped_nothing_is_put_in_place() {
         let _chance = crate::nets::testing::chance();
-        let (footage, encoder, folder) = (footage(), encoder(), tempfile::tempdir().unwrap());
+        let (frame_store, encoder, folder) = (frame_store(), encoder(), tempfile::tempdir().unwrap());
         let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(true));
-        assert!(!encode(&encoder, &footage, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        assert!(!encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
         assert!(Features::read(folder.path(), &header()).unwrap().is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! Footage: the trajectories of a dataset as states that can be drawn, any step at random.
+//! FrameStore: the trajectories of a dataset as states that can be drawn, any step at random.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::domain::{Scene, Trajectory, World};
 use crate::house::{generate, rules, validate};
 
 /// The trajectories of datasets with the scenes they play in.
-pub struct Footage {
+pub struct FrameStore {
     /// The trajectories, in the datasets' order.
     pub trajectories: Vec<Trajectory>,
     scenes: HashMap<SceneRef, Arc<Scene>>,
@@ -26,12 +26,12 @@ pub struct Footage {
     pub held_out: Vec<String>,
 }
 
-impl Footage {
+impl FrameStore {
     /// Reads the trajectories of datasets, one after the other, and makes their scenes.
     ///
     /// # Errors
     /// When a trajectory or a scene cannot be read, or a trajectory does not fit its scene; it is named with the field.
-    pub fn open(datasets: &[Dataset]) -> anyhow::Result<Footage> {
+    pub fn open(datasets: &[Dataset]) -> anyhow::Result<FrameStore> {
         let mut trajectories: Vec<Trajectory> = Vec::new();
         let mut parts = Vec::new();
         for dataset in datasets {
@@ -63,7 +63,7 @@ impl Footage {
             firsts.push(firsts[firsts.len() - 1] + trajectory.actions.len() + 1);
         }
         let held_out = datasets.iter().flat_map(|dataset| dataset.manifest().held_out.clone()).collect();
-        Ok(Footage { trajectories, scenes, parts, firsts, held_out })
+        Ok(FrameStore { trajectories, scenes, parts, firsts, held_out })
     }
 
     /// How many frames there are: each trajectory has one more than it has actions.
@@ -168,22 +168,22 @@ fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
 
 #[cfg(test)]
 mod tests {
-    use super::Footage;
+    use super::FrameStore;
     use crate::data::dataset;
     use crate::data::dataset::Dataset;
     use crate::domain::{Action, ActionType, Cell, Trajectory, trajectory};
     use crate::house::testing::kitchen;
-    use crate::train::visual::testing::footage;
+    use crate::train::visual::testing::frame_store;
 
     #[test]
     fn trajectories_of_other_splits_and_every_so_manieth_of_each_dataset_are_kept_apart() {
-        let mut footage = footage();
-        assert_eq!(footage.kept_apart(0), [false, false]);
-        assert_eq!(footage.kept_apart(2), [false, true]);
-        footage.parts = vec![0..1, 1..2];
-        assert_eq!(footage.kept_apart(2), [false, false], "each dataset is counted for itself");
-        footage.trajectories[0].split = "valid_seen".into();
-        assert_eq!(footage.kept_apart(0), [true, false]);
+        let mut frame_store = frame_store();
+        assert_eq!(frame_store.kept_apart(0), [false, false]);
+        assert_eq!(frame_store.kept_apart(2), [false, true]);
+        frame_store.parts = vec![0..1, 1..2];
+        assert_eq!(frame_store.kept_apart(2), [false, false], "each dataset is counted for itself");
+        frame_store.trajectories[0].split = "valid_seen".into();
+        assert_eq!(frame_store.kept_apart(0), [true, false]);
     }
 
     #[test]
@@ -195,18 +195,18 @@ mod tests {
         writer.scene(&scene).unwrap();
         writer.trajectory(&Trajectory { start, ..trajectory::testing::empty("lost", &scene.name) }).unwrap();
         writer.finish(&dataset::testing::manifest(1, &[])).unwrap();
-        let error = Footage::open(&[Dataset::open(folder.path()).unwrap()]).err().unwrap();
+        let error = FrameStore::open(&[Dataset::open(folder.path()).unwrap()]).err().unwrap();
         let error = format!("{error:#}");
         assert!(error.starts_with("lost: start.agent.cell: (900, 900) is no cell"), "{error}");
     }
 
     #[test]
     fn what_the_expert_only_would_have_done_is_a_label_that_was_not_taken() {
-        let mut footage = footage();
-        let mut choices = footage.trajectories[0].actions.clone();
+        let mut frame_store = frame_store();
+        let mut choices = frame_store.trajectories[0].actions.clone();
         choices[1..3].fill(Action::navigate(ActionType::MoveAhead));
-        footage.trajectories[0].choices = choices;
-        let labels = footage.labels().unwrap();
+        frame_store.trajectories[0].choices = choices;
+        let labels = frame_store.labels().unwrap();
         let found: Vec<_> = labels[..5].iter().map(|l| l.map(|l| (usize::from(l.action), l.taken))).collect();
         let [left, ahead] = [ActionType::RotateLeft, ActionType::MoveAhead].map(ActionType::index);
         let right = [Some((left, true)), Some((ahead, false)), Some((ahead, false)), Some((left, true)), None];

@@ -1,4 +1,4 @@
-//! Trials: while it trains, an agent plays some tasks of a set, and its curve shows what losses do not.
+//! InTrainingEval: while it trains, an agent plays some tasks of a set, and its curve shows what losses do not.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::house::grading::Grading;
 
 /// Which tasks are tried, and when.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Trials {
+pub struct InTrainingEval {
     /// The task file.
     pub tasks: PathBuf,
     /// Only that many tasks, from the first.
@@ -28,7 +28,7 @@ pub struct Trials {
     pub every: u64,
 }
 
-impl Trials {
+impl InTrainingEval {
     /// Whether a trial is held at the save at `step`, when the save before it was at `before`.
     pub fn are_due(&self, before: u64, step: u64) -> bool {
         step / self.every.max(1) > before / self.every.max(1)
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_trial_is_held_at_the_first_save_after_each_so_many_steps() {
-        let trials = Trials { tasks: "t.json".into(), limit: None, every: 300 };
+        let trials = InTrainingEval { tasks: "t.json".into(), limit: None, every: 300 };
         let mut before = 0;
         let mut held = Vec::new();
         for saved in [200, 400, 600, 800, 850] {

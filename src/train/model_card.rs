@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::validation::Findings;
+use super::validation::ValidationReport;
 use crate::agent::config::{Beginning, Config, Provenance};
 use crate::nets::precision::Precision;
 
@@ -45,13 +45,20 @@ fn told(config: &Config) -> String {
 
 /// How it decides, in words, where not by the logits alone.
 fn deciding(config: &Config) -> String {
-    let balance = config.balance.as_ref().map(|balance| balance.strength).filter(|&strength| strength > 0.0);
-    let balanced = balance.map(|strength| {
-        format!("{:.0} % of what is merely frequent is taken off the actions' logits (`balance`)", 100.0 * strength)
+    let logit_adjustment = config
+        .logit_adjustment
+        .as_ref()
+        .map(|logit_adjustment| logit_adjustment.strength)
+        .filter(|&strength| strength > 0.0);
+    let balanced = logit_adjustment.map(|strength| {
+        format!(
+            "{:.0} % of what is merely frequent is taken off the actions' logits (`logit_adjustment`)",
+            100.0 * strength
+        )
     });
-    let weighed = config
-        .weighing
-        .map(|weight| format!("a choice of advantage A by its critic is exp({weight} A) times as likely (`weighing`)"));
+    let weighed = config.advantage_scale.map(|weight| {
+        format!("a choice of advantage A by its critic is exp({weight} A) times as likely (`advantage_scale`)")
+    });
     let ways: Vec<String> = balanced.into_iter().chain(weighed).collect();
     if ways.is_empty() { String::new() } else { format!(" When it decides, {}.", ways.join(", and ")) }
 }
@@ -98,7 +105,7 @@ fn beginnings(provenance: &Provenance) -> String {
 }
 
 /// The card's text.
-pub fn card(name: &str, config: &Config, findings: &Findings) -> String {
+pub fn card(name: &str, config: &Config, findings: &ValidationReport) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write!(

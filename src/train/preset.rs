@@ -57,7 +57,7 @@ pub struct Preset {
     pub precision: Precision,
     /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.
     #[serde(default)]
-    pub balance: f32,
+    pub logit_adjustment: f32,
     /// How the result is measured.
     pub appraisal: Appraisal,
 }
@@ -177,8 +177,11 @@ impl Preset {
             weight.is_finite() && weight > 0.0,
             "visual_training.positive_weight is {weight}, which is not above 0"
         );
-        let balance = preset.balance;
-        anyhow::ensure!((0.0..=1.0).contains(&balance), "balance is {balance}, which is not a share");
+        let logit_adjustment = preset.logit_adjustment;
+        anyhow::ensure!(
+            (0.0..=1.0).contains(&logit_adjustment),
+            "logit_adjustment is {logit_adjustment}, which is not a share"
+        );
         preset.visual.check()?;
         preset.policy.check()?;
         preset.check_method()?;
@@ -288,7 +291,7 @@ mod tests {
             assert_eq!(paper.method(), preset.method(), "{name}");
             assert!(paper.critic.is_none_or(|critic| !critic.shared_trunk), "{name}");
             assert_eq!((preset.data.named, paper.data.named), (Named::Ahead, Named::Own), "{name}");
-            assert!(paper.iql.is_none_or(|iql| iql.weighing == 0.0), "{name}");
+            assert!(paper.iql.is_none_or(|iql| iql.advantage_scale == 0.0), "{name}");
             assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == Pairs::InBatch), "{name}");
         }
         let method = |name| Preset::named(name).unwrap().method();
@@ -334,7 +337,7 @@ mod tests {
         refused("[policy]\ngoal = [4, 4, 4, 4]\n[appraisal]\nswaps = 0", "goals have none");
         refused("[chaining]\nbatch = 0", "chaining.batch");
         refused("[iql]\nwarmup_share = 3000.0", "iql.warmup_share");
-        refused("[iql]\nweighing = -1.0", "iql.weighing");
+        refused("[iql]\nweighing = -1.0", "iql.advantage_scale");
         refused("[iql]\nexpectile = 1.5", "iql.expectile");
         refused("[iql]\ndiscount = 2.0", "iql.discount");
         refused("[policy]\ndropout = 1.5", "policy.dropout");

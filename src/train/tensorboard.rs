@@ -14,17 +14,17 @@ use anyhow::Context;
 use super::metrics::{Report, Scalars};
 
 /// Appends every step that has numbers to an event file, and passes everything on.
-pub struct Events<'a> {
+pub struct TensorBoard<'a> {
     file: File,
     next: &'a mut dyn Report,
 }
 
-impl<'a> Events<'a> {
+impl<'a> TensorBoard<'a> {
     /// Begins a new event file in `folder`; TensorBoard reads all of a folder as one.
     ///
     /// # Errors
     /// When it cannot be written to.
-    pub fn open(folder: &Path, next: &'a mut dyn Report) -> anyhow::Result<Events<'a>> {
+    pub fn open(folder: &Path, next: &'a mut dyn Report) -> anyhow::Result<TensorBoard<'a>> {
         let now = now();
         let path = folder.join(format!("events.out.tfevents.{now:.6}.sprint"));
         let open = || -> std::io::Result<File> {
@@ -32,11 +32,11 @@ impl<'a> Events<'a> {
             file.write_all(&record(&event(now, 0, &text(3, "brain.Event:2"))))?;
             Ok(file)
         };
-        Ok(Events { file: open().with_context(|| format!("{} cannot be written to", path.display()))?, next })
+        Ok(TensorBoard { file: open().with_context(|| format!("{} cannot be written to", path.display()))?, next })
     }
 }
 
-impl Report for Events<'_> {
+impl Report for TensorBoard<'_> {
     fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
         if !scalars.values.is_empty() {
             let mut summary = Vec::new();
@@ -182,7 +182,7 @@ mod tests {
     fn what_is_written_parses_back() {
         let folder = tempfile::tempdir().unwrap();
         let mut nobody = Nobody;
-        let mut events = Events::open(folder.path(), &mut nobody).unwrap();
+        let mut events = TensorBoard::open(folder.path(), &mut nobody).unwrap();
         let mut scalars = Scalars::new("policy", 300, 1000);
         events.step(&scalars).unwrap();
         scalars.set("q_loss", 0.25);

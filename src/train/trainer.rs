@@ -10,7 +10,7 @@ use tch::{Kind, Tensor};
 use super::batches::Batches;
 use super::metrics::{Report, Scalars};
 use super::preset::Preset;
-use super::training_state::State;
+use super::training_state::TrainingState;
 use crate::agent::checkpoint::Networks;
 use crate::algo::batch::{Batch, Transitions, seen};
 use crate::algo::bc;
@@ -33,7 +33,7 @@ pub struct Trainer<'a> {
     /// How.
     pub preset: &'a Preset,
     /// Its state.
-    pub state: State<'a>,
+    pub state: TrainingState<'a>,
 }
 
 /// Keeps the networks of a saved step, and may add to what is reported of it.
@@ -191,9 +191,9 @@ mod tests {
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::policy::PolicySpec;
-    use crate::nets::visual_encoder::Eyes;
+    use crate::nets::visual_encoder::VisualEncoder;
     use crate::nets::weights;
-    use crate::train::training_data::{Maps, Material, Pool, Rows, Told, joined};
+    use crate::train::training_data::{ConditioningTable, Maps, Pool, Rows, TrainingData, joined};
 
     const FRAMES: u64 = 24;
 
@@ -306,13 +306,13 @@ mod tests {
         loop {
             tch::manual_seed(1);
             let networks = {
-                let eyes = Eyes::house(&preset.visual, Device::Cpu);
+                let eyes = VisualEncoder::house(&preset.visual, Device::Cpu);
                 Networks::new(eyes, &preset.policy, preset.critic.as_ref(), Device::Cpu)
             };
             let told = match preset.policy.goal {
-                Some(_) => Told::Goals,
-                None if preset.policy.attention.is_some() => Told::Words(vec![vec![2, 3], vec![4]]),
-                None => Told::Sentences(Rows::new(&sentences, Device::Cpu).unwrap()),
+                Some(_) => ConditioningTable::Goals,
+                None if preset.policy.attention.is_some() => ConditioningTable::Words(vec![vec![2, 3], vec![4]]),
+                None => ConditioningTable::Sentences(Rows::new(&sentences, Device::Cpu).unwrap()),
             };
             let pool = preset.chaining.as_ref().and_then(|chaining| match chaining.pairs {
                 Pairs::InBatch => None,
@@ -324,10 +324,11 @@ mod tests {
                 }
             });
             let material =
-                Material { items: &items, maps: Maps::on(&features, Device::Cpu), told, pool, embed: &embed };
+                TrainingData { items: &items, maps: Maps::on(&features, Device::Cpu), told, pool, embed: &embed };
             let (judged, size) = (networks.critic.is_some(), (preset.seed, preset.training.batch));
             let batches = Batches::new(material, 2, judged, preset.chaining.as_ref(), size, Device::Cpu);
-            let trainer = Trainer { networks: &networks, preset, state: State { path: &state, identity: &identity } };
+            let trainer =
+                Trainer { networks: &networks, preset, state: TrainingState { path: &state, identity: &identity } };
             let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
             stop.store(false, Ordering::Relaxed);
             let mut keep = |step, _: &mut Scalars| keep(step);

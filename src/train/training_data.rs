@@ -13,13 +13,13 @@ use crate::data::items::{Item, Items};
 pub type Embed<'a> = dyn Fn(&[&str]) -> anyhow::Result<Tensor> + Sync + 'a;
 
 /// Everything that batches are made of.
-pub struct Material<'a> {
+pub struct TrainingData<'a> {
     /// Spans and labels.
     pub items: &'a Items,
     /// A map a frame.
     pub maps: Maps<'a>,
     /// What the agent is told.
-    pub told: Told,
+    pub told: ConditioningTable,
     /// Pairs of texts to chain, where they are drawn beforehand.
     pub pool: Option<Pool>,
     /// Embeds texts that are joined while training, [texts, width].
@@ -129,7 +129,7 @@ impl Rows {
 }
 
 /// What the agent is told.
-pub enum Told {
+pub enum ConditioningTable {
     /// A row a text: its sentence's embedding.
     Sentences(Rows),
     /// The words of a text, by their numbers.
@@ -180,7 +180,7 @@ pub fn joined(items: &Items, (first, second): (u32, u32)) -> String {
     format!("{} {}", items.texts[first as usize], items.texts[second as usize])
 }
 
-impl Material<'_> {
+impl TrainingData<'_> {
     /// "A. B." of pairs of items, embedded now and not kept: [pairs, width].
     ///
     /// # Errors

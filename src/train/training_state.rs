@@ -10,14 +10,14 @@ use crate::nets::weights::Tensors;
 
 /// Where a training's state lies, and what it belongs to.
 #[derive(Clone, Copy)]
-pub struct State<'a> {
+pub struct TrainingState<'a> {
     /// The file.
     pub path: &'a Path,
     /// What a state must have been made with to be taken up, by name: the dataset, the encoders.
     pub identity: &'a BTreeMap<String, String>,
 }
 
-impl State<'_> {
+impl TrainingState<'_> {
     /// Writes the state after so many steps, whole or not at all.
     ///
     /// # Errors
@@ -62,12 +62,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state.safetensors");
         let [own, other] = ["abc", "def"].map(|dataset| [("dataset".to_string(), dataset.to_string())].into());
-        let state = State { path: &path, identity: &own };
+        let state = TrainingState { path: &path, identity: &own };
         assert!(state.read().unwrap().is_none());
         let tensors: Tensors = [("a".to_string(), Tensor::from_slice(&[1.0f32, 2.0]))].into();
         state.write(7, &tensors).unwrap();
         assert_eq!(state.read().unwrap(), Some((7, tensors)));
-        let error = State { identity: &other, ..state }.read().unwrap_err().to_string();
+        let error = TrainingState { identity: &other, ..state }.read().unwrap_err().to_string();
         assert!(error.contains("state.safetensors: dataset is abc, this training's is def"), "{error}");
     }
 }

@@ -50,7 +50,7 @@ impl std::fmt::Display for Rate {
 /// What an appraisal found.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Findings {
+pub struct ValidationReport {
     /// One-skill tasks that the policy solved.
     pub agent: Rate,
     /// The same tasks, solved by chance.
@@ -69,8 +69,12 @@ pub struct Findings {
 ///
 /// # Errors
 /// When the policy fails.
-pub fn appraise(policy: &mut dyn Policy, appraisal: &Appraisal, report: &mut dyn Report) -> anyhow::Result<Findings> {
-    let mut findings = Findings::default();
+pub fn appraise(
+    policy: &mut dyn Policy,
+    appraisal: &Appraisal,
+    report: &mut dyn Report,
+) -> anyhow::Result<ValidationReport> {
+    let mut findings = ValidationReport::default();
     let mut chance = RandomPolicy::new();
     let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
     let mut number = 0;

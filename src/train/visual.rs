@@ -8,17 +8,17 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::{Kind, Tensor, nn};
 
-use super::frame_store::Footage;
+use super::frame_store::FrameStore;
 use super::metrics::{Report, Scalars};
 use super::perception_targets::{MARKS, Sight};
 use super::preset::Preset;
-use super::training_state::State;
+use super::training_state::TrainingState;
 use crate::algo::learner::Learner;
 use crate::domain::Class;
 use crate::house::House;
 use crate::house::render::Renderer;
 use crate::nets::perception_heads::{Known, SightHeads};
-use crate::nets::visual::{SIDE, VisualEncoder};
+use crate::nets::visual::{HouseEncoder, SIDE};
 
 /// Frames on which the encoder is measured while it trains.
 const MEASURED: usize = 256;
@@ -30,10 +30,10 @@ const MEASURED: usize = 256;
 /// When a state cannot be read or written, or a frame not be drawn.
 pub fn train(
     store: &nn::VarStore,
-    encoder: &VisualEncoder,
-    footage: &Footage,
+    encoder: &HouseEncoder,
+    frame_store: &FrameStore,
     preset: &Preset,
-    state: State<'_>,
+    state: TrainingState<'_>,
     report: &mut dyn Report,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
@@ -43,10 +43,10 @@ pub fn train(
     if let Some((step, tensors)) = state.read()? {
         learner.take_up(state.path, step, &tensors)?;
     }
-    let apart = footage.kept_apart(preset.hold_out);
+    let apart = frame_store.kept_apart(preset.hold_out);
     ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
     let drawn = |step, count, held_out| {
-        frames(footage, preset.seed, step, count, &|frame| apart[footage.trajectory_of(frame)] == held_out)
+        frames(frame_store, preset.seed, step, count, &|frame| apart[frame_store.trajectory_of(frame)] == held_out)
     };
     let held_out = if apart.contains(&true) { drawn(0, MEASURED, true) } else { Vec::new() };
     while !learner.is_done() {
@@ -54,7 +54,8 @@ pub fn train(
             state.write(learner.step(), &learner.state())?;
             return Ok(false);
         }
-        let (images, known) = batch(footage, encoder, &drawn(learner.step() + 1, training.optimisation.batch, false))?;
+        let (images, known) =
+            batch(frame_store, encoder, &drawn(learner.step() + 1, training.optimisation.batch, false))?;
         learner.begin_step();
         let loss = heads.loss(&encoder.forward_with(preset.precision, &images, true), &known, training.positive_weight);
         learner.minimise(&loss.total());
@@ -65,7 +66,7 @@ pub fn train(
             scalars.add("held", &loss.held);
         }
         if (learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done()) && !held_out.is_empty() {
-            measure(encoder, &heads, footage, &held_out, &mut scalars)?;
+            measure(encoder, &heads, frame_store, &held_out, &mut scalars)?;
         }
         report.step(&scalars)?;
         if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
@@ -76,13 +77,13 @@ pub fn train(
 }
 
 fn measure(
-    encoder: &VisualEncoder,
+    encoder: &HouseEncoder,
     heads: &SightHeads,
-    footage: &Footage,
+    frame_store: &FrameStore,
     held_out: &[usize],
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
-    let (images, known) = batch(footage, encoder, held_out)?;
+    let (images, known) = batch(frame_store, encoder, held_out)?;
     tch::no_grad(|| {
         let maps = encoder.forward(&images, false);
         for (name, from, to) in [("classes", 0, Class::VOCABULARY), ("possible", Class::VOCABULARY, MARKS - 1)] {
@@ -96,20 +97,20 @@ fn measure(
 }
 
 /// The frames of a step, of those that are wanted: a function of the seed and the step. There has to be one.
-fn frames(footage: &Footage, seed: u64, step: u64, count: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<usize> {
+fn frames(frame_store: &FrameStore, seed: u64, step: u64, count: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5157);
     rng.set_stream(step);
-    std::iter::repeat_with(|| rng.random_range(0..footage.frames()))
+    std::iter::repeat_with(|| rng.random_range(0..frame_store.frames()))
         .filter(|&frame| wanted(frame))
         .take(count)
         .collect()
 }
 
 /// Draws frames: what the encoder reads and what is known of them.
-fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, Known)> {
+fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, Known)> {
     let spec = encoder.spec();
     let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, Sight)> {
-        let (scene, world) = footage.state(frame)?;
+        let (scene, world) = frame_store.state(frame)?;
         let frame = renderer.draw(scene, &world);
         Ok((spec.image(frame), Sight::of(scene, &world, frame)))
     };
@@ -133,7 +134,7 @@ fn batch(footage: &Footage, encoder: &VisualEncoder, frames: &[usize]) -> anyhow
     Ok((Tensor::from_slice(&images.concat()).view([n, 3, side, side]), known))
 }
 
-/// Footage for tests.
+/// FrameStore for tests.
 #[cfg(test)]
 pub mod testing {
     use super::*;
@@ -143,7 +144,7 @@ pub mod testing {
     use crate::house::testing::kitchen;
 
     /// Two turns around in the test kitchen.
-    pub fn footage() -> Footage {
+    pub fn frame_store() -> FrameStore {
         let folder = tempfile::tempdir().unwrap();
         let (scene, start) = kitchen();
         let mut writer = crate::data::dataset::Writer::new(folder.path()).unwrap();
@@ -157,7 +158,7 @@ pub mod testing {
             writer.trajectory(&trajectory).unwrap();
         }
         writer.finish(&dataset::testing::manifest(1, &[])).unwrap();
-        Footage::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
+        FrameStore::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
     }
 
     /// Notes what is reported.
@@ -175,7 +176,7 @@ pub mod testing {
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::testing::{Notes, footage};
+    use super::testing::{Notes, frame_store};
     use super::*;
     use crate::nets::precision::Precision;
     use tch::Device;
@@ -183,8 +184,8 @@ mod tests {
     #[test]
     fn the_encoder_learns_what_a_few_frames_show() {
         let _chance = crate::nets::testing::chance();
-        let footage = footage();
-        assert_eq!(footage.frames(), 10);
+        let frame_store = frame_store();
+        assert_eq!(frame_store.frames(), 10);
         let mut preset = Preset::named("l-bc").unwrap();
         preset.visual.channels = vec![4, 4, 8, 16];
         preset.visual_training.optimisation.batch = 8;
@@ -195,12 +196,12 @@ mod tests {
             preset.visual_training.optimisation.steps = steps;
             tch::manual_seed(2);
             let store = nn::VarStore::new(Device::Cpu);
-            let encoder = VisualEncoder::new(&(store.root() / "encoder"), &preset.visual);
+            let encoder = HouseEncoder::new(&(store.root() / "encoder"), &preset.visual);
             let folder = tempfile::tempdir().unwrap();
             let (path, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
-            let state = State { path: &path, identity: &BTreeMap::new() };
+            let state = TrainingState { path: &path, identity: &BTreeMap::new() };
             let mut notes = Notes(Vec::new());
-            assert!(train(&store, &encoder, &footage, &preset, state, &mut notes, &stop).unwrap());
+            assert!(train(&store, &encoder, &frame_store, &preset, state, &mut notes, &stop).unwrap());
             notes.0.iter().map(|scalars| scalars.values["marks"]).collect()
         };
         let (full, mixed) = (losses(Precision::Full, 90), losses(Precision::Mixed, 2));

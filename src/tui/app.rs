@@ -17,7 +17,7 @@ use super::theme::Ability;
 use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
 use crate::analysis::instruction_ab::Contrast;
-use crate::analysis::value_map::Landscape;
+use crate::analysis::value_map::ValueMap;
 use crate::domain::Heading;
 use crate::explore::breakpoints::Condition;
 use crate::explore::chained::Chained;
@@ -70,7 +70,7 @@ pub struct App {
     /// Values are painted on the map.
     pub paints_values: bool,
     /// The values, and the step of the house that they are for.
-    pub landscape: Option<(Arc<Landscape>, u32)>,
+    pub landscape: Option<(Arc<ValueMap>, u32)>,
     /// The heading whose values are painted; the best without one.
     pub heading: Option<Heading>,
     /// The chain that is followed.

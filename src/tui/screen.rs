@@ -27,7 +27,7 @@ use super::terminal::{self, Counted};
 use super::theme::Ability;
 use super::update::{Effect, Farewell, Msg, update};
 use crate::agent::registry::PolicyKind;
-use crate::explore::session::Engine;
+use crate::explore::session::Session;
 use crate::explore::worker;
 use crate::explore::worker::{Command, Going};
 
@@ -64,7 +64,10 @@ const PATIENCE: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// When there is no terminal, or the worker stopped.
-pub fn run(screen: Screen, open: impl FnOnce() -> anyhow::Result<Engine> + Send + 'static) -> anyhow::Result<Farewell> {
+pub fn run(
+    screen: Screen,
+    open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
+) -> anyhow::Result<Farewell> {
     // The screen strips colours itself where there are none: kitty's placeholders carry a number in theirs.
     crossterm::style::force_color_output(true);
     let ability = ability();

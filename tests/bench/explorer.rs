@@ -16,8 +16,8 @@ use ratatui::{Terminal, TerminalOptions, Viewport};
 use sprint_explorer::agent::registry::{Policies, PolicyKind};
 use sprint_explorer::domain::scene::Room;
 use sprint_explorer::episode::scenes::Scenes;
-use sprint_explorer::explore::episode_source::{Openings, Start};
-use sprint_explorer::explore::session::Engine;
+use sprint_explorer::explore::episode_source::{EpisodeSource, Start};
+use sprint_explorer::explore::session::Session;
 use sprint_explorer::explore::worker;
 use sprint_explorer::explore::worker::{Command, Going, Pace};
 use sprint_explorer::tui::app::{App, Graphics};
@@ -38,9 +38,9 @@ const LIMITS: (Duration, Duration) = (Duration::from_millis(5), Duration::from_m
 /// Steps over which bytes and times of frames are taken.
 const STEPS: usize = 60;
 
-fn engine() -> anyhow::Result<Engine> {
-    let openings = Openings::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
-    Engine::new(openings, Policies::new(Vec::new()), PolicyKind::Expert, None)
+fn engine() -> anyhow::Result<Session> {
+    let openings = EpisodeSource::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
+    Session::new(openings, Policies::new(Vec::new()), PolicyKind::Expert, None)
 }
 
 /// What a protocol is measured at, and what a typical step may cost.
@@ -125,9 +125,9 @@ fn main() -> anyhow::Result<()> {
     let (tell, messages) = sync_channel(64);
     let reports = tell.clone();
     let open = || {
-        let openings = Openings::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
+        let openings = EpisodeSource::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
         let policies = Policies::new(Vec::new());
-        Engine::new(openings, policies, PolicyKind::Random, Some("look around"))
+        Session::new(openings, policies, PolicyKind::Random, Some("look around"))
     };
     let commands = worker::start(
         open,

@@ -14,12 +14,12 @@ use sprint_explorer::data::features::{Features, Header, Writer};
 use sprint_explorer::data::items::{Items, Label, Span};
 use sprint_explorer::data::selection::{Named, Past};
 use sprint_explorer::nets::device::best_device;
-use sprint_explorer::nets::visual_encoder::Eyes;
+use sprint_explorer::nets::visual_encoder::VisualEncoder;
 use sprint_explorer::train::batches::Batches;
 use sprint_explorer::train::preset::Preset;
 use sprint_explorer::train::trainer::Trainer;
-use sprint_explorer::train::training_data::{Maps, Material, Pool, Rows, Told, joined};
-use sprint_explorer::train::training_state::State;
+use sprint_explorer::train::training_data::{ConditioningTable, Maps, Pool, Rows, TrainingData, joined};
+use sprint_explorer::train::training_state::TrainingState;
 use tch::{Device, Kind, Tensor};
 
 const FRAMES: u32 = 6000;
@@ -59,9 +59,11 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
     };
     let texts: Vec<&str> = items.texts.iter().map(String::as_str).collect();
     let told = match (&preset.policy.goal, &preset.policy.attention) {
-        (Some(_), _) => Told::Goals,
-        (None, Some(_)) => Told::Words((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect()),
-        (None, None) => Told::Sentences(Rows::new(&embed(&texts)?, device)?),
+        (Some(_), _) => ConditioningTable::Goals,
+        (None, Some(_)) => {
+            ConditioningTable::Words((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect())
+        }
+        (None, None) => ConditioningTable::Sentences(Rows::new(&embed(&texts)?, device)?),
     };
     let pool = match preset.chaining.as_ref().map(|chaining| chaining.pairs) {
         Some(Pairs::Pool(count)) => {
@@ -72,12 +74,13 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
         }
         _ => None,
     };
-    let networks = Networks::new(Eyes::house(&preset.visual, device), &preset.policy, preset.critic.as_ref(), device);
-    let material = Material { items: &items, maps: Maps::on(&features, device), told, pool, embed: &embed };
+    let networks =
+        Networks::new(VisualEncoder::house(&preset.visual, device), &preset.policy, preset.critic.as_ref(), device);
+    let material = TrainingData { items: &items, maps: Maps::on(&features, device), told, pool, embed: &embed };
     let (judged, batch) = (networks.critic.is_some(), preset.training.batch);
     let batches =
         Batches::new(material, preset.policy.history, judged, preset.chaining.as_ref(), (preset.seed, batch), device);
-    let state = State { path: Path::new(""), identity: &BTreeMap::new() };
+    let state = TrainingState { path: Path::new(""), identity: &BTreeMap::new() };
     let trainer = Trainer { networks: &networks, preset, state };
     let mut update = trainer.update()?;
     let (mut gathering, mut updating) = (Vec::new(), Vec::new());

@@ -23,7 +23,7 @@ use sprint_explorer::eval::tasks::check;
 use sprint_explorer::eval::tasks::sample;
 use sprint_explorer::eval::tasks::sample::Wish;
 use sprint_explorer::eval::verify::{Recorded, verify};
-use sprint_explorer::house::expert::Pace;
+use sprint_explorer::house::expert::TurnTiming;
 use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
 use sprint_explorer::nets::embedding_cache::EmbeddingCache;
@@ -173,7 +173,7 @@ fn manifests(at: &Path) -> Vec<Vec<u8>> {
 fn finished(at: &Path) -> anyhow::Result<()> {
     let path = at.join("run");
     let run = FinishedRun::open(&path)?;
-    run.bookings();
+    run.episode_specs();
     Comparison::of(&[FinishedRun::open(&path)?, run])?.0.markdown();
     let recorded = Recorded::open(&path, None)?;
     verify(&recorded, &mut |_| Ok(None), &mut |_| ())?;
@@ -194,7 +194,7 @@ fn collected(at: &Path, file: &str) -> Vec<Vec<u8>> {
         out: at.to_owned(),
         source: Source::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
         seed: 3,
-        manner: Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 },
+        manner: Manner { demonstrator: Demonstrator::ScanningExpert, pace: TurnTiming::Late, noise: 0.0 },
         learner: None,
     };
     collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();

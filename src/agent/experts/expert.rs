@@ -2,8 +2,8 @@
 
 use anyhow::Context;
 
-use crate::agent::policy::{Carried, Decision, Policy, Situation};
-use crate::house::expert::{Expert, Pace};
+use crate::agent::policy::{Decision, Observation, Policy, PolicyState};
+use crate::house::expert::{Expert, TurnTiming};
 
 /// Acts as the expert would.
 #[derive(Default)]
@@ -18,7 +18,7 @@ impl ExpertPolicy {
     }
 
     /// An expert that goes about things so.
-    pub fn of(pace: Pace) -> ExpertPolicy {
+    pub fn of(pace: TurnTiming) -> ExpertPolicy {
         ExpertPolicy { expert: Expert::of(pace) }
     }
 }
@@ -32,19 +32,19 @@ impl Policy for ExpertPolicy {
         self.expert.forget();
     }
 
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
         let grader =
             situation.grader.context("the expert needs a task with subtasks; it does not read instructions")?;
         let action = self.expert.next(situation.house, grader)?;
         Ok(Decision { action, mind: None })
     }
 
-    fn carried(&self) -> Carried {
-        Carried::Plan(Box::new(self.expert.plan()))
+    fn carried(&self) -> PolicyState {
+        PolicyState::Plan(Box::new(self.expert.plan()))
     }
 
-    fn put_back(&mut self, carried: Carried) {
-        if let Carried::Plan(plan) = carried {
+    fn put_back(&mut self, carried: PolicyState) {
+        if let PolicyState::Plan(plan) = carried {
             self.expert.follow(*plan);
         }
     }

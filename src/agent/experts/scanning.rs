@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 
 use anyhow::Context;
 
-use crate::agent::policy::{Decision, Policy, Situation};
+use crate::agent::policy::{Decision, Observation, Policy};
 use crate::domain::{Action, ActionType, Cell, Instance};
-use crate::house::expert::{Expert, Pace};
+use crate::house::expert::{Expert, TurnTiming};
 
 /// Turns to the right while it looks for something: with the first view, a full circle.
 const TURNS: u32 = 3;
 
 /// The expert, who first turns around until it has seen what it is going for.
-pub struct Seeker {
-    pace: Pace,
+pub struct ScanningExpert {
+    pace: TurnTiming,
     expert: Expert,
     /// Everything that came into view in this episode.
     seen: BTreeSet<Instance>,
@@ -22,10 +22,10 @@ pub struct Seeker {
     search: Option<(Instance, Cell, u32)>,
 }
 
-impl Seeker {
+impl ScanningExpert {
     /// A demonstrator at the start of an episode.
-    pub fn new(pace: Pace) -> Seeker {
-        Seeker { pace, expert: Expert::of(pace), seen: BTreeSet::new(), search: None }
+    pub fn new(pace: TurnTiming) -> ScanningExpert {
+        ScanningExpert { pace, expert: Expert::of(pace), seen: BTreeSet::new(), search: None }
     }
 
     /// Whether to turn on the spot before going for `aim`.
@@ -49,16 +49,16 @@ impl Seeker {
     }
 }
 
-impl Policy for Seeker {
+impl Policy for ScanningExpert {
     fn name(&self) -> &str {
         "seeker"
     }
 
     fn begin(&mut self, _seed: u64) {
-        *self = Seeker::new(self.pace);
+        *self = ScanningExpert::new(self.pace);
     }
 
-    fn decide(&mut self, situation: &mut Situation<'_>) -> anyhow::Result<Decision> {
+    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
         let grader = situation.grader.context("only a task can be demonstrated")?;
         let action = self.expert.next(situation.house, grader)?;
         self.seen.extend(situation.house.view().sightings.iter().map(|sighting| sighting.instance));

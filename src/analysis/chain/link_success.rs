@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{Chain, PATIENCE, Play, SLACK};
+use super::{Chain, ChainRun, PATIENCE, SLACK};
 use crate::agent::Policy;
 use crate::domain::{Instance, World};
 use crate::episode::rollout::Rollout;
@@ -10,7 +10,7 @@ use crate::house::grading::{Grader, Grading};
 
 /// How often a link was done from one entry state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rate {
+pub struct LinkRate {
     /// Times it was done.
     pub done: u32,
     /// Of how many.
@@ -35,16 +35,16 @@ impl Draws {
 
 /// Which link breaks: how often each is done from the expert's entry state and from the agent's own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Trials {
+pub struct LinkSuccess {
     /// From where the expert begins each link.
-    pub expert: Vec<Rate>,
+    pub expert: Vec<LinkRate>,
     /// From where the agent itself began it; empty where it never got there.
-    pub own: Vec<Rate>,
+    pub own: Vec<LinkRate>,
 }
 
-impl Trials {
+impl LinkSuccess {
     /// Takes over the rates of the links that another set of plays left out.
-    pub fn fill(&mut self, earlier: &Trials) {
+    pub fn fill(&mut self, earlier: &LinkSuccess) {
         let pairs = [(&mut self.expert, &earlier.expert), (&mut self.own, &earlier.own)];
         for (rates, before) in pairs {
             for (rate, before) in rates.iter_mut().zip(before).filter(|(rate, _)| rate.of == 0) {
@@ -64,7 +64,7 @@ impl Trials {
         if !self.is_complete() {
             return None;
         }
-        let share = |rate: &Rate| (rate.of > 0).then(|| f64::from(rate.done) / f64::from(rate.of));
+        let share = |rate: &LinkRate| (rate.of > 0).then(|| f64::from(rate.done) / f64::from(rate.of));
         let both = self.expert.iter().zip(&self.own).map(|(e, o)| (share(e), share(o)));
         let worst = both.map(|(e, o)| o.or(e).unwrap_or(1.0)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         worst.filter(|(_, share)| *share < 1.0).map(|(link, _)| link)
@@ -78,17 +78,17 @@ impl Trials {
 /// When nobody grades the chain, the expert cannot follow it, or the policy fails.
 pub fn trials(
     chain: &Chain,
-    play: &Play,
+    play: &ChainRun,
     policy: &mut dyn Policy,
     draws: Draws,
     stop: &AtomicBool,
-    visit: &mut dyn FnMut(&Trials),
-) -> anyhow::Result<Trials> {
+    visit: &mut dyn FnMut(&LinkSuccess),
+) -> anyhow::Result<LinkSuccess> {
     let entries = chain.expert().ok_or_else(|| {
         anyhow::anyhow!("nobody grades these links, or the expert cannot follow them: use a task's own chain")
     })?;
     let links = chain.links.len();
-    let mut found = Trials { expert: vec![Rate::default(); links], own: vec![Rate::default(); links] };
+    let mut found = LinkSuccess { expert: vec![LinkRate::default(); links], own: vec![LinkRate::default(); links] };
     policy.set_sampling(true);
     for draw in 0..draws.times {
         for (link, (steps, world, grader)) in entries.iter().enumerate().filter(|(link, _)| draws.include(*link)) {
@@ -160,13 +160,13 @@ mod tests {
 
     #[test]
     fn the_weakest_link_is_where_the_agent_does_worst() {
-        let rate = |done| Rate { done, of: 4 };
-        let trials = Trials { expert: vec![rate(4), rate(4), rate(3)], own: vec![rate(4), rate(1), rate(3)] };
+        let rate = |done| LinkRate { done, of: 4 };
+        let trials = LinkSuccess { expert: vec![rate(4), rate(4), rate(3)], own: vec![rate(4), rate(1), rate(3)] };
         assert_eq!(trials.weakest(), Some(1));
         let mut some = trials.clone();
-        (some.expert[0], some.own[0]) = (Rate::default(), Rate::default());
+        (some.expert[0], some.own[0]) = (LinkRate::default(), LinkRate::default());
         assert_eq!((some.is_complete(), some.weakest()), (false, None), "the first link may break, too");
-        let perfect = Trials { expert: vec![rate(4)], own: vec![rate(4)] };
+        let perfect = LinkSuccess { expert: vec![rate(4)], own: vec![rate(4)] };
         assert_eq!(perfect.weakest(), None);
     }
 }

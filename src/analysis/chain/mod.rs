@@ -4,8 +4,8 @@ mod link_success;
 mod play;
 mod split;
 
-pub use link_success::{Draws, Rate, Trials, trials};
-pub use play::{Handover, Outcome, Play};
+pub use link_success::{Draws, LinkRate, LinkSuccess, trials};
+pub use play::{ChainRun, Handover, LinkOutcome};
 pub use split::split;
 
 use std::sync::Arc;

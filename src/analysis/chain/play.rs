@@ -9,7 +9,7 @@ use crate::episode::rollout::Rollout;
 
 /// How a link came out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct LinkOutcome {
     /// It was reached: the links before it were done.
     pub reached: bool,
     /// It was done; `None` where nobody grades it.
@@ -44,9 +44,9 @@ impl Handover {
 
 /// A chain that was followed.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Play {
+pub struct ChainRun {
     /// How each link came out, as far as it got.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<LinkOutcome>,
     /// For every step, how warm each link was: V under its instruction, or without critics the probability that its
     /// instruction gives to what was done.
     pub heat: Vec<Vec<f32>>,
@@ -67,13 +67,13 @@ impl Chain {
         policy: &mut dyn Policy,
         whole: bool,
         stop: &AtomicBool,
-        visit: &mut dyn FnMut(&Play),
-    ) -> anyhow::Result<Play> {
+        visit: &mut dyn FnMut(&ChainRun),
+    ) -> anyhow::Result<ChainRun> {
         let limits = self.limits();
         let told = |link: usize| if whole { self.whole() } else { self.links[link].clone() };
         let mut rollout = Rollout::new(self.house(&self.start), told(0), self.grader(), None);
         policy.begin(0);
-        let mut play = Play::default();
+        let mut play = ChainRun::default();
         let all: u32 = limits.iter().sum();
         for (link, &limit) in limits.iter().enumerate() {
             let entry = rollout.house.world().clone();
@@ -85,7 +85,7 @@ impl Chain {
                 false => rollout.steps() - begun >= limit,
             };
             let mut last = None;
-            let breaks = |before: &Outcome| !before.reached || before.done == Some(false);
+            let breaks = |before: &LinkOutcome| !before.reached || before.done == Some(false);
             let failed = play.outcomes.last().is_some_and(breaks);
             while !failed && !spent(&rollout) && !stop.load(Ordering::Relaxed) {
                 let decision = rollout.decide(policy)?;
@@ -105,7 +105,7 @@ impl Chain {
                 _ => None,
             };
             let (steps, exit) = (rollout.steps() - begun, rollout.house.world().clone());
-            play.outcomes.push(Outcome {
+            play.outcomes.push(LinkOutcome {
                 reached: !failed,
                 done: done.filter(|_| !failed),
                 steps,
@@ -125,7 +125,7 @@ impl Chain {
         rollout: &mut Rollout,
         decision: &Decision,
         at: usize,
-        play: &mut Play,
+        play: &mut ChainRun,
     ) -> anyhow::Result<Option<(f32, f32)>> {
         let action = decision.action;
         let class = action.target.and_then(|target| rollout.house.world().class_of(rollout.house.scene(), target));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::agent::{Carried, Policy};
+use crate::agent::{Policy, PolicyState};
 use crate::domain::World;
 use crate::episode::record::Author;
 use crate::episode::rollout::Rollout;
@@ -22,12 +22,12 @@ pub struct Moment {
     /// Who decides.
     pub author: Author,
     /// What the policy carries.
-    pub carried: Carried,
+    pub carried: PolicyState,
 }
 
 impl Moment {
     /// The present state of a rollout.
-    pub fn of(rollout: &Rollout, author: &Author, carried: Carried) -> Moment {
+    pub fn of(rollout: &Rollout, author: &Author, carried: PolicyState) -> Moment {
         Moment {
             world: Arc::new(rollout.house.world().clone()),
             grader: rollout.grader.clone(),
@@ -57,7 +57,7 @@ pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout
     if before.is_empty() {
         return;
     }
-    let present = Moment::of(rollout, author, Carried::Nothing);
+    let present = Moment::of(rollout, author, PolicyState::Nothing);
     for (back, moment) in before.iter().enumerate().take(FRAMES - 1).rev() {
         moment.restore(rollout, now.saturating_sub(back as u32 + 1));
         // What it would have done is of no interest here; an expert may not even know.

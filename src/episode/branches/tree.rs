@@ -2,7 +2,7 @@
 
 use super::moment::Moment;
 use super::taken::Taken;
-use crate::agent::Carried;
+use crate::agent::PolicyState;
 
 /// A state's place in the tree.
 pub type Place = usize;
@@ -197,7 +197,7 @@ impl Tree {
         self.twigs.push(Twig { parent: Some(from), step, taken: Some(taken), moment: moment(), children: Vec::new() });
         self.twigs[from].children.push(place);
         if let Some(old) = place.checked_sub(CARRIED) {
-            self.twigs[old].moment.carried = Carried::Nothing;
+            self.twigs[old].moment.carried = PolicyState::Nothing;
         }
         let longer = self.branches[self.branch].tip == from;
         let growth = if longer {
@@ -253,7 +253,7 @@ mod tests {
             horizon: None,
             instruction: "go".into(),
             author: Author::hand(),
-            carried: Carried::Nothing,
+            carried: PolicyState::Nothing,
         }
     }
 

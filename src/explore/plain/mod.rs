@@ -9,7 +9,7 @@ use std::io::{BufRead, Write};
 use super::breakpoints::Condition;
 use super::chained::Chained;
 use super::choices::Sort;
-use super::session::Engine;
+use super::session::Session;
 use super::verb::{Verb, parse};
 use crate::agent::registry::PolicyKind;
 use crate::analysis::chain::Chain;
@@ -18,7 +18,7 @@ use say::opening;
 
 /// What a session without a screen remembers beside the episode.
 struct Plain {
-    engine: Engine,
+    engine: Session,
     /// Where runs stop.
     breaks: Vec<Condition>,
     /// The other instruction of the last comparison.
@@ -37,7 +37,7 @@ struct Plain {
 ///
 /// # Errors
 /// When reading or writing fails.
-pub fn run(engine: Engine, kind: PolicyKind, input: impl BufRead, mut out: impl Write) -> anyhow::Result<()> {
+pub fn run(engine: Session, kind: PolicyKind, input: impl BufRead, mut out: impl Write) -> anyhow::Result<()> {
     let mut plain = Plain {
         engine,
         breaks: Vec::new(),

@@ -7,7 +7,7 @@ use super::say::{branches, choices, compare, divergence, here, look, opening, st
 use super::work::chain;
 use crate::domain::Action;
 use crate::explore::breakpoints::Condition;
-use crate::explore::session::Engine;
+use crate::explore::session::Session;
 use crate::explore::timeline::words;
 use crate::explore::verb::{Page, SAID, Verb};
 
@@ -223,19 +223,19 @@ impl Plain {
     }
 }
 
-fn act(engine: &mut Engine, action: Action, out: &mut impl Write) -> anyhow::Result<()> {
+fn act(engine: &mut Session, action: Action, out: &mut impl Write) -> anyhow::Result<()> {
     anyhow::ensure!(engine.end().is_none(), "the episode is over; `back`, `reset` or `next`");
     let event = engine.act(action);
     step_line(engine, &event, None, out)
 }
 
-fn seek(engine: &mut Engine, step: u32, out: &mut impl Write) -> anyhow::Result<()> {
+fn seek(engine: &mut Session, step: u32, out: &mut impl Write) -> anyhow::Result<()> {
     engine.seek(step);
     here(engine, out)
 }
 
 /// So many steps, or until one of these conditions holds.
-fn steps(engine: &mut Engine, count: u32, until: &[Condition], out: &mut impl Write) -> anyhow::Result<()> {
+fn steps(engine: &mut Session, count: u32, until: &[Condition], out: &mut impl Write) -> anyhow::Result<()> {
     anyhow::ensure!(engine.end().is_none(), "the episode is over; `back`, `reset` or `next`");
     for _ in 0..count {
         let mind = engine.think()?.0.mind.clone();

@@ -2,18 +2,18 @@
 
 use std::io::Write;
 
-use crate::agent::Mind;
+use crate::agent::ActionDistribution;
 use crate::analysis::instruction_ab::Contrast;
 use crate::domain::{ActionType, Instance};
 use crate::episode::rollout::End;
 use crate::explore::choices::{Sort, choices as table};
 use crate::explore::inspect;
 use crate::explore::inspect::state;
-use crate::explore::session::{Engine, Event, Snapshot};
+use crate::explore::session::{Event, Session, Snapshot};
 use crate::explore::timeline::{Divergence, words};
 
 /// Where the explorer is in what was tried.
-pub(crate) fn here(engine: &Engine, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn here(engine: &Session, out: &mut impl Write) -> anyhow::Result<()> {
     let tree = engine.tree();
     let name = tree.branches().get(tree.branch()).map_or("", |branch| branch.name.as_str());
     let last = tree.last_taken().map_or_else(|| "the start".to_string(), words);
@@ -21,7 +21,7 @@ pub(crate) fn here(engine: &Engine, out: &mut impl Write) -> anyhow::Result<()> 
     Ok(())
 }
 
-pub(crate) fn branches(engine: &Engine, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn branches(engine: &Session, out: &mut impl Write) -> anyhow::Result<()> {
     let tree = engine.tree();
     for (at, branch) in tree.branches().iter().enumerate() {
         let mark = if at == tree.branch() { '*' } else { ' ' };
@@ -57,9 +57,9 @@ pub(crate) fn compare(contrast: &Contrast, out: &mut impl Write) -> anyhow::Resu
 
 /// One line for a step: number, action, outcome, what the policy weighed, how far the task is.
 pub(crate) fn step_line(
-    engine: &mut Engine,
+    engine: &mut Session,
     event: &Event,
-    mind: Option<&Mind>,
+    mind: Option<&ActionDistribution>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     write!(out, "step {}: {}: {}", event.step, event.action, event.outcome)?;
@@ -89,7 +89,7 @@ pub(crate) fn step_line(
 }
 
 /// The likeliest actions and, for interactions, the likeliest class.
-pub(crate) fn top(mind: &Mind) -> String {
+pub(crate) fn top(mind: &ActionDistribution) -> String {
     let mut actions: Vec<(f32, ActionType)> =
         ActionType::ALL.into_iter().filter_map(|kind| Some((mind.actions[kind.index()]?, kind))).collect();
     actions.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -112,7 +112,7 @@ pub(crate) fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()
 }
 
 /// Every legal choice: how likely, how good.
-pub(crate) fn choices(engine: &mut Engine, sort: Sort, out: &mut impl Write) -> anyhow::Result<()> {
+pub(crate) fn choices(engine: &mut Session, sort: Sort, out: &mut impl Write) -> anyhow::Result<()> {
     let (decision, values) = engine.think()?.clone();
     let now = engine.snapshot();
     let entropy = decision.mind.as_ref().map_or(String::new(), |mind| format!(", entropy {:.2}", mind.entropy));

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::Plain;
 use crate::agent::registry::{Loaded, Who};
-use crate::analysis::chain::{Draws, Play, Rate, Trials};
+use crate::analysis::chain::{ChainRun, Draws, LinkRate, LinkSuccess};
 use crate::analysis::value_map::survey;
 use crate::explore::chained::Chained;
 
@@ -59,7 +59,7 @@ impl Plain {
 
 /// How each link came out, by every policy that followed the chain.
 pub(crate) fn chain(followed: &[Chained], out: &mut impl Write) -> anyhow::Result<()> {
-    let word = |play: &Option<Play>, at: usize| match play.as_ref().and_then(|play| play.outcomes.get(at)) {
+    let word = |play: &Option<ChainRun>, at: usize| match play.as_ref().and_then(|play| play.outcomes.get(at)) {
         Some(outcome) if !outcome.reached => "not reached".to_string(),
         Some(outcome) => match outcome.done {
             Some(true) => format!("done in {}", outcome.steps),
@@ -79,7 +79,7 @@ pub(crate) fn chain(followed: &[Chained], out: &mut impl Write) -> anyhow::Resul
                 word(&known.as_one, at)
             )?;
             if let Some(trials) = &known.trials {
-                let rate = |rates: &[Rate]| {
+                let rate = |rates: &[LinkRate]| {
                     rates.get(at).map_or(String::new(), |rate| format!("{} of {}", rate.done, rate.of))
                 };
                 write!(out, "; from the expert's entry {}, from its own {}", rate(&trials.expert), rate(&trials.own))?;
@@ -93,7 +93,7 @@ pub(crate) fn chain(followed: &[Chained], out: &mut impl Write) -> anyhow::Resul
         writeln!(out)?;
     }
     for known in followed {
-        match known.trials.as_ref().filter(|trials| trials.is_complete()).map(Trials::weakest) {
+        match known.trials.as_ref().filter(|trials| trials.is_complete()).map(LinkSuccess::weakest) {
             Some(Some(at)) => writeln!(out, "{}: link {} breaks the chain", known.who.name, at + 1)?,
             Some(None) => writeln!(out, "{}: no link breaks", known.who.name)?,
             None => {}

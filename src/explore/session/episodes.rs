@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Engine;
+use super::Session;
 use crate::episode::branches::Tree;
 use crate::episode::rollout::Rollout;
 use crate::explore::episode_source::Opening;
@@ -10,7 +10,7 @@ use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
 
-impl Engine {
+impl Session {
     /// Opens the next house, or the next task of the set.
     ///
     /// # Errors

@@ -14,9 +14,9 @@ pub use step::Event;
 
 use std::sync::Arc;
 
-use super::episode_source::Openings;
+use super::episode_source::EpisodeSource;
 use crate::agent::registry::{Policies, PolicyKind};
-use crate::agent::{Carried, Decision, Policy, Values};
+use crate::agent::{Decision, Policy, PolicyState, Values};
 use crate::domain::Task;
 use crate::domain::task::SceneRef;
 use crate::episode::branches::{Moment, Tree};
@@ -26,8 +26,8 @@ use crate::house::view::Frame;
 use episodes::rollout_of;
 
 /// The episode under exploration.
-pub struct Engine {
-    openings: Openings,
+pub struct Session {
+    openings: EpisodeSource,
     policies: Policies,
     checkpoints: Arc<Vec<String>>,
     kind: PolicyKind,
@@ -47,26 +47,26 @@ pub struct Engine {
     looks_back: bool,
 }
 
-impl Engine {
+impl Session {
     /// Opens the first house. `instruction` replaces the task's own.
     ///
     /// # Errors
     /// When the house cannot be opened or the instruction is unfit.
     pub fn new(
-        openings: Openings,
+        openings: EpisodeSource,
         policies: Policies,
         kind: PolicyKind,
         instruction: Option<&str>,
-    ) -> anyhow::Result<Engine> {
+    ) -> anyhow::Result<Session> {
         let opening = openings.open()?;
         let rollout = rollout_of(&opening);
         let author = Author { policy: kind.name().into(), checkpoint: None, seed: openings.seed(), samples: false };
-        let mut engine = Engine {
+        let mut engine = Session {
             checkpoints: Arc::new(policies.agents()),
             policies,
             kind,
             policy: None,
-            tree: Tree::new(Moment::of(&rollout, &author, Carried::Nothing)),
+            tree: Tree::new(Moment::of(&rollout, &author, PolicyState::Nothing)),
             author,
             rollout,
             seed: openings.seed(),
@@ -94,7 +94,7 @@ impl Engine {
     }
 
     fn moment(&self) -> Moment {
-        let carried = self.policy.as_ref().map_or(Carried::Nothing, |policy| policy.carried());
+        let carried = self.policy.as_ref().map_or(PolicyState::Nothing, |policy| policy.carried());
         Moment::of(&self.rollout, &self.author, carried)
     }
 
@@ -196,7 +196,7 @@ mod tests {
     }
 
     /// Everything that decides what comes next, as text.
-    fn state(engine: &mut Engine) -> String {
+    fn state(engine: &mut Session) -> String {
         let frame = engine.snapshot().frame;
         let thought = engine.think().map(|(decision, _)| format!("{decision:?}")).unwrap_or_default();
         let moment = engine.moment();

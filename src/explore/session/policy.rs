@@ -1,11 +1,11 @@
 //! Who decides: which policy, which checkpoint, which chance.
 
-use super::Engine;
+use super::Session;
 use crate::agent::Policy;
 use crate::agent::registry::{Loaded, PolicyKind, Who};
 use crate::episode::record::Author;
 
-impl Engine {
+impl Session {
     /// Loads the chosen policy; slow the first time for the agent. It decides from here on, having seen the last frames.
     ///
     /// # Errors

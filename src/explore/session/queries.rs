@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use super::Engine;
+use super::Session;
 use crate::analysis::chain::Chain;
 use crate::analysis::instruction_ab::Contrast;
 use crate::analysis::{chain, instruction_ab};
@@ -11,10 +11,10 @@ use crate::domain::{Role, Subtask};
 use crate::explore::breakpoints::{Facts, gap};
 use crate::language::{instruction, nouns, phrases};
 
-impl Engine {
+impl Session {
     /// What conditions ask of the present state.
     pub fn facts(&mut self) -> Facts {
-        let classes = |engine: &mut Engine| {
+        let classes = |engine: &mut Session| {
             let seen = engine.rollout.house.view().sightings.clone();
             let house = &engine.rollout.house;
             seen.iter().filter_map(|seen| house.world().class_of(house.scene(), seen.instance)).collect()

@@ -4,22 +4,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::Engine;
+use super::Session;
 use crate::domain::{Scene, Task};
 use crate::episode::branches::Moment;
-use crate::episode::frames::Recording;
+use crate::episode::frames::FrameSequence;
 use crate::episode::scenes::Setting;
 use crate::explore::session_export;
-use crate::explore::session_export::Explored;
+use crate::explore::session_export::SessionExport;
 use crate::report::export;
 use crate::run_dir::writer;
 
-impl Engine {
+impl Session {
     /// Everything that was tried as a run's tasks and episodes, a branch each.
-    pub fn explored(&self) -> Explored {
+    pub fn explored(&self) -> SessionExport {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
-        Explored {
+        SessionExport {
             scene: self.rollout.house.scene().clone(),
             tasks,
             episodes: branches().map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
@@ -30,11 +30,11 @@ impl Engine {
     ///
     /// # Errors
     /// Never for what the simulator itself did.
-    pub fn recording(&self) -> anyhow::Result<Recording> {
+    pub fn recording(&self) -> anyhow::Result<FrameSequence> {
         let start = &self.tree.beginning(self.tree.branch());
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
         let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
-        Recording::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
+        FrameSequence::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
     }
 
     /// The present state and instruction as a task: what is left of the subtasks, with the expert's own number of steps.

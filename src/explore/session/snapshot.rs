@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Engine;
+use super::Session;
 use crate::agent::Reading;
 use crate::agent::registry::PolicyKind;
 use crate::domain::{Cell, Scene, World};
@@ -71,7 +71,7 @@ pub struct Progress {
     pub waits_for: String,
 }
 
-impl Engine {
+impl Session {
     /// The present state for a screen; draws the frame when it changed.
     pub fn snapshot(&mut self) -> Snapshot {
         let candidates = self.rollout.house.candidates();

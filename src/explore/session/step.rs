@@ -1,6 +1,6 @@
 //! What the policy would do, and the steps that are taken.
 
-use super::Engine;
+use super::Session;
 use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
 use crate::domain::Action;
@@ -27,7 +27,7 @@ pub struct Event {
     pub forked: Option<String>,
 }
 
-impl Engine {
+impl Session {
     /// What the policy would do now. Decided once a state, and again when the instruction or the policy changes.
     ///
     /// # Errors

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Engine, rollout_of};
-use crate::agent::{Carried, Decision};
+use super::{Session, rollout_of};
+use crate::agent::{Decision, PolicyState};
 use crate::domain::Action;
 use crate::episode::branches;
 use crate::episode::branches::{FRAMES, Moment};
@@ -13,7 +13,7 @@ use crate::explore::side_by_side::beside;
 use crate::explore::timeline::Divergence;
 use crate::house::House;
 
-impl Engine {
+impl Session {
     /// Goes to a step of the branch in hand, or to its end.
     pub fn seek(&mut self, step: u32) {
         self.tree.seek(step);
@@ -82,7 +82,7 @@ impl Engine {
         moment.restore(&mut self.rollout, self.tree.at());
         self.frame = None;
         self.decision = None;
-        if moment.author == self.author && !matches!(moment.carried, Carried::Nothing) {
+        if moment.author == self.author && !matches!(moment.carried, PolicyState::Nothing) {
             if let Some(policy) = self.policy.as_deref_mut() {
                 policy.put_back(moment.carried);
             }

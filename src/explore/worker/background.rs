@@ -8,12 +8,12 @@ use super::{Report, Worker};
 use crate::agent::Policy;
 use crate::agent::registry::{Loaded, Who};
 use crate::analysis::chain::Draws;
-use crate::analysis::value_map::{Landscape, survey};
+use crate::analysis::value_map::{ValueMap, survey};
 use crate::domain::{Heading, Scene, World};
 use crate::explore::chained::Chained;
 
 /// Finished surveys by who was asked, what it was told, and the house without the agent.
-pub(crate) type Surveys = Arc<Mutex<HashMap<(Who, String, String), Arc<Landscape>>>>;
+pub(crate) type Surveys = Arc<Mutex<HashMap<(Who, String, String), Arc<ValueMap>>>>;
 
 /// The policy that worked in the background last: loading one takes a while.
 pub(crate) type Spare = Arc<Mutex<Option<(Who, Box<dyn Policy>)>>>;
@@ -109,7 +109,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         let (tell, surveys, spare) = (self.tell.clone(), self.surveys.clone(), self.spare.clone());
         self.background.start(Work::Survey, move |turn| {
             let mut policy = policy;
-            let mut visit = |found: &Landscape| {
+            let mut visit = |found: &ValueMap| {
                 let far = format!("values {}/{}", found.heights.len(), found.of);
                 let found = Arc::new(found.clone());
                 turn.say(|| tell(Report::Working(Some(far))) && tell(Report::Surveyed(found, step)))

@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Instant;
 
 use super::breakpoints::Condition;
-use super::session::Engine;
+use super::session::Session;
 use crate::agent::registry::PolicyKind;
 use crate::analysis::chain::Chain;
 use background::{Background, Followed, Spare, Surveys};
@@ -27,7 +27,7 @@ use background::{Background, Followed, Spare, Surveys};
 /// # Errors
 /// When the system has no thread left.
 pub fn start(
-    open: impl FnOnce() -> anyhow::Result<Engine> + Send + 'static,
+    open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
     tell: impl Fn(Report) -> bool + Send + Sync + 'static,
     fail: impl FnOnce(String) + Send + 'static,
 ) -> std::io::Result<Sender<Command>> {
@@ -54,7 +54,7 @@ pub fn start(
 }
 
 struct Worker<T> {
-    engine: Engine,
+    engine: Session,
     going: Option<Going>,
     pace: Pace,
     due: Instant,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Going;
 use crate::agent::{Decision, Values};
 use crate::analysis::instruction_ab::Contrast;
-use crate::analysis::value_map::Landscape;
+use crate::analysis::value_map::ValueMap;
 use crate::episode::rollout::End;
 use crate::explore::chained::Chained;
 use crate::explore::session::{Event, Snapshot};
@@ -42,7 +42,7 @@ pub enum Report {
     /// What two instructions come to.
     Compared(Box<Contrast>),
     /// The values of the cells so far, in the house as it was at that step.
-    Surveyed(Arc<Landscape>, u32),
+    Surveyed(Arc<ValueMap>, u32),
     /// A chain so far.
     Chained(Box<Chained>),
     /// Work in the background, with how far it is; nothing when it is over.

@@ -44,17 +44,17 @@ pub enum NoWay {
 
 /// How an expert goes about what can be done in several equally good ways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum TurnTiming {
     /// Turns as late as it may and acts where its target is seen best.
-    Steady,
+    Late,
     /// Turns as soon as it may and acts as soon as its target is at hand. Who learns from it and does not know exactly where
     /// it stands need not hit the last moment for either.
-    Prompt,
+    Early,
 }
 
 /// Plans from the present state, keeps to the plan while the world goes as expected, and plans anew when it does not.
 pub struct Expert {
-    pace: Pace,
+    pace: TurnTiming,
     scout: Scout,
     scene: Option<(Arc<Scene>, Floor)>,
     plan: VecDeque<Action>,
@@ -81,11 +81,11 @@ impl Default for Expert {
 impl Expert {
     /// A steady expert without a plan.
     pub fn new() -> Expert {
-        Expert::of(Pace::Steady)
+        Expert::of(TurnTiming::Late)
     }
 
     /// An expert without a plan.
-    pub fn of(pace: Pace) -> Expert {
+    pub fn of(pace: TurnTiming) -> Expert {
         Expert { pace, scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
     }
 
@@ -119,7 +119,7 @@ impl Expert {
             self.scout.visit(world, same_scene);
             self.plan = self.plan_from(&scene, world, grader)?.into();
         }
-        if self.pace == Pace::Prompt
+        if self.pace == TurnTiming::Early
             && let Some(&aim) = self.plan.back()
             && is_at_hand(house, aim)
         {
@@ -153,7 +153,7 @@ impl Expert {
     fn plan_from(&mut self, scene: &Scene, world: &World, grader: &Grader) -> Result<Vec<Action>, NoWay> {
         let intent = plan::intent(scene, world, grader)?;
         let Some((_, floor)) = &self.scene else { return Err(NoWay::Finished) };
-        let turning = if self.pace == Pace::Prompt { Turning::Early } else { Turning::Late };
+        let turning = if self.pace == TurnTiming::Early { Turning::Early } else { Turning::Late };
         let paths = Paths::from(floor, world.agent, turning);
         let left = plan::left_open(scene, world, &intent);
         if !left.is_empty()
@@ -364,7 +364,7 @@ mod tests {
         use crate::domain::{Room, task::SceneRef};
         use crate::house::generate;
         use rand::SeedableRng;
-        let walked = |pace: Pace| {
+        let walked = |pace: TurnTiming| {
             let ahead = |seed: u64| {
                 let (scene, world) = generate::house(Room::LivingRoom, seed);
                 let (scene, reference) = (Arc::new(scene), SceneRef::Generated { room: Room::LivingRoom, seed });
@@ -379,7 +379,7 @@ mod tests {
             };
             (0..8).map(ahead).sum::<usize>()
         };
-        let (prompt, steady) = (walked(Pace::Prompt), walked(Pace::Steady));
+        let (prompt, steady) = (walked(TurnTiming::Early), walked(TurnTiming::Late));
         assert!(prompt < steady, "{prompt} steps, {steady} of the steady one");
     }
 

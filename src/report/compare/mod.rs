@@ -67,7 +67,7 @@ impl Comparison {
         let [first, others @ ..] = runs else { anyhow::bail!("name the runs to compare") };
         anyhow::ensure!(!others.is_empty(), "name a second run to compare with {}", first.path.display());
         let summary = |run: &FinishedRun| {
-            let partial = run.episodes.len() < run.bookings().len();
+            let partial = run.episodes.len() < run.episode_specs().len();
             Summary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
         };
         let summaries: Vec<Summary> = runs.iter().map(summary).collect();

@@ -168,7 +168,7 @@ fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) 
 pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
-    use crate::episode::instruction_variant::Wording;
+    use crate::episode::instruction_variant::InstructionVariant;
     use crate::episode::scenes::Scenes;
     use crate::run_dir::manifest::Manifest;
     use crate::run_dir::manifest::tests::manifest;
@@ -210,7 +210,7 @@ pub(crate) mod tests {
     fn other_words_and_other_starts_are_not_compared() {
         let [a, b] = [("a", [true, true, true]), ("b", [true, false, false])].map(|(name, outcomes)| {
             let mut run = run(name, &outcomes);
-            (run.episodes[1].wording, run.episodes[2].from) = (Wording::Swapped, 1);
+            (run.episodes[1].wording, run.episodes[2].from) = (InstructionVariant::Swapped, 1);
             run
         });
         let paired = Paired::of(&a, &b).unwrap();

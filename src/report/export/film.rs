@@ -6,7 +6,7 @@ use gif::{Encoder, Frame, Repeat};
 use super::canvas::Canvas;
 use super::lettering;
 use super::lettering::LINE;
-use crate::episode::frames::{Recording, Shot};
+use crate::episode::frames::{FrameSequence, Shot};
 
 const PAPER: [u8; 3] = [20, 20, 24];
 const INK: [u8; 3] = [230, 230, 230];
@@ -21,7 +21,7 @@ const SHOWN: (u16, u16) = (25, 200);
 ///
 /// # Errors
 /// Never in practice: it is written to memory.
-pub fn draw(recording: &Recording) -> anyhow::Result<Vec<u8>> {
+pub fn draw(recording: &FrameSequence) -> anyhow::Result<Vec<u8>> {
     let mut camera = recording.camera();
     let mut data = Vec::new();
     let side = crate::house::House::FRAME;

@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::canvas::Canvas;
-use crate::episode::frames::Recording;
+use crate::episode::frames::FrameSequence;
 use crate::report::html::in_script;
 
 #[derive(Serialize)]
@@ -29,7 +29,7 @@ struct Step<'a> {
 ///
 /// # Errors
 /// Never in practice: it is written to memory.
-pub fn write(recording: &Recording) -> anyhow::Result<String> {
+pub fn write(recording: &FrameSequence) -> anyhow::Result<String> {
     let mut camera = recording.camera();
     let mut steps = Vec::with_capacity(recording.shots.len());
     for shot in &recording.shots {

@@ -14,7 +14,7 @@ use anyhow::bail;
 pub use canvas::Canvas;
 
 use crate::data::atomic_file;
-use crate::episode::frames::Recording;
+use crate::episode::frames::FrameSequence;
 
 /// Writes a recording in the form that the file's ending asks for: `.gif` a film with captions, `.strip.png` the frames at
 /// which subtasks were done, `.png` the frame at step `at`, `.txt` a transcript, `.html` a page that replays it. Returns the
@@ -22,7 +22,7 @@ use crate::episode::frames::Recording;
 ///
 /// # Errors
 /// When the ending is none of these, or the file cannot be written.
-pub fn write(recording: &Recording, at: u32, path: &Path) -> anyhow::Result<u64> {
+pub fn write(recording: &FrameSequence, at: u32, path: &Path) -> anyhow::Result<u64> {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().to_lowercase());
     let bytes = if name.ends_with(".strip.png") {
         strip::draw(recording).png()?

@@ -5,7 +5,7 @@ use anyhow::Context;
 use super::canvas::Canvas;
 use super::lettering;
 use super::lettering::LINE;
-use crate::episode::frames::{Recording, Shot};
+use crate::episode::frames::{FrameSequence, Shot};
 
 const PAPER: [u8; 3] = [255, 255, 255];
 const INK: [u8; 3] = [20, 20, 24];
@@ -21,14 +21,14 @@ const SIDE: usize = 150;
 ///
 /// # Errors
 /// When there is no such step.
-pub fn frame(recording: &Recording, at: u32) -> anyhow::Result<Canvas> {
+pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Canvas> {
     let shot = recording.shots.get(at as usize).with_context(|| format!("there is no step {at}"))?;
     let frame = recording.camera().draw(shot);
     Ok(Canvas { width: frame.width, height: frame.height, rgb: frame.rgb })
 }
 
 /// The first frame, those at which a subtask was done, and the last one, each over its words.
-pub fn draw(recording: &Recording) -> Canvas {
+pub fn draw(recording: &FrameSequence) -> Canvas {
     let shots = chosen(recording);
     let words: Vec<Vec<String>> = shots.iter().map(|shot| lettering::broken(&caption(shot), SIDE)).collect();
     let lines = words.iter().map(Vec::len).max().unwrap_or(1);
@@ -60,7 +60,7 @@ fn caption(shot: &Shot) -> String {
     }
 }
 
-fn chosen(recording: &Recording) -> Vec<&Shot> {
+fn chosen(recording: &FrameSequence) -> Vec<&Shot> {
     let last = recording.shots.len().saturating_sub(1);
     let telling = |(at, shot): &(usize, &Shot)| *at == 0 || *at == last || shot.done.is_some();
     let found: Vec<&Shot> = recording.shots.iter().enumerate().filter(telling).map(|(_, shot)| shot).collect();

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::agent::experts::scanning::Seeker;
+use crate::agent::experts::scanning::ScanningExpert;
 use crate::agent::learned::LearnedPolicy;
 use crate::agent::{Decision, ExpertPolicy, Policy};
 use crate::domain::trajectory::Annotation;
@@ -11,7 +11,7 @@ use crate::domain::{Action, ActionType, Scene, Task, Trajectory, World};
 use crate::episode::rollout::Rollout;
 use crate::episode::scenes::Setting;
 use crate::house::House;
-use crate::house::expert::Pace;
+use crate::house::expert::TurnTiming;
 use crate::house::grading::{Grader, Grading};
 use crate::language::phrases;
 
@@ -25,15 +25,15 @@ const SLACK: u32 = 40;
 pub enum Demonstrator {
     /// Turns around until it has seen what it goes for, as someone must who only sees.
     #[default]
-    Seeker,
+    ScanningExpert,
     /// Goes straight for things, seen or not, as ALFRED's planner did.
     Expert,
 }
 
 impl Demonstrator {
-    fn policy(self, pace: Pace) -> Box<dyn Policy> {
+    fn policy(self, pace: TurnTiming) -> Box<dyn Policy> {
         match self {
-            Demonstrator::Seeker => Box::new(Seeker::new(pace)),
+            Demonstrator::ScanningExpert => Box::new(ScanningExpert::new(pace)),
             Demonstrator::Expert => Box::new(ExpertPolicy::of(pace)),
         }
     }
@@ -45,7 +45,7 @@ pub struct Manner {
     /// Who says what is right in every state.
     pub demonstrator: Demonstrator,
     /// Which of several ways is right.
-    pub pace: Pace,
+    pub pace: TurnTiming,
     /// The share of steps at which chance takes over for a few steps.
     pub noise: f64,
 }

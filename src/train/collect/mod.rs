@@ -240,12 +240,13 @@ mod tests {
     use crate::domain::{Class, Role};
     use crate::episode::rollout::Rollout;
     use crate::house::House;
-    use crate::house::expert::Pace;
+    use crate::house::expert::TurnTiming;
     use crate::house::grading::{Grader, Grading};
     use crate::nets::embedding_cache::Embedder;
     use crate::nets::sentence::default_folder;
 
-    const UNDISTURBED: Manner = Manner { demonstrator: Demonstrator::Seeker, pace: Pace::Steady, noise: 0.0 };
+    const UNDISTURBED: Manner =
+        Manner { demonstrator: Demonstrator::ScanningExpert, pace: TurnTiming::Late, noise: 0.0 };
 
     struct Silent;
 
@@ -321,7 +322,7 @@ mod tests {
     #[test]
     fn who_is_prompt_is_done_sooner() {
         let expert = Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED };
-        let pairs = steps([expert, Manner { pace: Pace::Prompt, ..expert }]);
+        let pairs = steps([expert, Manner { pace: TurnTiming::Early, ..expert }]);
         let saved: Vec<_> = pairs.iter().filter(|(steady, prompt)| prompt < steady).collect();
         let (steady, prompt) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
         assert!(prompt < steady && !saved.is_empty(), "{pairs:?}");

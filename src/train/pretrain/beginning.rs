@@ -10,13 +10,13 @@ use super::Pretraining;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::Config;
 use crate::data::ensure_free;
-use crate::nets::visual::VisualEncoder;
-use crate::nets::visual_encoder::Eyes;
+use crate::nets::visual::HouseEncoder;
+use crate::nets::visual_encoder::VisualEncoder;
 use crate::nets::weights;
-use crate::train::frame_store::Footage;
+use crate::train::frame_store::FrameStore;
 use crate::train::metrics::Report;
 use crate::train::preset::Sight;
-use crate::train::training_state::State;
+use crate::train::training_state::TrainingState;
 use crate::train::visual;
 
 impl Pretraining {
@@ -73,10 +73,10 @@ impl Pretraining {
     }
 
     /// What the agent will see through: a House encoder with fresh weights, or ResNet-18.
-    fn eyes(&self) -> anyhow::Result<Eyes> {
+    fn eyes(&self) -> anyhow::Result<VisualEncoder> {
         match self.preset.eyes {
-            Sight::House => Ok(Eyes::house(&self.preset.visual, self.device)),
-            Sight::ResNet18 => Eyes::resnet18(&Eyes::resnet18_file(), self.device),
+            Sight::House => Ok(VisualEncoder::house(&self.preset.visual, self.device)),
+            Sight::ResNet18 => VisualEncoder::resnet18(&VisualEncoder::resnet18_file(), self.device),
         }
     }
 
@@ -84,17 +84,19 @@ impl Pretraining {
     pub(crate) fn train_visual(
         &self,
         networks: &Networks,
-        (footage, data): (&Footage, &str),
+        (frame_store, data): (&FrameStore, &str),
         report: &mut dyn Report,
         stop: &AtomicBool,
     ) -> anyhow::Result<bool> {
-        let (Eyes::House { store: own, .. }, None) = (&networks.eyes, &self.visual_from) else { return Ok(true) };
+        let (VisualEncoder::House { store: own, .. }, None) = (&networks.eyes, &self.visual_from) else {
+            return Ok(true);
+        };
         let path = self.out.join("training/visual.safetensors");
-        let state = State { path: &path, identity: &self.visual_identity(data) };
+        let state = TrainingState { path: &path, identity: &self.visual_identity(data) };
         // The heads live in a store of their own shape, so the trained encoder is copied out of it.
         let mut store = VarStore::new(self.device);
-        let encoder = VisualEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
-        let finished = visual::train(&store, &encoder, footage, &self.preset, state, report, stop)?;
+        let encoder = HouseEncoder::new(&(store.root() / "encoder"), &self.preset.visual);
+        let finished = visual::train(&store, &encoder, frame_store, &self.preset, state, report, stop)?;
         store.freeze();
         copy(&store, "encoder.", own)?;
         Ok(finished)

@@ -46,8 +46,13 @@ impl Pretraining {
             policy: self.preset.policy.clone(),
             critic: self.preset.critic.clone(),
             words: None,
-            balance: None,
-            weighing: self.preset.iql.as_ref().map(|iql| iql.weighing as f32).filter(|&weight| weight > 0.0),
+            logit_adjustment: None,
+            advantage_scale: self
+                .preset
+                .iql
+                .as_ref()
+                .map(|iql| iql.advantage_scale as f32)
+                .filter(|&weight| weight > 0.0),
             sentence_encoder: SentenceSpec {
                 name: self.sentence_encoder.clone(),
                 digest: embedder.encoder().digest().to_string(),

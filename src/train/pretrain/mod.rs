@@ -13,18 +13,18 @@ use tch::{Device, Tensor};
 
 use super::batches::Batches;
 use super::feature_cache;
-use super::frame_store::Footage;
+use super::frame_store::FrameStore;
 use super::in_training_eval;
-use super::in_training_eval::Trials;
+use super::in_training_eval::InTrainingEval;
 use super::metrics::{Journal, Report, Scalars};
 use super::preset::Preset;
-use super::tensorboard::Events;
+use super::tensorboard::TensorBoard;
 use super::trainer::Trainer;
-use super::training_data::{Embed, Maps, Material, Pool, Rows, Told, joined};
-use super::training_state::State;
+use super::training_data::{ConditioningTable, Embed, Maps, Pool, Rows, TrainingData, joined};
+use super::training_state::TrainingState;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
-use crate::agent::logit_adjustment::Balance;
+use crate::agent::logit_adjustment::LogitAdjustment;
 use crate::algo::chain::Pairs;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
@@ -50,7 +50,7 @@ pub struct Pretraining {
     /// A checkpoint whose critic is the start, instead of a fresh one.
     pub critic_from: Option<PathBuf>,
     /// Tasks that the agent tries while it trains.
-    pub trials: Option<Trials>,
+    pub trials: Option<InTrainingEval>,
     /// Embeds the instructions.
     pub sentences: SharedEmbedder,
     /// The name of the sentence encoder's folder.
@@ -82,7 +82,7 @@ impl Pretraining {
         let begun = self.check_out(&training)?;
         // What can be refused is refused before the folder is touched.
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
-        let footage = Footage::open(&datasets)?;
+        let frame_store = FrameStore::open(&datasets)?;
         let networks = self.networks()?;
         let trials =
             self.trials.as_ref().map(|trials| Ok::<_, anyhow::Error>((trials, trials.prepare()?))).transpose()?;
@@ -92,24 +92,24 @@ impl Pretraining {
         }
         self.keep_preset()?;
         let mut report = Journal::open(&training.join("progress.jsonl"), report)?;
-        let mut report = Events::open(&training, &mut report)?;
+        let mut report = TensorBoard::open(&training, &mut report)?;
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
         let digest = digests.join("-");
-        if !self.train_visual(&networks, (&footage, &digest), &mut report, stop)? {
+        if !self.train_visual(&networks, (&frame_store, &digest), &mut report, stop)? {
             return Ok(Trained::Stopped);
         }
         let encoder = networks.eyes.frozen()?;
-        let Some(features) = feature_cache::features(&*encoder, &datasets, &footage, &mut report, stop)? else {
+        let Some(features) = feature_cache::features(&*encoder, &datasets, &frame_store, &mut report, stop)? else {
             return Ok(Trained::Stopped);
         };
         let summaries = self.summaries()?;
         let source = Source {
-            trajectories: &footage.trajectories,
-            apart: &footage.kept_apart(self.preset.hold_out),
-            held_out: &footage.held_out,
+            trajectories: &frame_store.trajectories,
+            apart: &frame_store.kept_apart(self.preset.hold_out),
+            held_out: &frame_store.held_out,
             summaries: &summaries,
         };
-        let items = Items::of(&source, footage.labels()?, &self.preset.data)?;
+        let items = Items::of(&source, frame_store.labels()?, &self.preset.data)?;
         anyhow::ensure!(
             !items.training.is_empty(),
             "there is nothing to learn from: no span has a text, or every one is held out (hold_out is {})",
@@ -128,17 +128,21 @@ impl Pretraining {
         };
         let resnet18 = networks.eyes.store().is_none().then(|| encoder.digest().to_owned());
         let learned_from: BTreeSet<u32> = items.training.iter().map(|span| span.trajectory).collect();
-        let (dataset, trajectories) = description::each_once(&digests, &footage.parts, &learned_from);
-        let balance = Balance { strength: self.preset.balance, shares: items.action_shares() };
+        let (dataset, trajectories) = description::each_once(&digests, &frame_store.parts, &learned_from);
+        let logit_adjustment =
+            LogitAdjustment { strength: self.preset.logit_adjustment, shares: items.action_shares() };
         let config = |steps: u64| -> anyhow::Result<Config> {
             let config = self.config(&dataset, trajectories, steps)?;
             let words = words.as_ref().map(|words| words.words().to_vec());
-            Ok(Config { words, resnet18: resnet18.clone(), balance: Some(balance.clone()), ..config })
+            Ok(Config { words, resnet18: resnet18.clone(), logit_adjustment: Some(logit_adjustment.clone()), ..config })
         };
         let path = training.join("state.safetensors");
         let identity = self.identity(encoder.digest(), &digest, &items.digest(), &config(0)?);
-        let trainer =
-            Trainer { networks: &networks, preset: &self.preset, state: State { path: &path, identity: &identity } };
+        let trainer = Trainer {
+            networks: &networks,
+            preset: &self.preset,
+            state: TrainingState { path: &path, identity: &identity },
+        };
         let batches = Batches::new(
             material,
             self.preset.policy.history,
@@ -172,14 +176,14 @@ impl Pretraining {
         words: Option<&Vocabulary>,
         report: &mut dyn Report,
         stop: &AtomicBool,
-    ) -> anyhow::Result<Option<Material<'a>>> {
+    ) -> anyhow::Result<Option<TrainingData<'a>>> {
         let told = if self.preset.policy.goal.is_some() {
-            Told::Goals
+            ConditioningTable::Goals
         } else if let Some(words) = words {
-            Told::Words(items.texts.iter().map(|text| words.numbers(text)).collect())
+            ConditioningTable::Words(items.texts.iter().map(|text| words.numbers(text)).collect())
         } else {
             let Some(sentences) = self.embed(&items.texts, report, stop)? else { return Ok(None) };
-            Told::Sentences(Rows::new(&sentences, self.device)?)
+            ConditioningTable::Sentences(Rows::new(&sentences, self.device)?)
         };
         let pool = match self.preset.chaining.as_ref().map(|chaining| chaining.pairs) {
             Some(Pairs::Pool(count)) => {
@@ -190,7 +194,7 @@ impl Pretraining {
             }
             _ => None,
         };
-        Ok(Some(Material { items, maps: Maps::on(features, self.device), told, pool, embed }))
+        Ok(Some(TrainingData { items, maps: Maps::on(features, self.device), told, pool, embed }))
     }
 
     /// The labels of the datasets, where the preset asks for labels.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use ratatui::style::Color;
 
 use super::chain::warmth;
-use crate::analysis::value_map::Landscape;
+use crate::analysis::value_map::ValueMap;
 use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Pose};
 use crate::explore::session::Snapshot;
@@ -40,7 +40,7 @@ pub(super) struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    pub(super) fn of(now: &'a Snapshot, values: Option<&Landscape>, heading: Option<Heading>) -> Ground<'a> {
+    pub(super) fn of(now: &'a Snapshot, values: Option<&ValueMap>, heading: Option<Heading>) -> Ground<'a> {
         let values = values.map_or_else(HashMap::new, |values| values.shares(heading));
         let floor = now.scene.floor();
         let fixtures = (0u16..).zip(&now.scene.fixtures);

@@ -9,7 +9,7 @@ use unicode_width::UnicodeWidthStr;
 use super::ground::{Ground, extent, furniture_colour};
 use super::hit::Hit;
 use super::{fit, panel};
-use crate::analysis::value_map::Landscape;
+use crate::analysis::value_map::ValueMap;
 use crate::domain::{Cell, Heading, Instance, Point};
 use crate::explore::inspect::things;
 use crate::explore::session::Snapshot;
@@ -67,7 +67,7 @@ impl Widget for Map<'_> {
 }
 
 /// What the painted values are, their range, and the step they are for where that is another: as much of it as there is room for.
-fn legend(values: &Landscape, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
+fn legend(values: &ValueMap, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
     let facing = heading.map_or("best heading", Heading::name);
     let (low, high) = values.range(heading).unwrap_or((0.0, 0.0));
     let far = values.heights.len() < values.of;

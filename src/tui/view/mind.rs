@@ -8,7 +8,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::{bar, fit, panel, put, share, wrap};
-use crate::agent::{Decision, Mind};
+use crate::agent::{ActionDistribution, Decision};
 use crate::domain::{ActionType, Class};
 use crate::explore::session::Snapshot;
 use crate::tui::app::App;
@@ -52,7 +52,7 @@ impl Widget for MindPanel<'_> {
 /// The 12 actions, and the object classes where there is a distribution over them.
 struct Table<'a> {
     decision: &'a Decision,
-    mind: Option<&'a Mind>,
+    mind: Option<&'a ActionDistribution>,
     now: &'a Snapshot,
 }
 
@@ -132,7 +132,7 @@ fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
 }
 
 /// One class a row, with bars.
-fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &Mind) {
+fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &ActionDistribution) {
     put(buf, area, 0, if mind.objects.is_empty() { "" } else { "object" }, THEME.quiet);
     for (row, &(class, p, candidate)) in (1..area.height).zip(&mind.objects) {
         let style = object_style(target == Some(class), candidate);
@@ -156,7 +156,7 @@ fn object_style(chosen: bool, candidate: bool) -> Style {
 }
 
 /// As many classes as fit in a few lines.
-fn object_line(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &Mind) {
+fn object_line(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &ActionDistribution) {
     let mut lines = vec![Line::default()];
     let mut used = 0;
     for &(class, p, candidate) in &mind.objects {

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use termprofile::TermProfile;
 
 use crate::agent::registry::{PolicyKind, Who};
-use crate::analysis::chain::{Handover, Outcome, Play, Rate, Trials};
-use crate::analysis::value_map::{Height, Landscape, Measure};
+use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
+use crate::analysis::value_map::{CellValue, Measure, ValueMap};
 use crate::domain::{Action, ActionType, World};
 use crate::explore::chained::Chained;
-use crate::explore::session::{Engine, Event};
+use crate::explore::session::{Event, Session};
 use crate::explore::verb::{Page, Verb};
 use crate::explore::worker::{Command, Report};
 use crate::tui::app::App;
@@ -115,9 +115,9 @@ fn values_are_painted_for_one_heading_or_the_best() {
         let cells = app.now.as_ref().unwrap().scene.cells.clone();
         let heights = (0u8..).zip(&cells).map(|(at, &cell)| {
             let value = f32::from(at) / cells.len() as f32;
-            Height { cell, values: [value, 1.0 - value, 0.5, 0.0] }
+            CellValue { cell, values: [value, 1.0 - value, 0.5, 0.0] }
         });
-        let landscape = Landscape {
+        let landscape = ValueMap {
             instruction: app.now.as_ref().unwrap().instruction.clone(),
             measure: Measure::Value,
             heights: heights.collect(),
@@ -185,7 +185,7 @@ fn without_colour_and_unicode_letters_say_it_all() {
 }
 
 /// An app whose state is that of an engine with a fork: main has three steps, b1 leaves it after the first.
-fn forked(width: u16, height: u16) -> (App, Engine) {
+fn forked(width: u16, height: u16) -> (App, Session) {
     let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
     let mut engine = engine();
     let turn = |kind| Action::navigate(kind);
@@ -270,7 +270,7 @@ fn two_instructions_are_compared_and_swapped() {
 
 /// A chain of three links by a policy: the second link is done or not, the heat is V or not.
 fn chained(name: &str, second: bool, by_value: bool) -> Chained {
-    let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| Outcome {
+    let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| LinkOutcome {
         reached,
         done: Some(done),
         steps,
@@ -278,7 +278,7 @@ fn chained(name: &str, second: bool, by_value: bool) -> Chained {
         exit: World::default(),
         handover: worth.filter(|_| by_value).map(|worth| Handover { worth, next: worth - 0.1, joined: 0.3 }),
     };
-    let play = |second: bool| Play {
+    let play = |second: bool| ChainRun {
         outcomes: vec![
             outcome(true, true, 9, Some(0.62)),
             outcome(true, second, 14, Some(-0.07)),
@@ -301,8 +301,9 @@ fn chained(name: &str, second: bool, by_value: bool) -> Chained {
 
 #[test]
 fn a_chain_shows_each_link_and_which_one_breaks() {
-    let rate = |done| Rate { done, of: 8 };
-    let trials = Trials { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), Rate::default()] };
+    let rate = |done| LinkRate { done, of: 8 };
+    let trials =
+        LinkSuccess { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), LinkRate::default()] };
     let chained = Chained { trials: Some(trials), ..chained("first", false, false) };
     for (width, height) in SIZES {
         let (mut app, _) = forked(width, height);
@@ -351,7 +352,7 @@ fn two_policies_follow_the_same_chain_side_by_side() {
             update(&mut app, Msg::Report(Report::Chained(Box::new(report))));
         }
         check(&format!("chains-{width}x{height}"), &screen(&mut app));
-        let again = Chained { trials: Some(Trials::default()), ..chained("first", false, false) };
+        let again = Chained { trials: Some(LinkSuccess::default()), ..chained("first", false, false) };
         update(&mut app, Msg::Report(Report::Chained(Box::new(again))));
         assert_eq!(app.chain.as_ref().unwrap().who.name, "sprint", "each stays on its side");
         assert!(app.rival.as_ref().unwrap().trials.is_some());

@@ -7,7 +7,7 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 
 use super::{panel, put};
-use crate::analysis::chain::Play;
+use crate::analysis::chain::ChainRun;
 use crate::explore::chained::Chained;
 use crate::tui::theme::THEME;
 use crate::tui::view::fit;
@@ -64,12 +64,12 @@ fn title(side: &Chained) -> String {
 }
 
 /// What is shown of a play.
-fn measure(play: &Play) -> &'static str {
+fn measure(play: &ChainRun) -> &'static str {
     if play.by_value { "V of every link" } else { "no critic: p of what was done, by every link" }
 }
 
 /// The lowest and the highest of all plays that show the same measure: their digits mean the same.
-fn range<'a>(plays: impl Iterator<Item = &'a Play>, by_value: bool) -> (f32, f32) {
+fn range<'a>(plays: impl Iterator<Item = &'a ChainRun>, by_value: bool) -> (f32, f32) {
     let all = plays.filter(|play| play.by_value == by_value).flat_map(|play| play.heat.iter().flatten());
     all.fold((f32::MAX, f32::MIN), |(low, high), &x| (low.min(x), high.max(x)))
 }

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
 use super::{panel, put};
-use crate::analysis::chain::{Handover, Outcome, Play, Rate, Trials};
+use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
 use crate::explore::chained::Chained;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -36,7 +36,7 @@ impl Widget for Links<'_> {
             put(buf, inner, row, line, THEME.quiet);
         }
         let top = self.sides.len() as u16;
-        let weakest = own.trials.as_ref().and_then(Trials::weakest);
+        let weakest = own.trials.as_ref().and_then(LinkSuccess::weakest);
         let rows = usize::from(inner.height.saturating_sub(top + 1));
         let first = (self.app.selected + 1).saturating_sub(rows);
         for (row, (at, link)) in (top..).zip(own.links.iter().enumerate().skip(first).take(rows)) {
@@ -55,8 +55,9 @@ impl Widget for Links<'_> {
                 spans.extend([outcome(side.by_link.as_ref(), at), outcome(side.as_one.as_ref(), at)]);
             }
             if columns.rates {
-                let rate =
-                    |rates: fn(&Trials) -> &Vec<Rate>| own.trials.as_ref().and_then(|trials| rates(trials).get(at));
+                let rate = |rates: fn(&LinkSuccess) -> &Vec<LinkRate>| {
+                    own.trials.as_ref().and_then(|trials| rates(trials).get(at))
+                };
                 spans.push(Span::raw(rate_words(rate(|trials| &trials.expert))));
                 let style = if weak { THEME.bad } else { Style::new() };
                 spans.push(Span::styled(rate_words(rate(|trials| &trials.own)), style));
@@ -120,7 +121,7 @@ impl Columns {
 }
 
 /// What the columns of values are, or why there are none.
-fn about(play: Option<&Play>, shown: bool) -> &'static str {
+fn about(play: Option<&ChainRun>, shown: bool) -> &'static str {
     match play {
         Some(play) if !play.by_value => "chaining targets (eq. 4, eq. 5): this checkpoint has no critic",
         Some(_) if shown => {
@@ -134,20 +135,20 @@ fn values(handover: Handover) -> String {
     format!("{:>VALUE$.2}{:>VALUE$.2}{:>VALUE$.2}", handover.target(), handover.next, handover.joined)
 }
 
-fn outcome(play: Option<&Play>, at: usize) -> Span<'static> {
+fn outcome(play: Option<&ChainRun>, at: usize) -> Span<'static> {
     let (text, style) = match play.and_then(|play| play.outcomes.get(at)) {
         None => ("...".to_string(), THEME.quiet),
-        Some(Outcome { reached: false, .. }) => ("not reached".into(), THEME.quiet),
-        Some(Outcome { done: Some(true), steps, .. }) => (format!("done in {steps}"), THEME.good),
-        Some(Outcome { done: Some(false), steps, .. }) => (format!("failed, {steps}"), THEME.bad),
-        Some(Outcome { done: None, steps, .. }) => (format!("{steps} steps"), Style::new()),
+        Some(LinkOutcome { reached: false, .. }) => ("not reached".into(), THEME.quiet),
+        Some(LinkOutcome { done: Some(true), steps, .. }) => (format!("done in {steps}"), THEME.good),
+        Some(LinkOutcome { done: Some(false), steps, .. }) => (format!("failed, {steps}"), THEME.bad),
+        Some(LinkOutcome { done: None, steps, .. }) => (format!("{steps} steps"), Style::new()),
     };
     Span::styled(format!("{:<OUTCOME$}", fit(&text, OUTCOME - 1)), style)
 }
 
-fn rate_words(rate: Option<&Rate>) -> String {
+fn rate_words(rate: Option<&LinkRate>) -> String {
     let text = match rate {
-        Some(Rate { done, of }) if *of > 0 => format!("{done}/{of} {}%", 100 * done / of),
+        Some(LinkRate { done, of }) if *of > 0 => format!("{done}/{of} {}%", 100 * done / of),
         Some(_) => "-".into(),
         None => String::new(),
     };
