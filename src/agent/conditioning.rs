@@ -1,14 +1,11 @@
-//! What a trained agent is told, in the form that its networks take.
+//! What conditions a trained agent, in the form that its networks take: the instruction, or frames of its goal.
 
-use std::sync::Arc;
-
+use anyhow::Context;
 use tch::{Device, Kind, Tensor};
 
 use super::config::Config;
 use super::frame_history::SharedEmbedder;
-use super::goal;
 use super::policy::{Observation, Reading};
-use crate::house::House;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::frozen::FrameEncoder;
@@ -22,17 +19,17 @@ const WORDS: usize = 128;
 ///
 /// # Errors
 /// When the sentence encoder fails, or an agent that is shown its goal has no task to take it from.
-pub fn told(
-    situation: &Observation<'_>,
+pub fn of(
+    observation: &mut Observation<'_>,
     config: &Config,
     visual: &dyn FrameEncoder,
     sentences: &SharedEmbedder,
     device: Device,
 ) -> anyhow::Result<Tensor> {
     if config.policy.goal.is_some() {
-        return shown(situation, config.policy.history as usize, visual);
+        return goal_frames(observation, config.policy.history as usize, visual);
     }
-    let instruction = normalise(situation.instruction);
+    let instruction = normalise(observation.instruction);
     if config.policy.attention.is_some() {
         let mut numbers = words(config, &instruction);
         numbers.resize(WORDS, Vocabulary::PADDING);
@@ -63,8 +60,8 @@ fn words(config: &Config, instruction: &str) -> Vec<i64> {
     Vocabulary::new(config.words.clone().unwrap_or_default()).numbers(instruction)
 }
 
-/// Of the same shape, for nobody.
-pub fn nothing(config: &Config, device: Device) -> Tensor {
+/// Zeros of the same shape, for an empty slot.
+pub fn blank(config: &Config, device: Device) -> Tensor {
     let (policy, features) = (&config.policy, config.features());
     match (policy.goal, &policy.attention) {
         (Some(_), _) => Tensor::zeros([1, policy.history * features, SIDE, SIDE], (Kind::Float, device)),
@@ -73,9 +70,11 @@ pub fn nothing(config: &Config, device: Device) -> Tensor {
     }
 }
 
-fn shown(situation: &Observation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
-    let see = |world| visual.image(House::new(Arc::clone(situation.house.scene()), world).frame());
-    let images: Vec<Vec<u8>> = goal::end_states(situation, history)?.into_iter().map(see).collect();
+fn goal_frames(observation: &mut Observation<'_>, history: usize, visual: &dyn FrameEncoder) -> anyhow::Result<Tensor> {
+    let name = observation.environment.name().to_owned();
+    let house = observation.environment.house();
+    let house = house.with_context(|| format!("the agent is shown its goal by House's expert, and this is {name}"))?;
+    let images: Vec<Vec<u8>> = house.goal_frames(history)?.iter().map(|frame| visual.image(frame)).collect();
     let missing = history - images.len();
     let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();
     Ok(visual.encode(&stacked).flatten(0, 1).unsqueeze(0))

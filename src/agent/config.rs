@@ -231,7 +231,7 @@ impl Config {
     }
 
     /// Balances the logits of the action head, where the agent's are.
-    pub fn logit_adjustment(&self, logits: &mut [f32]) {
+    pub fn adjust_logits(&self, logits: &mut [f32]) {
         if let Some(logit_adjustment) = &self.logit_adjustment {
             logit_adjustment.apply(logits);
         }

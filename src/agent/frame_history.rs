@@ -7,8 +7,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tch::Tensor;
 
+use super::decision::Decision;
 use super::loop_guard::LoopGuard;
-use super::policy::Decision;
 use super::select::{self, Heads, Selection};
 use crate::house::view::Candidate;
 use crate::nets::embedding_cache::Embedder;
@@ -16,14 +16,14 @@ use crate::nets::embedding_cache::Embedder;
 /// A sentence encoder with its cache, which several policies may share.
 pub type SharedEmbedder = Arc<Mutex<Embedder>>;
 
-/// The last frames, what would lead in rounds, what was told, and chance.
+/// The last frames, what the loop guard knows, what conditions the agent, and random numbers.
 #[derive(Debug)]
 pub struct FrameHistory {
     /// The maps of the last frames, oldest first, and the step that the last one belongs to.
     seen: VecDeque<Tensor>,
     seen_at: Option<u32>,
     last_image: Vec<u8>,
-    rounds: LoopGuard,
+    loop_guard: LoopGuard,
     /// The instruction that was read last, with what the networks take for it.
     read: Option<(String, Tensor)>,
     rng: ChaCha8Rng,
@@ -35,7 +35,7 @@ impl Default for FrameHistory {
             seen: VecDeque::new(),
             seen_at: None,
             last_image: Vec::new(),
-            rounds: LoopGuard::default(),
+            loop_guard: LoopGuard::default(),
             read: None,
             rng: ChaCha8Rng::seed_from_u64(0),
         }
@@ -49,7 +49,7 @@ impl Clone for FrameHistory {
             seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
             seen_at: self.seen_at,
             last_image: self.last_image.clone(),
-            rounds: self.rounds.clone(),
+            loop_guard: self.loop_guard.clone(),
             read: self.read.as_ref().map(|(text, told)| (text.clone(), told.shallow_clone())),
             rng: self.rng.clone(),
         }
@@ -58,10 +58,10 @@ impl Clone for FrameHistory {
 
 impl FrameHistory {
     /// Forgets the past: a new episode starts.
-    pub fn begin(&mut self, seed: u64) {
+    pub fn reset(&mut self, seed: u64) {
         self.seen.clear();
         self.last_image.clear();
-        self.rounds = LoopGuard::default();
+        self.loop_guard = LoopGuard::default();
         self.seen_at = None;
         // The next episode's goal may look different, whatever its instruction.
         self.read = None;
@@ -77,7 +77,7 @@ impl FrameHistory {
     pub fn look(&mut self, image: &[u8], step: u32) {
         let changed = self.last_image != image;
         if self.seen_at != Some(step) {
-            self.rounds.note(&self.last_image, changed);
+            self.loop_guard.note(&self.last_image, changed);
         }
         if changed {
             image.clone_into(&mut self.last_image);
@@ -100,29 +100,33 @@ impl FrameHistory {
         Tensor::cat(&maps, 1)
     }
 
-    /// What the agent is told: asked of `hear` once an instruction.
+    /// What conditions the agent: asked of `condition` once an instruction.
     ///
     /// # Errors
-    /// When `hear` fails.
-    pub fn told(&mut self, instruction: &str, hear: impl FnOnce() -> anyhow::Result<Tensor>) -> anyhow::Result<Tensor> {
+    /// When `condition` fails.
+    pub fn conditioning(
+        &mut self,
+        instruction: &str,
+        condition: impl FnOnce() -> anyhow::Result<Tensor>,
+    ) -> anyhow::Result<Tensor> {
         if let Some((text, told)) = &self.read
             && text == instruction
         {
             return Ok(told.shallow_clone());
         }
-        let told = hear()?;
-        self.rounds.allow_all();
+        let told = condition()?;
+        self.loop_guard.allow_all();
         self.read = Some((instruction.to_string(), told.shallow_clone()));
         Ok(told)
     }
 
-    /// Decides from what the networks say, and remembers the choice. Nothing that would lead in rounds is chosen while there
-    /// is something else.
+    /// Decides from what the networks say, and remembers the choice. Nothing that the loop guard knows to repeat is chosen
+    /// while there is something else.
     pub fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        let (candidates, tried) = self.rounds.open(&self.last_image, candidates);
+        let (candidates, tried) = self.loop_guard.open(&self.last_image, candidates);
         let decision = select::decide(heads, &candidates, &tried, selection);
-        self.rounds.choose(decision.action, &candidates);
+        self.loop_guard.choose(decision.action, &candidates);
         decision
     }
 }
@@ -139,12 +143,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_leads_in_rounds_is_chosen_until_another_instruction_is_given() {
+    fn nothing_is_repeated_until_another_instruction_is_given() {
         use ActionType::{MoveAhead, RotateLeft, RotateRight};
         let mut memory = FrameHistory::default();
-        memory.begin(1);
+        memory.reset(1);
         let mut leave = |text: &str, step: u32| {
-            drop(memory.told(text, || Ok(map(0.0))).unwrap());
+            drop(memory.conditioning(text, || Ok(map(0.0))).unwrap());
             memory.look(&[7], step);
             let _ = memory.observe(map(0.0), step, 5);
             let logits = ActionType::ALL.map(|kind| -(kind.index() as f32));
@@ -157,7 +161,7 @@ mod tests {
     #[test]
     fn a_copy_goes_on_exactly_as_the_original_does() {
         let mut memory = FrameHistory::default();
-        memory.begin(5);
+        memory.reset(5);
         for step in 0..3u8 {
             memory.look(&[step], u32::from(step));
             let _ = memory.observe(map(f32::from(step)), u32::from(step), 5);

@@ -1,34 +1,49 @@
-//! A trained agent: sees the last frames, reads the instruction, decides.
+//! A trained agent: sees the last frames, reads the instruction, decides; in several episodes at once, with one forward pass
+//! for all of them.
+//!
+//! The pass always has the same shape: an empty slot is a row of zeros. A row of a pass of one shape is computed the same way
+//! whatever the other rows hold, so a decision depends on its own episode and slot alone; the tests hold this.
 
 use std::path::Path;
 
 use anyhow::Context;
-use tch::{Device, Tensor};
+use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
 use super::conditioning;
 use super::config::Config;
+use super::decision::Decision;
 use super::frame_history::FrameHistory;
 pub use super::frame_history::SharedEmbedder;
-use super::policy::{Decision, Observation, Policy, PolicyState, Reading};
+use super::policy::{Decisions, Observation, Policy, PolicyState, Reading};
 use super::select::Heads;
 use super::value_estimates::Values;
 use crate::nets::frozen::FrameEncoder;
+use crate::nets::visual::SIDE;
 
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
-    pub(super) name: String,
-    pub(super) config: Config,
-    pub(super) networks: Networks,
+    name: String,
+    config: Config,
+    networks: Networks,
     /// The visual encoder of the networks, for computing alone.
-    pub(super) sight: Box<dyn FrameEncoder>,
-    pub(super) sentences: SharedEmbedder,
-    pub(super) device: Device,
-    pub(super) samples: bool,
-    pub(super) memory: FrameHistory,
+    encoder: Box<dyn FrameEncoder>,
+    sentences: SharedEmbedder,
+    device: Device,
+    samples: bool,
+    slots: Vec<FrameHistory>,
+}
+
+/// What the networks take of a slot: an observation [1, history x features, 7, 7], and what conditions it.
+struct Inputs {
+    observation: Tensor,
+    conditioning: Tensor,
 }
 
 impl LearnedPolicy {
+    /// Rows of a pass: enough to read the weights once for several episodes, few enough to stay in a processor's caches.
+    pub const SLOTS: usize = 8;
+
     /// Loads a checkpoint; it decides greedily.
     ///
     /// # Errors
@@ -55,9 +70,9 @@ impl LearnedPolicy {
         sentences: SharedEmbedder,
         device: Device,
     ) -> anyhow::Result<LearnedPolicy> {
-        let sight = networks.eyes.frozen()?;
-        let memory = FrameHistory::default();
-        Ok(LearnedPolicy { name, config, networks, sight, sentences, device, samples: false, memory })
+        let encoder = networks.eyes.frozen()?;
+        let slots = (0..LearnedPolicy::SLOTS).map(|_| FrameHistory::default()).collect();
+        Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
     }
 
     /// The checkpoint's configuration.
@@ -65,15 +80,58 @@ impl LearnedPolicy {
         &self.config
     }
 
-    /// The last frames' maps as one observation, and what the agent is told.
-    fn perceive(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<(Tensor, Tensor)> {
-        let image = self.sight.image(situation.house.frame());
-        let map = self.memory.map_of(&image).unwrap_or_else(|| self.sight.encode(std::slice::from_ref(&image)));
-        self.memory.look(&image, situation.step);
-        let observation = self.memory.observe(map, situation.step, self.config.policy.history as usize);
-        let hear = || conditioning::told(situation, &self.config, &*self.sight, &self.sentences, self.device);
-        Ok((observation, self.memory.told(situation.instruction, hear)?))
+    fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Inputs> {
+        let image = self.encoder.image(here.environment.frame()?);
+        let slots = self.slots.len();
+        let history = self.slots.get_mut(slot).with_context(|| format!("there are {slots} slots, not {slot}"))?;
+        // A frame is encoded by itself, so that what it comes to does not depend on what other slots see.
+        let map = history.map_of(&image).unwrap_or_else(|| self.encoder.encode(std::slice::from_ref(&image)));
+        history.look(&image, here.step);
+        let observation = history.observe(map, here.step, self.config.policy.history as usize);
+        let instruction = here.instruction;
+        let condition = || conditioning::of(here, &self.config, &*self.encoder, &self.sentences, self.device);
+        Ok(Inputs { observation, conditioning: history.conditioning(instruction, condition)? })
     }
+
+    fn blank(&self) -> Inputs {
+        let channels = self.config.policy.history * self.config.features();
+        Inputs {
+            observation: Tensor::zeros([1, channels, SIDE, SIDE], (Kind::Float, self.device)),
+            conditioning: conditioning::blank(&self.config, self.device),
+        }
+    }
+
+    fn decide(
+        &mut self,
+        slot: usize,
+        here: &mut Observation<'_>,
+        of: &Inputs,
+        logits: Rows,
+    ) -> anyhow::Result<Decision> {
+        let candidates = here.environment.legal_actions()?;
+        // The critic computes a pass for each slot by itself.
+        let values = self.networks.advice(&self.config, &of.observation, &of.conditioning, &candidates)?;
+        let heads = Heads {
+            actions: logits.actions,
+            objects: logits.objects,
+            advantage_scale: self.config.advantage_scale(values.as_ref()),
+        };
+        let decision = self.slots[slot].decide(&heads, &candidates, self.samples);
+        Ok(Decision { values, ..decision })
+    }
+}
+
+/// A slot's rows of the policy's heads.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    actions: &'a [f32],
+    objects: &'a [f32],
+}
+
+/// The numbers of a tensor [n, width], with the width.
+fn numbers(tensor: Tensor) -> anyhow::Result<(usize, Vec<f32>)> {
+    let width = tensor.size()[1] as usize;
+    Ok((width, Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu))?))
 }
 
 impl Policy for LearnedPolicy {
@@ -81,33 +139,53 @@ impl Policy for LearnedPolicy {
         &self.name
     }
 
-    fn begin(&mut self, seed: u64) {
-        self.memory.begin(seed);
+    fn slots(&self) -> usize {
+        self.slots.len()
     }
 
-    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let (observation, told) = self.perceive(situation)?;
-        let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &told, false));
-        let numbers = |tensor: Tensor| Vec::<f32>::try_from(tensor.flatten(0, -1).to_device(Device::Cpu));
-        let (mut actions, objects) = (numbers(logits.actions)?, numbers(logits.objects)?);
-        self.config.logit_adjustment(&mut actions);
-        let candidates = situation.house.candidates();
-        let values = self.networks.advice(&self.config, &observation, &told, &candidates)?;
-        let heads = Heads {
-            actions: &actions,
-            objects: &objects,
-            advantage_scale: self.config.advantage_scale(values.as_ref()),
+    fn reset(&mut self, slot: usize, seed: u64) {
+        if let Some(history) = self.slots.get_mut(slot) {
+            history.reset(seed);
+        }
+    }
+
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        let (given, slots) = (observations.len(), self.slots.len());
+        anyhow::ensure!(given == slots, "{given} observations for {slots} slots");
+        let mut inputs: Vec<Option<anyhow::Result<Inputs>>> = Vec::with_capacity(slots);
+        for (slot, here) in observations.iter_mut().enumerate() {
+            inputs.push(here.as_mut().map(|here| self.perceive(slot, here)));
+        }
+        let blank = self.blank();
+        let seen = |input: &Option<anyhow::Result<Inputs>>, part: fn(&Inputs) -> &Tensor| {
+            part(input.as_ref().and_then(|input| input.as_ref().ok()).unwrap_or(&blank)).shallow_clone()
         };
-        Ok(self.memory.decide(&heads, &candidates, self.samples))
+        let together = |part: fn(&Inputs) -> &Tensor| {
+            Tensor::cat(&inputs.iter().map(|input| seen(input, part)).collect::<Vec<_>>(), 0)
+        };
+        let (observation, conditioning) = (together(|of| &of.observation), together(|of| &of.conditioning));
+        let logits = tch::no_grad(|| self.networks.policy.forward(&observation, &conditioning, false));
+        let ((kinds, mut actions), (classes, objects)) = (numbers(logits.actions)?, numbers(logits.objects)?);
+        actions.chunks_exact_mut(kinds).for_each(|row| self.config.adjust_logits(row));
+        let rows = actions.chunks_exact(kinds).zip(objects.chunks_exact(classes));
+        let mut decided = Vec::with_capacity(slots);
+        for (slot, ((here, input), (actions, objects))) in observations.iter_mut().zip(inputs).zip(rows).enumerate() {
+            decided.push(match (here, input) {
+                (Some(here), Some(Ok(input))) => Some(self.decide(slot, here, &input, Rows { actions, objects })),
+                (_, Some(Err(error))) => Some(Err(error)),
+                _ => None,
+            });
+        }
+        Ok(decided)
     }
 
-    fn carried(&self) -> PolicyState {
-        PolicyState::Frames(Box::new(self.memory.clone()))
+    fn state(&self, slot: usize) -> PolicyState {
+        self.slots.get(slot).map_or(PolicyState::Nothing, |history| PolicyState::Frames(Box::new(history.clone())))
     }
 
-    fn put_back(&mut self, carried: PolicyState) {
-        if let PolicyState::Frames(memory) = carried {
-            self.memory = *memory;
+    fn restore(&mut self, slot: usize, state: PolicyState) {
+        if let (PolicyState::Frames(frames), Some(history)) = (state, self.slots.get_mut(slot)) {
+            *history = *frames;
         }
     }
 
@@ -119,98 +197,16 @@ impl Policy for LearnedPolicy {
         conditioning::reading(instruction, &self.config, &self.sentences)
     }
 
-    fn values(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {
+    fn values(&mut self, slot: usize, observation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {
         if self.networks.critic.is_none() {
             return Ok(None);
         }
-        let (observation, told) = self.perceive(situation)?;
+        let of = self.perceive(slot, observation)?;
         let Some(critic) = &self.networks.critic else { return Ok(None) };
-        Values::of(&critic.online, &observation, &told, &situation.house.candidates()).map(Some)
+        Values::of(&critic.online, &of.observation, &of.conditioning, &observation.environment.legal_actions()?)
+            .map(Some)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::{Arc, Mutex};
-
-    use super::*;
-    use crate::agent::config::tests::small;
-    use crate::domain::{ActionType, SkillKind};
-    use crate::house::grading::{Grader, Grading};
-    use crate::house::testing::{kitchen_house, role, subtask};
-    use crate::nets::critic::CriticSpec;
-    use crate::nets::embedding_cache::Embedder;
-    use crate::nets::episodic::AttentionSpec;
-    use crate::nets::policy::PolicySpec;
-    use crate::nets::sentence::{SentenceEncoder, default_folder};
-
-    /// A fresh agent with a critic; nothing where there is no sentence encoder.
-    fn agent(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
-        let folder = default_folder();
-        if !folder.join("model.safetensors").exists() {
-            eprintln!("skipped: needs the sentence encoder (`make setup`)");
-            return None;
-        }
-        let embedder = Embedder::new(SentenceEncoder::load(&folder, Device::Cpu).unwrap(), None);
-        let embedding = embedder.encoder().width() as i64;
-        let small = small();
-        let config = Config {
-            policy: PolicySpec { embedding, goal, ..small.policy },
-            critic: Some(CriticSpec {
-                channels: [4; 4],
-                halved: false,
-                hidden: vec![8],
-                dropout: 0.2,
-                action_embedding: 4,
-                object_embedding: 4,
-                shared_trunk: true,
-            }),
-            ..small
-        };
-        let networks =
-            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
-        LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
-    }
-
-    #[test]
-    fn a_critic_values_what_is_possible_and_changes_no_decision() {
-        let _chance = crate::nets::testing::chance();
-        let Some(mut agent) = agent(None) else { return };
-        agent.begin(1);
-        let mut house = kitchen_house();
-        let mut situation = Observation { house: &mut house, instruction: "take the mug", step: 0, grader: None };
-        let decision = agent.decide(&mut situation).unwrap();
-        let values = agent.values(&mut situation).unwrap().unwrap();
-        assert_eq!(agent.decide(&mut situation).unwrap().action, decision.action);
-        let candidates = situation.house.candidates();
-        let wanted: std::collections::BTreeSet<_> = candidates.iter().map(|c| (c.kind, c.class.index())).collect();
-        assert_eq!(values.choices.len(), 5 + wanted.len());
-        assert!(values.state.is_finite() && values.q(ActionType::MoveAhead, None).is_some());
-    }
-
-    #[test]
-    fn an_agent_says_how_much_of_an_instruction_it_reads() {
-        let _chance = crate::nets::testing::chance();
-        let Some(mut told) = agent(None) else { return };
-        let read = told.reading("take the mug").unwrap();
-        assert!(read.tokens > 3 && read.cut == 0, "{read:?}");
-        assert_eq!(agent(Some([4; 4])).unwrap().reading("take the mug"), None, "it is shown its goal");
-        told.config.policy.attention = Some(AttentionSpec { words: 9, layers: 1, heads: 1, inner: 4 });
-        assert_eq!(told.reading("take the mug"), Some(Reading { tokens: 3, cut: 0 }));
-        assert_eq!(told.reading(&"mug ".repeat(130)), Some(Reading { tokens: 128, cut: 2 }));
-    }
-
-    #[test]
-    fn an_agent_that_is_shown_its_goal_needs_a_task() {
-        let _chance = crate::nets::testing::chance();
-        let Some(mut agent) = agent(Some([4; 4])) else { return };
-        agent.begin(1);
-        let mut house = kitchen_house();
-        let mut decide = |grader: Option<&Grader>| {
-            agent.decide(&mut Observation { house: &mut house, instruction: "", step: 0, grader }).map(|_| ())
-        };
-        assert!(decide(None).unwrap_err().to_string().contains("which a task has"));
-        let grader = Grader::new(Grading::default(), &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
-        decide(Some(&grader)).unwrap();
-    }
-}
+mod tests;

@@ -4,7 +4,8 @@ use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::policy::{ActionDistribution, Decision, Observation, Policy, PolicyState};
+use super::decision::{ActionDistribution, Decision};
+use super::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{self, Candidate};
 
@@ -20,7 +21,7 @@ impl Default for RandomPolicy {
 }
 
 impl RandomPolicy {
-    /// A random policy; [`Policy::begin`] seeds it.
+    /// A random policy; [`Policy::reset`] seeds it.
     pub fn new() -> RandomPolicy {
         RandomPolicy { rng: ChaCha8Rng::seed_from_u64(0) }
     }
@@ -40,12 +41,32 @@ impl Policy for RandomPolicy {
         "random"
     }
 
-    fn begin(&mut self, seed: u64) {
+    fn slots(&self) -> usize {
+        1
+    }
+
+    fn reset(&mut self, _slot: usize, seed: u64) {
         self.rng = ChaCha8Rng::seed_from_u64(seed);
     }
 
-    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let candidates = situation.house.candidates();
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        each_alone(observations, |_, here| self.decide(here))
+    }
+
+    fn state(&self, _slot: usize) -> PolicyState {
+        PolicyState::Random(Box::new(self.rng.clone()))
+    }
+
+    fn restore(&mut self, _slot: usize, state: PolicyState) {
+        if let PolicyState::Random(rng) = state {
+            self.rng = *rng;
+        }
+    }
+}
+
+impl RandomPolicy {
+    fn decide(&mut self, observation: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        let candidates = observation.environment.legal_actions()?;
         let possible: Vec<ActionType> = ActionType::ALL
             .into_iter()
             .filter(|&kind| !kind.is_interaction() || candidates.iter().any(|candidate| candidate.kind == kind))
@@ -56,47 +77,39 @@ impl Policy for RandomPolicy {
         let target = named.choose(&mut self.rng).and_then(|&class| view::nearest(&candidates, kind, class));
         let action = Action { kind, target: target.map(|candidate| candidate.instance) };
         let chance = 1.0 / possible.len() as f32;
-        let mind = ActionDistribution {
+        let distribution = ActionDistribution {
             actions: ActionType::ALL.map(|kind| possible.contains(&kind).then_some(chance)),
             objects: named.iter().map(|&class| (class, 1.0 / named.len() as f32, true)).collect(),
             choices: Vec::new(),
             entropy: (possible.len() as f32).ln(),
             greedy: action,
         };
-        Ok(Decision { action, mind: Some(mind) })
-    }
-
-    fn carried(&self) -> PolicyState {
-        PolicyState::Chance(Box::new(self.rng.clone()))
-    }
-
-    fn put_back(&mut self, carried: PolicyState) {
-        if let PolicyState::Chance(rng) = carried {
-            self.rng = *rng;
-        }
+        Ok(Decision { action, distribution: Some(distribution), values: None })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::env::{Environment, HouseEnvironment};
     use crate::house::testing::kitchen_house;
 
     fn walk(seed: u64) -> (String, usize) {
         let mut policy = RandomPolicy::new();
-        policy.begin(seed);
-        let mut house = kitchen_house();
+        let policy: &mut dyn Policy = &mut policy;
+        policy.reset(0, seed);
+        let mut environment = HouseEnvironment::new(kitchen_house(), None);
         let mut interactions = 0;
         for _ in 0..150 {
-            let mut situation = Observation { house: &mut house, instruction: "", step: 0, grader: None };
-            let action = policy.decide(&mut situation).unwrap().action;
-            let outcome = house.step(action);
+            let here = Observation { environment: &mut environment, instruction: "", step: 0 };
+            let action = policy.act_in(0, here).unwrap().action;
+            let outcome = environment.step(action).unwrap().outcome;
             if action.target.is_some() {
                 assert!(outcome.is_done(), "{action:?}: {outcome}");
                 interactions += 1;
             }
         }
-        (house.world().digest(), interactions)
+        (environment.fingerprint().unwrap(), interactions)
     }
 
     #[test]

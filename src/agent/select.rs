@@ -6,7 +6,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::policy::{ActionDistribution, Decision};
+use super::decision::{ActionDistribution, Decision};
 use super::value_estimates::AdvantageScale;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
@@ -65,14 +65,14 @@ pub fn decide(heads: &Heads<'_>, candidates: &[Candidate], tried: &[ActionType],
         probabilities[index] = Some(share);
     }
     let entropy = -shares.iter().filter(|&&p| p > 0.0).map(|p| p * p.ln()).sum::<f32>();
-    let mind = ActionDistribution {
+    let distribution = ActionDistribution {
         actions: probabilities,
         objects: ranking(heads.objects, candidates, shown, &open, &shares),
         choices: open.iter().flat_map(|&index| choices(ActionType::ALL[index], heads, candidates)).collect(),
         entropy,
         greedy,
     };
-    Decision { action, mind: Some(mind) }
+    Decision { action, distribution: Some(distribution), values: None }
 }
 
 /// Each possible action's share times that of its candidates among all classes, each choice weighed by its advantage,
@@ -228,7 +228,7 @@ mod tests {
                 );
                 let kind = decision.action.kind;
                 assert!(!kind.is_interaction() || kind == ActionType::Pickup);
-                let mind = decision.mind.unwrap();
+                let mind = decision.distribution.unwrap();
                 assert!(mind.actions[ActionType::Slice.index()].is_none());
                 let sum: f32 = mind.actions.iter().flatten().sum();
                 assert!((sum - 1.0).abs() < 1e-5 && mind.entropy >= 0.0);
@@ -246,7 +246,7 @@ mod tests {
         let decision =
             decide(&Heads::of(&actions(ActionType::Pickup), &objects("Apple")), &candidates, &[], Selection::Greedy);
         assert_eq!(decision.action, Action::interact(ActionType::Pickup, Instance::Object(3)));
-        let (likeliest, _, possible) = decision.mind.unwrap().objects[0];
+        let (likeliest, _, possible) = decision.distribution.unwrap().objects[0];
         assert_eq!((likeliest.name(), possible), ("Apple", false));
     }
 
@@ -279,7 +279,8 @@ mod tests {
         let (logits, classes) = ([0.0; ActionType::COUNT], [0.0; Class::VOCABULARY]);
         let alone = Heads::of(&logits, &classes);
         let weighed = Heads { advantage_scale: Some(AdvantageScale { values: &values, weight: 1.0 }), ..alone };
-        let [before, after] = [alone, weighed].map(|heads| decide(&heads, &candidates, &[], Selection::Greedy).mind);
+        let [before, after] =
+            [alone, weighed].map(|heads| decide(&heads, &candidates, &[], Selection::Greedy).distribution);
         let (before, after) = (before.unwrap(), after.unwrap());
         let times = |kind: ActionType| {
             let odds = |mind: &ActionDistribution| mind.actions[kind.index()].unwrap() / mind.actions[1].unwrap();
@@ -333,7 +334,7 @@ mod tests {
         for _ in 0..2000 {
             let decision = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Sample(&mut rng));
             turns += usize::from(decision.action.kind == ActionType::RotateLeft);
-            assert_eq!(decision.mind.unwrap().greedy.kind, ActionType::RotateLeft);
+            assert_eq!(decision.distribution.unwrap().greedy.kind, ActionType::RotateLeft);
         }
         assert!((1400..1600).contains(&turns), "{turns}");
     }
@@ -342,7 +343,7 @@ mod tests {
     fn all_probability_on_masked_actions_leaves_a_uniform_choice() {
         let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
         logits[ActionType::Slice.index()] = 0.0;
-        let mind = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Greedy).mind.unwrap();
+        let mind = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Greedy).distribution.unwrap();
         assert_eq!(mind.actions[0], Some(0.2));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::agent::{Decision, Policy, Values};
 use crate::domain::{ActionType, Class};
+use crate::env::Environment;
 use crate::episode::rollout::Rollout;
 use crate::house::view::Candidate;
 use crate::language::instruction;
@@ -57,17 +58,21 @@ pub const REFERENCES: [&str; 8] = [
 ///
 /// # Errors
 /// When the other text is no instruction, or the policy cannot go on or has no distribution.
-pub fn contrast(policy: &mut dyn Policy, rollout: &mut Rollout, other: &str) -> anyhow::Result<Contrast> {
+pub fn contrast<E: Environment>(
+    policy: &mut dyn Policy,
+    rollout: &mut Rollout<E>,
+    other: &str,
+) -> anyhow::Result<Contrast> {
     let other = instruction::parse(other)?;
     let own = rollout.instruction.clone();
-    let candidates = rollout.house.candidates();
-    let carried = policy.carried();
+    let candidates = rollout.env.legal_actions()?;
+    let state = policy.state(0);
     let mut ask = |text: &str| -> anyhow::Result<Side> {
-        policy.put_back(carried.clone());
+        policy.restore(0, state.clone());
         rollout.instruction = text.to_string();
         let decided = rollout.decide(policy);
-        let values = policy.values(&mut rollout.situation());
-        policy.put_back(carried.clone());
+        let values = decided.as_ref().map_or(Ok(None), |decision| rollout.values(policy, decision));
+        policy.restore(0, state.clone());
         Ok(Side { instruction: text.to_string(), decision: decided?, values: values? })
     };
     let asked = || -> anyhow::Result<Contrast> {
@@ -95,7 +100,7 @@ pub fn contrast(policy: &mut dyn Policy, rollout: &mut Rollout, other: &str) -> 
 type Share = (ActionType, Option<Class>, f32);
 
 fn distribution(side: &Side, candidates: &[Candidate]) -> anyhow::Result<Vec<Share>> {
-    let mind = side.decision.mind.as_ref();
+    let mind = side.decision.distribution.as_ref();
     Ok(mind.ok_or_else(|| anyhow::anyhow!("this policy has no distribution to compare"))?.joint(candidates))
 }
 
@@ -109,7 +114,8 @@ fn divergence(one: &[Share], two: &[Share]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::agent::{ActionDistribution, Observation};
+    use crate::agent::policy::each_alone;
+    use crate::agent::{ActionDistribution, Decisions, Observation};
     use crate::domain::Action;
     use crate::house::testing::kitchen_house;
 
@@ -121,30 +127,29 @@ mod tests {
             "listener"
         }
 
-        fn begin(&mut self, _seed: u64) {}
+        fn slots(&self) -> usize {
+            1
+        }
 
-        fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-            let left = situation.instruction.contains("left");
-            let mut actions = [None; ActionType::COUNT];
-            let likely = if left { ActionType::RotateLeft } else { ActionType::RotateRight };
-            actions[likely.index()] = Some(1.0);
-            let action = Action::navigate(likely);
-            Ok(Decision {
-                action,
-                mind: Some(ActionDistribution {
-                    actions,
-                    objects: vec![],
-                    choices: vec![],
-                    entropy: 0.0,
-                    greedy: action,
-                }),
+        fn reset(&mut self, _slot: usize, _seed: u64) {}
+
+        fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+            each_alone(observations, |_, here| {
+                let left = here.instruction.contains("left");
+                let mut actions = [None; ActionType::COUNT];
+                let likely = if left { ActionType::RotateLeft } else { ActionType::RotateRight };
+                actions[likely.index()] = Some(1.0);
+                let action = Action::navigate(likely);
+                let (objects, choices) = (vec![], vec![]);
+                let distribution = ActionDistribution { actions, objects, choices, entropy: 0.0, greedy: action };
+                Ok(Decision { action, distribution: Some(distribution), values: None })
             })
         }
     }
 
     #[test]
     fn a_policy_that_listens_differs_and_the_instruction_stays() {
-        let mut rollout = Rollout::new(kitchen_house(), "Turn right.".into(), None, None);
+        let mut rollout = Rollout::in_house(kitchen_house(), "Turn right.".into(), None, None);
         let found = contrast(&mut Listener, &mut rollout, "turn left").unwrap();
         assert!((found.divergence - 1.0).abs() < 1e-6 && found.sensitivity == 0.0, "{found:?}");
         assert_eq!(rollout.instruction, "Turn right.");

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::agent::{Observation, Policy};
 use crate::domain::{Cell, Heading, Scene, World};
+use crate::env::HouseEnvironment;
 use crate::house::House;
 
 /// What is measured.
@@ -80,6 +81,11 @@ impl ValueMap {
     }
 }
 
+/// What an agent sees that has just come there.
+fn looks<'a>(environment: &'a mut HouseEnvironment, instruction: &'a str) -> Observation<'a> {
+    Observation { environment, instruction, step: 0 }
+}
+
 /// Puts the agent on every cell, looking each way, and asks the policy. `visit` sees what is there after every cell; it, or
 /// `stop`, ends the survey early.
 ///
@@ -93,7 +99,7 @@ pub fn survey(
     stop: &AtomicBool,
     visit: &mut dyn FnMut(&ValueMap) -> bool,
 ) -> anyhow::Result<ValueMap> {
-    let mut house = House::new(scene.clone(), world.clone());
+    let mut environment = HouseEnvironment::new(House::new(scene.clone(), world.clone()), None);
     let (instruction, of) = (instruction.to_string(), scene.cells.len());
     let mut found = ValueMap { instruction, measure: Measure::Confidence, heights: Vec::with_capacity(of), of };
     // From where the agent is outwards: what matters most comes first.
@@ -108,17 +114,19 @@ pub fn survey(
             }
             let mut there = world.clone();
             (there.agent.cell, there.agent.heading) = (cell, heading);
-            house.restore(there);
-            policy.begin(0);
-            let mut situation =
-                Observation { house: &mut house, instruction: &found.instruction, step: 0, grader: None };
-            let decision = policy.decide(&mut situation)?;
-            *height = match policy.values(&mut situation)? {
+            environment.house.restore(there);
+            policy.reset(0, 0);
+            let decision = policy.act_in(0, looks(&mut environment, &found.instruction))?;
+            let values = match decision.values {
+                Some(values) => Some(values),
+                None => policy.values(0, &mut looks(&mut environment, &found.instruction))?,
+            };
+            *height = match values {
                 Some(values) => {
                     found.measure = Measure::Value;
                     values.state
                 }
-                None => decision.mind.map_or(0.0, |mind| mind.actions.into_iter().flatten().fold(0.0, f32::max)),
+                None => decision.distribution.map_or(0.0, |it| it.actions.into_iter().flatten().fold(0.0, f32::max)),
             };
         }
         found.heights.push(CellValue { cell, values });

@@ -6,7 +6,8 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use super::{Ending, logging, policies, streams};
+use super::{Ending, logging, streams};
+use crate::agent::policy_source;
 use crate::nets::{device, home, sentence};
 
 /// Prints what was found.
@@ -125,7 +126,7 @@ fn cache() -> Finding {
 }
 
 fn checkpoints() -> Finding {
-    let found: Vec<String> = policies::checkpoints().iter().map(|path| path.display().to_string()).collect();
+    let found: Vec<String> = policy_source::checkpoints().iter().map(|path| path.display().to_string()).collect();
     if found.is_empty() {
         let remedy = "run in the repository's folder, or train one with `sprint collect` and `sprint pretrain`";
         return Finding::bad("checkpoints", "none in checkpoints/", remedy);

@@ -99,7 +99,7 @@ impl Eval {
         run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
         let stop = super::stop::on_signals()?;
         let mut meter = Meter::new(self.json);
-        let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.team, &mut run, &stop, &mut |progress| {
+        let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.make, &mut run, &stop, &mut |progress| {
             meter.show(progress)
         })?;
         meter.finish();

@@ -8,7 +8,8 @@ use clap::{Args, ValueEnum};
 use etcetera::BaseStrategy;
 
 use super::rooms::RoomName;
-use super::{Ending, logging, policies};
+use super::{Ending, logging};
+use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
 use crate::episode::scenes::Scenes;
@@ -181,7 +182,7 @@ impl Origin {
     fn engine(&self, kind: PolicyKind) -> anyhow::Result<Session> {
         let (start, scenes) = self.start()?;
         let openings = EpisodeSource::new(start, self.seed, scenes);
-        let policies = Policies::new(policies::agents(self.checkpoint.as_deref()));
+        let policies = Policies::new(policy_source::agents(self.checkpoint.as_deref()));
         Session::new(openings, policies, kind, self.instruction.as_deref())
     }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use clap::Args;
 
-use super::{Ending, explore::Display, policies};
+use super::{Ending, explore::Display};
+use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
 use crate::eval::verify::Recorded;
@@ -87,7 +88,7 @@ impl Open {
         let open = move || -> anyhow::Result<Session> {
             let scenes = recorded.scenes;
             let start = Start::Tasks { tasks: vec![task], index: 0 };
-            let policies = Policies::new(policies::agents(checkpoint.as_deref()));
+            let policies = Policies::new(policy_source::agents(checkpoint.as_deref()));
             let openings = EpisodeSource::new(start, 0, scenes);
             let mut engine = Session::new(openings, policies, kind, None)?;
             if explored {

@@ -11,13 +11,12 @@ use indicatif::ProgressBar;
 
 use super::rooms::RoomName;
 use super::{Ending, streams};
-use crate::agent::{ExpertPolicy, Solo, Team};
+use crate::agent::policy_source::PolicySource;
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
 use crate::episode::instruction_variant::told;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
-use crate::eval::executor::MakeTeam;
 use crate::eval::options::Options;
 use crate::eval::tasks::check;
 use crate::eval::tasks::sample;
@@ -185,8 +184,7 @@ impl Check {
         let mut unsolved = 0;
         evaluation.play(
             &evaluation.all(),
-            &(Arc::new(|| -> anyhow::Result<Box<dyn Team>> { Ok(Box::new(Solo(Box::new(ExpertPolicy::new())))) })
-                as Arc<MakeTeam>),
+            &PolicySource::expert().make,
             &Arc::new(AtomicBool::new(false)),
             &mut |episode| {
                 if !episode.success {

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, policies, streams};
-use crate::agent::Policy;
-use crate::agent::registry::{Policies, PolicyKind};
+use super::{Ending, streams};
+use crate::agent::policy_source;
 use crate::episode::record::Author;
 use crate::eval::verify;
 use crate::eval::verify::Recorded;
@@ -23,6 +22,9 @@ pub struct Verify {
     /// The checkpoint folder of the run's agent [default: the one of the run's hash among checkpoints/]
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
+    /// Threads; the verdict does not depend on their number [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
     /// Print the verdict as JSON
     #[arg(long)]
     json: bool,
@@ -35,25 +37,17 @@ impl Verify {
     /// When the run or its tasks cannot be read.
     pub fn run(self) -> anyhow::Result<Ending> {
         let run = Recorded::open(&self.run, self.tasks.as_deref())?;
-        let mut policies = Policies::new(policies::agents(self.checkpoint.as_deref()));
-        let mut summon = |author: &Author| -> anyhow::Result<Option<Box<dyn Policy>>> {
-            match author.policy.as_str() {
-                "expert" => Ok(Some(policies.make(PolicyKind::Expert)?.policy)),
-                "random" => Ok(Some(policies.make(PolicyKind::Random)?.policy)),
-                _ => {
-                    for number in 1..=policies.agents().len() {
-                        policies.choose(&number.to_string())?;
-                        let loaded = policies.make(PolicyKind::Agent)?;
-                        if loaded.checkpoint == author.checkpoint {
-                            return Ok(Some(loaded.policy));
-                        }
-                    }
-                    Ok(None)
-                }
-            }
+        let mut find = |author: &Author| {
+            policy_source::find(
+                author.policy.as_str(),
+                author.checkpoint.as_deref(),
+                author.samples,
+                self.checkpoint.as_deref(),
+            )
         };
         let bar = indicatif::ProgressBar::new(run.episodes.len() as u64);
-        let verdict = verify::verify(&run, &mut summon, &mut |done| bar.set_position(done as u64))?;
+        let verdict =
+            verify::verify(&run, &mut find, super::threads(self.jobs), &mut |done| bar.set_position(done as u64))?;
         bar.finish_and_clear();
         let mut out = streams::out();
         if self.json {

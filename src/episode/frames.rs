@@ -1,12 +1,14 @@
 //! A recorded episode as a sequence of states that can be drawn.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use anyhow::ensure;
 
-use super::record::Episode;
+use super::record::{Episode, Step};
+use super::rollout::{AfterEach, Rollout, Tick};
 use super::scenes::Setting;
-use crate::domain::{Action, Scene, Task, World};
+use crate::domain::{Scene, Task, World};
 use crate::house::grading::describe;
 use crate::house::view::Frame;
 use crate::house::{House, Outcome};
@@ -72,7 +74,8 @@ impl FrameSequence {
     /// # Errors
     /// When a step does not come to what was recorded.
     pub fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<FrameSequence> {
-        let mut house = House::new(setting.scene.clone(), setting.world.clone());
+        let house = House::new(setting.scene.clone(), setting.world.clone());
+        let mut rollout = Rollout::in_house(house, String::new(), None, None);
         let subtasks: Vec<String> = task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect();
         let mut told = instruction::normalise(&episode.instruction);
         let start = Shot {
@@ -85,11 +88,13 @@ impl FrameSequence {
             done: None,
         };
         let mut shots = vec![start];
-        for (number, step) in (1..).zip(&episode.trace) {
+        let mut recorded = (1..).zip(&episode.trace);
+        let mut record = AfterEach(|rollout: &mut Rollout, tick: &Tick| {
+            let Some((number, step)) = recorded.next() else { return Ok(ControlFlow::Break(())) };
             if let Some(text) = &step.told {
                 told.clone_from(text);
             }
-            let outcome = house.step(Action { kind: step.kind, target: step.target });
+            let outcome = tick.outcome;
             ensure!(
                 outcome == step.outcome,
                 "task {:?}, step {number} ({}): came to {outcome}, recorded is {}; the simulator or the scene is another one",
@@ -100,14 +105,16 @@ impl FrameSequence {
             let class = step.class.map_or(String::new(), |class| format!(" {}", class.name()));
             shots.push(Shot {
                 step: number,
-                world: house.world().clone(),
+                world: rollout.env.house.world().clone(),
                 told: told.clone(),
                 did: Some(format!("{}{class}", step.kind)),
                 outcome,
                 possible: outcome.is_done(),
                 done: step.subtask.map(|at| subtasks.get(at as usize).cloned().unwrap_or_default()),
             });
-        }
+            Ok(ControlFlow::Continue(()))
+        });
+        rollout.replay(episode.trace.iter().map(Step::action), &mut record)?;
         let result = match (episode.success, episode.of) {
             (true, _) => "success".to_string(),
             (false, 0) => "not graded".to_string(),
@@ -133,7 +140,6 @@ impl FrameSequence {
 pub(crate) mod tests {
     use super::*;
     use crate::domain::ActionType;
-    use crate::episode::record::Step;
     use crate::house::testing::kitchen;
 
     /// A few turns in the kitchen; one subtask is said to be done.
@@ -143,14 +149,13 @@ pub(crate) mod tests {
         let mut task = crate::data::taskset::tests::sample_set().tasks.remove(0);
         task.instruction = "put the mug in the sink".into();
         let kinds = [ActionType::RotateLeft, ActionType::LookUp, ActionType::RotateLeft];
-        let mut house = House::new(setting.scene.clone(), setting.world.clone());
         let trace: Vec<Step> = kinds
             .into_iter()
             .map(|kind| Step {
                 kind,
                 target: None,
                 class: None,
-                outcome: house.step(Action::navigate(kind)),
+                outcome: Outcome::Done,
                 subtask: (kind == ActionType::LookUp).then_some(0),
                 told: None,
                 by: None,

@@ -6,7 +6,8 @@ use super::failure::Failure;
 use super::instruction_variant::InstructionVariant;
 use super::rollout::{Rollout, Tick};
 use crate::domain::world::Instance;
-use crate::domain::{ActionType, Class};
+use crate::domain::{Action, ActionType, Class};
+use crate::env::Environment;
 use crate::house::Outcome;
 
 /// One line of a run's `episodes.jsonl`.
@@ -170,14 +171,19 @@ impl Author {
 }
 
 impl Step {
+    /// What was done, as an action that can be taken again.
+    pub fn action(&self) -> Action {
+        Action { kind: self.kind, target: self.target }
+    }
+
     /// The record of a step that `rollout` just took.
-    pub fn of(tick: &Tick, rollout: &Rollout) -> Step {
-        let (action, house) = (tick.decision.action, &rollout.house);
-        let completed = rollout.grader.as_ref().map_or(0, |grader| grader.completed() as u32);
+    pub fn of<E: Environment>(tick: &Tick, rollout: &Rollout<E>) -> Step {
+        let action = tick.decision.action;
+        let completed = rollout.env.grading().map_or(0, |(completed, _)| completed as u32);
         Step {
             kind: action.kind,
             target: action.target,
-            class: action.target.and_then(|target| house.world().class_of(house.scene(), target)),
+            class: action.target.and_then(|target| rollout.env.class_of(target)),
             outcome: tick.outcome,
             subtask: tick.completed_one.then(|| completed.saturating_sub(1)),
             told: None,

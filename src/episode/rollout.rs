@@ -1,20 +1,21 @@
-//! The one loop that steps an environment; the explorer, the evaluator and the collector all go through it.
+//! The one loop that steps an environment; the explorer, the evaluator, verification and collection all go through it.
+
+use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use crate::agent::{Decision, Observation, Policy};
-use crate::domain::{Action, World};
+use crate::agent::{Decision, Decisions, Observation, Policy, Values};
+use crate::domain::Action;
+use crate::env::{Environment, HouseEnvironment};
 use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
 
-/// An episode under way: a house, what is asked, and how far it has come.
-pub struct Rollout {
+/// An episode under way: an environment, what is asked, and how far it has come.
+pub struct Rollout<E = HouseEnvironment> {
     /// Where it happens.
-    pub house: House,
+    pub env: E,
     /// What the agent is told; may change between steps.
     pub instruction: String,
-    /// Follows the subtasks, where there is a task.
-    pub grader: Option<Grader>,
     /// After how many steps it ends; `None` for no limit.
     pub horizon: Option<u32>,
     steps: u32,
@@ -25,7 +26,7 @@ pub struct Rollout {
 pub struct Tick {
     /// Which step, from 1.
     pub step: u32,
-    /// What was done, and the mind behind it; a person's action has none.
+    /// What was done, and what was behind it.
     pub decision: Decision,
     /// What it came to.
     pub outcome: Outcome,
@@ -43,10 +44,53 @@ pub enum End {
     Timeout,
 }
 
+/// Looks on while a rollout goes its way, and may end it.
+pub trait Observer<E> {
+    /// Before each step, when it is known what will be done. The policy may be asked further questions.
+    ///
+    /// # Errors
+    /// Ends the rollout before the step.
+    fn before(
+        &mut self,
+        _rollout: &mut Rollout<E>,
+        _policy: Option<&mut dyn Policy>,
+        _decision: &Decision,
+    ) -> anyhow::Result<ControlFlow<()>> {
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// After each step.
+    ///
+    /// # Errors
+    /// Ends the rollout after the step.
+    fn after(&mut self, _rollout: &mut Rollout<E>, _tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+/// Nobody looks on.
+impl<E> Observer<E> for () {}
+
+/// Looks on after each step with a closure.
+pub struct AfterEach<F>(pub F);
+
+impl<E, F: FnMut(&mut Rollout<E>, &Tick) -> anyhow::Result<ControlFlow<()>>> Observer<E> for AfterEach<F> {
+    fn after(&mut self, rollout: &mut Rollout<E>, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
+        (self.0)(rollout, tick)
+    }
+}
+
 impl Rollout {
+    /// An episode in a house, at its start.
+    pub fn in_house(house: House, instruction: String, grader: Option<Grader>, horizon: Option<u32>) -> Rollout {
+        Rollout::new(HouseEnvironment::new(house, grader), instruction, horizon)
+    }
+}
+
+impl<E: Environment> Rollout<E> {
     /// An episode at its start.
-    pub fn new(house: House, instruction: String, grader: Option<Grader>, horizon: Option<u32>) -> Rollout {
-        Rollout { house, instruction, grader, horizon, steps: 0 }
+    pub fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
+        Rollout { env, instruction, horizon, steps: 0 }
     }
 
     /// How many steps were taken.
@@ -54,61 +98,104 @@ impl Rollout {
         self.steps
     }
 
+    /// Goes on as if so many steps had been taken: the environment was brought to another state.
+    pub fn set_steps(&mut self, steps: u32) {
+        self.steps = steps;
+    }
+
     /// Whether it is over, and why.
     pub fn end(&self) -> Option<End> {
-        if self.grader.as_ref().is_some_and(Grader::is_done) {
+        if self.env.grading().is_some_and(|(completed, of)| completed == of) {
             return Some(End::Success);
         }
         self.horizon.is_some_and(|horizon| self.steps >= horizon).then_some(End::Timeout)
     }
 
-    /// What `policy` would do now, without doing it.
+    /// What a policy decides from now.
+    pub fn observation(&mut self) -> Observation<'_> {
+        Observation { environment: &mut self.env, instruction: &self.instruction, step: self.steps }
+    }
+
+    /// What `policy` would do now in its slot 0, without doing it.
     ///
     /// # Errors
     /// Whatever the policy reports.
     pub fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
-        policy.decide(&mut self.situation())
+        policy.act_in(0, self.observation())
     }
 
-    /// What a policy decides from now.
-    pub fn situation(&mut self) -> Observation<'_> {
-        Observation {
-            house: &mut self.house,
-            instruction: &self.instruction,
-            step: self.steps,
-            grader: self.grader.as_ref(),
+    /// What the policy's critics say of the present state, in which it decided so; nothing without critics.
+    ///
+    /// # Errors
+    /// Whatever the policy reports.
+    pub fn values(&mut self, policy: &mut dyn Policy, decision: &Decision) -> anyhow::Result<Option<Values>> {
+        match &decision.values {
+            Some(values) => Ok(Some(values.clone())),
+            None => policy.values(0, &mut self.observation()),
         }
     }
 
-    /// Goes on from another state, `steps` into the episode.
-    pub fn resume(&mut self, world: World, grader: Option<Grader>, steps: u32) {
-        self.house.restore(world);
-        self.grader = grader;
-        self.steps = steps;
-    }
-
-    /// Takes one step by `policy`'s choice.
+    /// Takes one step that was decided.
     ///
     /// # Errors
-    /// Whatever the policy reports; nothing was done then.
-    pub fn step(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Tick> {
-        let decision = self.decide(policy)?;
-        Ok(self.carry_out(decision))
-    }
-
-    /// Takes one step that a person chose.
-    pub fn act(&mut self, action: Action) -> Tick {
-        self.carry_out(Decision { action, mind: None })
-    }
-
-    /// Takes one step that was decided.
-    pub fn carry_out(&mut self, decision: Decision) -> Tick {
-        let outcome = self.house.step(decision.action);
+    /// When the environment fails; an impossible action is an outcome.
+    pub fn carry_out(&mut self, decision: Decision) -> anyhow::Result<Tick> {
+        let transition = self.env.step(decision.action)?;
         self.steps += 1;
-        let completed_one = match &mut self.grader {
-            Some(grader) => grader.observe(self.house.scene(), self.house.world(), decision.action, outcome),
-            None => false,
-        };
-        Tick { step: self.steps, decision, outcome, completed_one }
+        let completed_one = transition.completed_subtask;
+        Ok(Tick { step: self.steps, decision, outcome: transition.outcome, completed_one })
     }
+
+    /// Lets a policy act in its slot 0 until the episode is over or `observer` ends it.
+    ///
+    /// # Errors
+    /// Whatever policy, environment or observer report.
+    pub fn run(&mut self, policy: &mut dyn Policy, observer: &mut dyn Observer<E>) -> anyhow::Result<()> {
+        while self.end().is_none() {
+            let decision = self.decide(policy)?;
+            if observer.before(self, Some(policy), &decision)?.is_break() {
+                break;
+            }
+            let tick = self.carry_out(decision)?;
+            if observer.after(self, &tick)?.is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes actions that were recorded, to the last of them or until `observer` ends it.
+    ///
+    /// # Errors
+    /// Whatever environment or observer report.
+    pub fn replay(
+        &mut self,
+        actions: impl IntoIterator<Item = Action>,
+        observer: &mut dyn Observer<E>,
+    ) -> anyhow::Result<()> {
+        for action in actions {
+            let decision = Decision::of(action);
+            if observer.before(self, None, &decision)?.is_break() {
+                break;
+            }
+            let tick = self.carry_out(decision)?;
+            if observer.after(self, &tick)?.is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What `policy` would do in each of its slots, one rollout a slot.
+///
+/// # Errors
+/// Where all slots fail together; a slot's own failure is in its place.
+pub fn decide_all<E: Environment>(
+    policy: &mut dyn Policy,
+    rollouts: &mut [Option<Rollout<E>>],
+) -> anyhow::Result<Decisions> {
+    let mut observations: Vec<_> =
+        rollouts.iter_mut().map(|rollout| rollout.as_mut().map(Rollout::observation)).collect();
+    policy.act(&mut observations)
 }

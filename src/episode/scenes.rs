@@ -13,10 +13,11 @@ use crate::domain::{Instance, Scene, Task, TaskSet, World};
 use crate::house::validate;
 use crate::house::validate::Misfit;
 
-/// The scenes that a task set may name. Those from files are read once and shared; generated houses are made anew.
+/// The scenes that a task set may name. Those from files are read once and shared, by copies too; generated houses are made anew.
+#[derive(Clone)]
 pub struct Scenes {
     folder: Option<PathBuf>,
-    read: Mutex<BTreeMap<String, Arc<Scene>>>,
+    read: Arc<Mutex<BTreeMap<String, Arc<Scene>>>>,
 }
 
 /// Where an episode starts.
@@ -32,12 +33,12 @@ impl Scenes {
     /// The scenes of the tasks in `file`: the set names their folder relative to that.
     pub fn of(file: &Path, set: &TaskSet) -> Scenes {
         let folder = set.scenes.as_ref().map(|scenes| file.parent().unwrap_or(Path::new("")).join(scenes));
-        Scenes { folder, read: Mutex::default() }
+        Scenes { folder, read: Arc::default() }
     }
 
     /// The scenes in a folder of scene files; `None` where only generated houses are known.
     pub fn in_folder(folder: Option<PathBuf>) -> Scenes {
-        Scenes { folder, read: Mutex::default() }
+        Scenes { folder, read: Arc::default() }
     }
 
     /// The scene, with the world that a generated one starts in.

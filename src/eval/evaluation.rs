@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::executor;
-use super::executor::MakeTeam;
 use super::options::Options;
+use super::plan::EvaluationPlan;
+use super::worker_pool;
+use crate::agent::policy_source::MakePolicy;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
 use crate::episode::instruction_variant;
@@ -21,9 +22,7 @@ use crate::run_dir::writer::RunFolder;
 /// An evaluation that can start: its tasks fit their scenes. Copies share tasks and scenes.
 #[derive(Clone)]
 pub struct Evaluation {
-    pub(crate) tasks: Arc<[Task]>,
-    pub(crate) scenes: Arc<Scenes>,
-    pub(crate) options: Options,
+    plan: EvaluationPlan,
     manifest: Manifest,
 }
 
@@ -82,7 +81,8 @@ impl Evaluation {
             shard: options.shard,
         };
         manifest.check()?;
-        Ok(Evaluation { tasks: tasks.into(), scenes: Arc::new(scenes), options, manifest })
+        let plan = EvaluationPlan { tasks: tasks.into(), scenes: Arc::new(scenes), options };
+        Ok(Evaluation { plan, manifest })
     }
 
     /// What identifies this run.
@@ -92,24 +92,24 @@ impl Evaluation {
 
     /// The tasks that are played.
     pub fn tasks(&self) -> &[Task] {
-        &self.tasks
+        &self.plan.tasks
     }
 
     /// Where they play.
     pub fn scenes(&self) -> &Scenes {
-        &self.scenes
+        &self.plan.scenes
     }
 
     /// Every episode of the run, or of its share, in order.
     pub fn all(&self) -> Vec<EpisodeSpec> {
-        let all = episode_specs(&self.manifest, &self.tasks);
-        let own = self.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
+        let all = episode_specs(&self.manifest, &self.plan.tasks);
+        let own = self.plan.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
         all[own].to_vec()
     }
 
     /// What tells an episode apart from the others.
     pub fn key(&self, spec: &EpisodeSpec) -> Key {
-        spec.key(&self.tasks)
+        spec.key(&self.plan.tasks)
     }
 
     /// Plays these episodes on several threads; `sink` takes each, in their order.
@@ -117,15 +117,15 @@ impl Evaluation {
     /// `stop` ends it early: what is under way is dropped.
     ///
     /// # Errors
-    /// When a team cannot be made, or `sink` fails.
+    /// When a policy cannot be made, or `sink` fails.
     pub fn play(
         &self,
         wanted: &[EpisodeSpec],
-        make_team: &Arc<MakeTeam>,
+        make_policy: &Arc<MakePolicy>,
         stop: &Arc<AtomicBool>,
         sink: &mut dyn FnMut(Episode) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        executor::play(self, wanted, make_team, stop, sink)
+        worker_pool::play(&self.plan, wanted, make_policy, stop, sink)
     }
 }
 
@@ -158,10 +158,10 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
 /// `stop` ends it early: what is under way is dropped, and the summary says that it is partial.
 ///
 /// # Errors
-/// When a team cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
+/// When a policy cannot be made or the folder cannot be written to. What goes wrong in an episode is recorded there instead.
 pub fn evaluate(
     evaluation: &Evaluation,
-    make_team: &Arc<MakeTeam>,
+    make_policy: &Arc<MakePolicy>,
     folder: &mut RunFolder,
     stop: &Arc<AtomicBool>,
     progress: &mut dyn FnMut(Progress),
@@ -174,7 +174,7 @@ pub fn evaluate(
         match episodes.get(&evaluation.key(spec)) {
             None => wanted.push(*spec),
             // What failed before is begun anew as often as is asked now.
-            Some(found) if found.error.is_some() && found.attempts <= evaluation.options.retries => {
+            Some(found) if found.error.is_some() && found.attempts <= evaluation.plan.options.retries => {
                 wanted.push(EpisodeSpec { attempts: found.attempts, ..*spec });
             }
             Some(_) => {}
@@ -187,7 +187,7 @@ pub fn evaluate(
     }
     episodes.values().for_each(|episode| state.count(episode));
     progress(state);
-    evaluation.play(&wanted, make_team, stop, &mut |mut episode| {
+    evaluation.play(&wanted, make_policy, stop, &mut |mut episode| {
         folder.append(&episode)?;
         state.count(&episode);
         progress(state);
@@ -196,7 +196,7 @@ pub fn evaluate(
         episodes.insert(episode.key(), episode);
         Ok(())
     })?;
-    finish(&evaluation.manifest, &evaluation.tasks, &all, folder)
+    finish(&evaluation.manifest, &evaluation.plan.tasks, &all, folder)
 }
 
 /// Sums up what a folder holds, and writes the summary into it.
@@ -226,7 +226,8 @@ pub(crate) mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::agent::{Decision, Observation, Policy, Solo, Team};
+    use crate::agent::policy::each_alone;
+    use crate::agent::{Decision, Decisions, Observation, Policy};
     use crate::data::{json, taskset};
     use crate::domain::task::SceneRef;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
@@ -251,27 +252,37 @@ pub(crate) mod tests {
             "walker"
         }
 
-        fn begin(&mut self, seed: u64) {
+        fn slots(&self) -> usize {
+            1
+        }
+
+        fn reset(&mut self, _slot: usize, seed: u64) {
             self.rng = ChaCha8Rng::seed_from_u64(seed);
             self.steps = 0;
         }
 
-        fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+            each_alone(observations, |_, here| self.decide(here))
+        }
+    }
+
+    impl Walker {
+        pub(crate) fn decide(&mut self, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
             self.steps += 1;
             assert!(!(self.panics && self.steps == 4), "out of legs");
             anyhow::ensure!(!(self.fails && self.steps == 6), "no way to the mug");
-            let candidates = situation.house.candidates();
+            let candidates = here.environment.legal_actions()?;
             let action = if !candidates.is_empty() && self.rng.random_bool(0.5) {
                 candidates[self.rng.random_range(0..candidates.len())].action()
             } else {
                 Action::navigate(ActionType::ALL[self.rng.random_range(0..5)])
             };
-            Ok(Decision { action, mind: None })
+            Ok(Decision::of(action))
         }
     }
 
-    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Team>> {
-        Ok(Box::new(Solo(Box::new(Walker::new(fails, panics)))))
+    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Policy>> {
+        Ok(Box::new(Walker::new(fails, panics)))
     }
 
     /// Three tasks in the test kitchen, and the folder that they live in.
@@ -319,7 +330,7 @@ pub(crate) mod tests {
     pub(crate) fn run(
         into: &std::path::Path,
         options: Options,
-        make: impl Fn() -> anyhow::Result<Box<dyn Team>> + Send + Sync + 'static,
+        make: impl Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync + 'static,
         stop_after: usize,
     ) -> anyhow::Result<Ran> {
         let (folder, set) = tasks();
@@ -333,7 +344,7 @@ pub(crate) mod tests {
                 stopping.store(true, Ordering::Relaxed);
             }
         };
-        let summary = evaluate(&evaluation, &(Arc::new(make) as Arc<MakeTeam>), &mut folder, &stop, &mut progress)?;
+        let summary = evaluate(&evaluation, &(Arc::new(make) as Arc<MakePolicy>), &mut folder, &stop, &mut progress)?;
         Ok(Ran { summary, lines: std::fs::read_to_string(into.join("episodes.jsonl"))? })
     }
 

@@ -4,9 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::evaluation::Evaluation;
+use super::plan::EvaluationPlan;
 use crate::episode::record::Episode;
-use crate::episode::{failure, instruction_variant};
+use crate::episode::{diagnosis, instruction_variant};
 use crate::run_dir::episode_spec::EpisodeSpec;
 
 /// An episode under way, as far as it is recorded.
@@ -24,7 +24,7 @@ pub(crate) struct InFlight {
 
 impl InFlight {
     /// Before the first step.
-    pub fn new(evaluation: &Evaluation, at: usize, spec: EpisodeSpec) -> InFlight {
+    pub fn new(evaluation: &EvaluationPlan, at: usize, spec: EpisodeSpec) -> InFlight {
         let task = &evaluation.tasks[spec.task];
         let chance = crate::run_dir::episode_spec::policy_seed(spec.task, spec.seed);
         let step_by_step = evaluation.options.step_by_step;
@@ -46,15 +46,15 @@ impl InFlight {
         self.episode.error.get_or_insert_with(|| problem.to_owned());
     }
 
-    /// The booking of another attempt, where an error is to be tried again.
-    pub fn again(&self, evaluation: &Evaluation) -> Option<EpisodeSpec> {
+    /// The spec of another attempt, where an error is to be tried again.
+    pub fn again(&self, evaluation: &EvaluationPlan) -> Option<EpisodeSpec> {
         let tried = self.episode.attempts;
         let again = self.episode.error.is_some() && tried <= evaluation.options.retries;
         again.then_some(EpisodeSpec { attempts: tried, ..self.spec })
     }
 
     /// The record of what it came to.
-    pub fn close(mut self, evaluation: &Evaluation) -> Episode {
+    pub fn close(mut self, evaluation: &EvaluationPlan) -> Episode {
         let episode = &mut self.episode;
         let own = &episode.trace[(episode.prefix as usize).min(episode.trace.len())..];
         episode.steps = own.len() as u32;
@@ -65,7 +65,7 @@ impl InFlight {
             // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
             let class = guarded(|| {
                 let setting = evaluation.scenes.setting(task)?;
-                Ok(failure::classify(task, evaluation.options.grading, &setting, &episode.trace))
+                diagnosis::classify(task, evaluation.options.grading, &setting, &episode.trace)
             });
             episode.failure = class.ok();
         }
@@ -86,7 +86,7 @@ pub(crate) fn guarded<T>(run: impl FnOnce() -> anyhow::Result<T>) -> Result<T, S
     }
 }
 
-/// What is under way at a table, seat by seat. The table writes it, the thread that waits for the table reads it.
+/// What is under way at a worker, slot by slot. The worker writes it, the thread that waits for the worker reads it.
 #[derive(Debug)]
 pub(crate) struct Watchdog {
     state: Mutex<WatchdogState>,
@@ -94,32 +94,32 @@ pub(crate) struct Watchdog {
 
 #[derive(Debug)]
 pub(crate) struct WatchdogState {
-    /// Seat by seat.
-    pub seats: Vec<Option<InFlight>>,
-    /// Nobody waits for this table any more: it must record nothing.
-    pub is_left: bool,
+    /// Slot by slot.
+    pub slots: Vec<Option<InFlight>>,
+    /// Nobody waits for this worker any more: it must record nothing.
+    pub is_abandoned: bool,
 }
 
 impl Watchdog {
-    /// Over a table with empty seats.
-    pub fn new(seats: usize) -> Watchdog {
-        Watchdog { state: Mutex::new(WatchdogState { seats: vec![None; seats], is_left: false }) }
+    /// For a worker with empty slots.
+    pub fn new(slots: usize) -> Watchdog {
+        Watchdog { state: Mutex::new(WatchdogState { slots: vec![None; slots], is_abandoned: false }) }
     }
 
-    /// What is under way now. A table that panicked while it wrote leaves its last whole record.
+    /// What is under way now. A worker that panicked while it wrote leaves its last whole record.
     pub fn lock(&self) -> MutexGuard<'_, WatchdogState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a table's episodes away from it when one has taken so much longer than `limit` that the table must hang within
+    /// Takes a worker's episodes away from it when one has taken so much longer than `limit` that the worker must hang within
     /// one step: between two steps it looks at the time itself.
-    pub fn leave_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
+    pub fn abandon_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
         let patience = limit + (limit / 10).max(Duration::from_secs(1));
         let mut state = self.lock();
-        if state.is_left || !state.seats.iter().flatten().any(|in_flight| in_flight.began.elapsed() >= patience) {
+        if state.is_abandoned || !state.slots.iter().flatten().any(|in_flight| in_flight.began.elapsed() >= patience) {
             return None;
         }
-        state.is_left = true;
-        Some(state.seats.iter_mut().filter_map(Option::take).collect())
+        state.is_abandoned = true;
+        Some(state.slots.iter_mut().filter_map(Option::take).collect())
     }
 }

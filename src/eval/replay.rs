@@ -15,7 +15,7 @@ use crate::domain::{ActionType, Scene, Task, Trajectory, World};
 use crate::house::camera::projected_bounds;
 use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
-use crate::house::{House, Outcome, rules};
+use crate::house::{House, Outcome, Replay};
 
 /// What to replay.
 #[derive(Clone, Debug, Default)]
@@ -167,33 +167,36 @@ fn recorded(dataset: &Dataset, ids: &[&str]) -> anyhow::Result<BTreeMap<String, 
 
 fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     let mut replayed = Replayed::default();
-    let mut world = trajectory.start.clone();
+    let mut replay = Replay::new(scene, trajectory.start.clone(), &trajectory.actions);
     let goal = trajectory.goal.as_ref();
     let new = |grading| Grader::new(grading, &trajectory.roles, &trajectory.skills, goal);
     let (mut class, mut strict) = (new(Grading::Class), new(Grading::Strict));
     let mut interactions = 0;
-    let mut moved = vec![false; world.objects.len()];
+    let mut moved = vec![false; trajectory.start.objects.len()];
     let mut illegal = None;
-    for (number, &action) in trajectory.actions.iter().enumerate() {
+    let mut number = 0;
+    while let Some(action) = replay.upcoming() {
         if action.kind.is_interaction() {
             let recorded = trajectory.boxes.get(interactions).copied().unwrap_or_default();
             interactions += 1;
             if boxes && let Some(target) = action.target {
-                replayed.ious.extend(compare(scene, &world, action.kind, target, recorded, &moved));
+                replayed.ious.extend(compare(scene, replay.world(), action.kind, target, recorded, &moved));
             }
             if let (ActionType::Pickup, Some(Instance::Object(index))) = (action.kind, action.target) {
-                note_moved(&world, index, &mut moved);
+                note_moved(replay.world(), index, &mut moved);
             }
         }
-        let outcome = rules::apply(scene, &mut world, action);
+        let Some((_, outcome)) = replay.step() else { break };
         if let Outcome::Impossible(reason) = outcome
             && illegal.is_none()
         {
             illegal = Some(format!("action {number}, {}: {reason}", action.kind));
         }
-        class.observe(scene, &world, action, outcome);
-        strict.observe(scene, &world, action, outcome);
+        class.observe(scene, replay.world(), action, outcome);
+        strict.observe(scene, replay.world(), action, outcome);
+        number += 1;
     }
+    let world = replay.finish();
     replayed.failures.extend(illegal.map(|reason| ("legal", reason)));
     if let Some(goal) = goal
         && !goal_met(goal, scene, &world)
@@ -213,7 +216,8 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
 fn unseen(scene: &Arc<Scene>, trajectory: &Trajectory) -> Option<String> {
     let mut house = House::new(scene.clone(), trajectory.start.clone());
     for (number, &action) in trajectory.actions.iter().enumerate() {
-        let possible = rules::apply(scene, &mut house.world().clone(), action).is_done();
+        let mut by_rules = Replay::new(scene, house.world().clone(), std::slice::from_ref(&action));
+        let possible = by_rules.step().is_some_and(|(_, outcome)| outcome.is_done());
         if let (true, Outcome::Impossible(reason)) = (possible, house.step(action)) {
             return Some(format!("action {number}, {}: {reason}", action.kind));
         }
@@ -326,16 +330,17 @@ fn replay_set(
         let (Some((id, first)), Some(start)) = (&task.source, &task.start) else { continue };
         let Some(trajectory) = recorded.get(id) else { continue };
         let from = trajectory.skill_range(usize::from(*first)).start;
-        let actions = trajectory.actions.iter().skip(from).take(task.expert_steps as usize);
-        let mut world = start.clone();
+        let rest = trajectory.actions.get(from..).unwrap_or_default();
+        let actions = &rest[..rest.len().min(task.expert_steps as usize)];
+        let mut replay = Replay::new(scene, start.clone(), actions);
         let new = |grading| Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
         let mut graders = [new(Grading::Class), new(Grading::Strict)];
-        for &action in actions {
-            let outcome = rules::apply(scene, &mut world, action);
+        while let Some((action, outcome)) = replay.step() {
             for grader in &mut graders {
-                grader.observe(scene, &world, action, outcome);
+                grader.observe(scene, replay.world(), action, outcome);
             }
         }
+        let world = replay.finish();
         report.class += usize::from(graders[0].is_done());
         report.strict += usize::from(graders[1].is_done());
         for (what, grader) in [("task_class", &graders[0]), ("task_strict", &graders[1])] {

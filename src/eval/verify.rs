@@ -1,23 +1,29 @@
 //! Verifying a run: its episodes are played again, and must come out the same, step by step.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, ensure};
 use serde::Serialize;
 
-use crate::agent::{Policy, PolicyState};
+use super::options::Options;
+use super::plan::EvaluationPlan;
+use super::worker_pool;
+use crate::agent::policy_source::PolicySource;
+use crate::agent::{Decision, Policy, PolicyState};
 use crate::data::json;
-use crate::domain::{Action, Task, TaskSet};
+use crate::domain::{Task, TaskSet};
 use crate::episode::branches::{FRAMES, Moment, look_back};
-use crate::episode::record::{Author, Episode, Step};
+use crate::episode::record::{Author, Episode, Key, Step};
 use crate::episode::rollout::Rollout;
 use crate::episode::scenes::{Scenes, Setting};
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
 use crate::report::summary::Summary;
-use crate::run_dir::episode_spec::policy_seed;
+use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs, policy_seed};
 use crate::run_dir::manifest::Manifest;
 use crate::run_dir::writer::{RunFolder, read_episodes};
 
@@ -139,28 +145,163 @@ fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Res
     Ok((tasks, scenes))
 }
 
-/// Makes the policy of an author; `None` where it is not at hand.
-pub type Summon<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<Box<dyn Policy>>> + 'a;
+/// Finds the policy of an author; `None` where it is not at hand.
+pub type FindPolicy<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<PolicySource>> + 'a;
 
-/// Plays every episode of a run again. `progress` hears how many are done.
+/// Plays every episode of a run again: what an evaluation played by the very code that played it, many at once, so that it
+/// decides bit for bit as it did; what a person explored step by step. `progress` hears how many are done.
 ///
 /// # Errors
 /// When a task does not fit its scene, or a policy cannot be made. What differs is in the verdict.
-pub fn verify(run: &Recorded, summon: &mut Summon<'_>, progress: &mut dyn FnMut(usize)) -> anyhow::Result<Verdict> {
+pub fn verify(
+    run: &Recorded,
+    find: &mut FindPolicy<'_>,
+    jobs: usize,
+    progress: &mut dyn FnMut(usize),
+) -> anyhow::Result<Verdict> {
     let mut verdict = Verdict { summarised: run.summarised, ..Verdict::default() };
+    let again = evaluated_again(run, find, jobs, progress)?;
+    let mut sources = Sources { find, known: Vec::new() };
     for (number, episode) in (1..).zip(&run.episodes) {
         let (at, task, setting) = run.setting(episode).with_context(|| format!("episode {number}"))?;
-        let author = run.author(at, episode);
-        let mut again = Again { verdict: &mut verdict, number, episode };
-        if let Some((step, what, recorded, found)) = again.play(task, setting, author, run.manifest.grader, summon)? {
+        let found = match again.get(&episode.key()) {
+            Some(found) => verdict.compare(episode, found),
+            None => {
+                let author = run.author(at, episode);
+                let mut again = Again { verdict: &mut verdict, number, episode };
+                again.play(task, setting, author, run.manifest.grader, &mut sources)?
+            }
+        };
+        if let Some((step, what, recorded, found)) = found {
             let task = episode.task.clone();
             verdict.differences.push(Difference { episode: number, task, step, what, recorded, found });
         }
         verdict.episodes += 1;
         verdict.plain += usize::from(episode.is_plain());
-        progress(number);
+        progress(verdict.episodes.max(again.len()));
     }
     Ok(verdict)
+}
+
+/// The episodes that an evaluation played, played again by the same policy in the same slots; none where the policy is not at
+/// hand.
+fn evaluated_again(
+    run: &Recorded,
+    find: &mut FindPolicy<'_>,
+    jobs: usize,
+    progress: &mut dyn FnMut(usize),
+) -> anyhow::Result<BTreeMap<Key, Episode>> {
+    let specs = episode_specs(&run.manifest, &run.tasks);
+    let recorded: BTreeSet<Key> =
+        run.episodes.iter().filter(|episode| !is_explored(episode)).map(Episode::key).collect();
+    let wanted: Vec<EpisodeSpec> = specs.into_iter().filter(|spec| recorded.contains(&spec.key(&run.tasks))).collect();
+    let mut again = BTreeMap::new();
+    if wanted.is_empty() {
+        return Ok(again);
+    }
+    let Manifest { policy, checkpoint_hash, sampling, .. } = run.manifest.clone();
+    let author = Author { policy, checkpoint: checkpoint_hash, seed: 0, samples: sampling };
+    let Some(source) = find(&author)? else { return Ok(again) };
+    let plan = EvaluationPlan {
+        tasks: run.tasks.clone().into(),
+        scenes: Arc::new(run.scenes.clone()),
+        options: Options {
+            jobs,
+            step_by_step: run.manifest.step_by_step,
+            sampling,
+            ..Options::plain(run.manifest.grader)
+        },
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    worker_pool::play(&plan, &wanted, &source.make, &stop, &mut |episode| {
+        again.insert(episode.key(), episode);
+        progress(again.len());
+        Ok(())
+    })?;
+    Ok(again)
+}
+
+/// Whether a person explored it: its first step says who chose.
+fn is_explored(episode: &Episode) -> bool {
+    episode.trace.first().is_some_and(|step| step.by.is_some())
+}
+
+impl Verdict {
+    /// The first difference between an episode and the same played again.
+    fn compare(&mut self, recorded: &Episode, found: &Episode) -> Option<Found> {
+        let texts = |what, one: &str, other: &str| Some((0, what, one.to_owned(), other.to_owned()));
+        if recorded.start_hash != found.start_hash {
+            return texts("start", &recorded.start_hash, &found.start_hash);
+        }
+        if recorded.instruction != found.instruction {
+            return texts("instruction", &recorded.instruction, &found.instruction);
+        }
+        for (number, step) in (1..).zip(&recorded.trace) {
+            let is_choice = number > recorded.prefix;
+            let Some(again) = found.trace.get(number as usize - 1) else {
+                let why = found.error.clone().unwrap_or_else(|| "the episode is over".into());
+                return Some((number, "choice", format!("{:?}", step.action()), why));
+            };
+            if is_choice && again.action() != step.action() {
+                return Some((number, "choice", format!("{:?}", step.action()), format!("{:?}", again.action())));
+            }
+            self.choices += usize::from(is_choice);
+            if let Some(difference) = differs(number, step, again) {
+                return Some(difference);
+            }
+            self.steps += 1;
+        }
+        // An error ended the recorded one before its time; what was recorded of it has to agree in itself.
+        let whole = if recorded.error.is_some() { result_of(recorded) } else { counts(found) };
+        (counts(recorded) != whole).then(|| (0, "result", counts(recorded), whole))
+    }
+}
+
+/// What an episode says that it came to.
+fn counts(episode: &Episode) -> String {
+    format!("{} subtasks, {} steps, success {}", episode.completed, episode.steps, episode.success)
+}
+
+/// What an episode's own steps come to.
+fn result_of(episode: &Episode) -> String {
+    let own = episode.trace.get(episode.prefix as usize..).unwrap_or_default();
+    let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
+    let success = episode.error.is_none() && episode.of > 0 && completed == episode.of;
+    counts(&Episode { completed, steps: own.len() as u32, success, ..Episode::default() })
+}
+
+/// The difference between a recorded step and the same taken again, where there is one.
+fn differs(number: u32, recorded: &Step, found: &Step) -> Option<Found> {
+    let field = match () {
+        () if found.outcome != recorded.outcome => "outcome",
+        () if found.subtask != recorded.subtask || found.class != recorded.class => "subtask",
+        () => return None,
+    };
+    let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
+    Some((number, field, text(recorded), text(found)))
+}
+
+/// The policies of authors, each looked for once.
+struct Sources<'a, 'b> {
+    find: &'a mut FindPolicy<'b>,
+    known: Vec<(Author, Option<PolicySource>)>,
+}
+
+impl Sources<'_, '_> {
+    fn make(&mut self, author: &Author) -> anyhow::Result<Option<Box<dyn Policy>>> {
+        let is_known = |(known, _): &&(Author, Option<PolicySource>)| {
+            (&known.policy, &known.checkpoint) == (&author.policy, &author.checkpoint)
+        };
+        let source = match self.known.iter().find(is_known) {
+            Some((_, source)) => source.clone(),
+            None => {
+                let source = (self.find)(author)?;
+                self.known.push((author.clone(), source.clone()));
+                source
+            }
+        };
+        source.map(|source| (source.make)()).transpose()
+    }
 }
 
 /// An episode that is played again.
@@ -180,7 +321,7 @@ impl Again<'_> {
         setting: Setting,
         mut author: Author,
         grading: Grading,
-        summon: &mut Summon<'_>,
+        sources: &mut Sources<'_, '_>,
     ) -> anyhow::Result<Option<Found>> {
         let episode = self.episode;
         let start = setting.world.digest();
@@ -190,7 +331,7 @@ impl Again<'_> {
         let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
         let grader = (!task.subtasks.is_empty()).then_some(grader);
         let house = House::new(setting.scene, setting.world);
-        let mut rollout = Rollout::new(house, episode.instruction.clone(), grader, None);
+        let mut rollout = Rollout::in_house(house, episode.instruction.clone(), grader, None);
         let mut policy: Option<Box<dyn Policy>> = None;
         let mut summoned: Option<Author> = None;
         let named = episode.trace.iter().filter_map(|step| step.by.as_ref()).find(|by| !by.is_hand());
@@ -202,7 +343,7 @@ impl Again<'_> {
         for (number, recorded) in (1..).zip(&episode.trace) {
             if number <= episode.prefix {
                 // The expert led here, unseen by the run's policy.
-                if let Some(found) = self.act(&mut rollout, number, recorded) {
+                if let Some(found) = self.act(&mut rollout, number, recorded)? {
                     return Ok(Some(found));
                 }
                 continue;
@@ -211,7 +352,7 @@ impl Again<'_> {
                 let own = instruction::normalise(&task.instruction) == instruction::normalise(told);
                 rollout.instruction.clone_from(told);
                 if !own {
-                    rollout.grader = None;
+                    rollout.env.grader = None;
                 }
             }
             if let Some(by) = &recorded.by {
@@ -220,7 +361,7 @@ impl Again<'_> {
             // While a person acts, the policy before (or the first one to come) looks on.
             let acts = if author.is_hand() { summoned.clone().or_else(|| first.clone()) } else { Some(author.clone()) };
             if let Some(acts) = acts.filter(|acts| summoned.as_ref() != Some(acts)) {
-                policy = summon(&acts).with_context(|| format!("episode {}", self.number))?;
+                policy = sources.make(&acts).with_context(|| format!("episode {}", self.number))?;
                 if policy.is_none() && !self.verdict.missing.contains(&acts.policy) {
                     self.verdict.missing.push(acts.policy.clone());
                 }
@@ -230,7 +371,7 @@ impl Again<'_> {
                 }
                 summoned = Some(acts);
             }
-            let action = Action { kind: recorded.kind, target: recorded.target };
+            let action = recorded.action();
             if let Some(policy) = policy.as_deref_mut() {
                 let chosen = rollout.decide(policy);
                 if !author.is_hand() {
@@ -244,30 +385,20 @@ impl Again<'_> {
             }
             past.push_front(Moment::of(&rollout, &author, PolicyState::Nothing));
             past.truncate(FRAMES - 1);
-            if let Some(found) = self.act(&mut rollout, number, recorded) {
+            if let Some(found) = self.act(&mut rollout, number, recorded)? {
                 return Ok(Some(found));
             }
         }
-        let own = episode.trace.get(episode.prefix as usize..).unwrap_or_default();
-        let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let (steps, success) = (own.len() as u32, episode.of > 0 && completed == episode.of);
-        let counted = |completed, steps, success| format!("{completed} subtasks, {steps} steps, success {success}");
-        let recorded = counted(episode.completed, episode.steps, episode.success);
-        let found = counted(completed, steps, success);
+        let (recorded, found) = (counts(episode), result_of(episode));
         Ok((recorded != found).then_some((0, "result", recorded, found)))
     }
 
     /// Takes a recorded step; what it comes to now, where that is something else.
-    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &Step) -> Option<Found> {
-        let tick = rollout.act(Action { kind: recorded.kind, target: recorded.target });
-        let found = Step { told: recorded.told.clone(), by: recorded.by.clone(), ..Step::of(&tick, rollout) };
-        if found != *recorded {
-            let field = if found.outcome != recorded.outcome { "outcome" } else { "subtask" };
-            let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
-            return Some((number, field, text(recorded), text(&found)));
-        }
-        self.verdict.steps += 1;
-        None
+    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &Step) -> anyhow::Result<Option<Found>> {
+        let tick = rollout.carry_out(Decision::of(recorded.action()))?;
+        let difference = differs(number, recorded, &Step::of(&tick, rollout));
+        self.verdict.steps += usize::from(difference.is_none());
+        Ok(difference)
     }
 }
 
@@ -275,7 +406,7 @@ impl Again<'_> {
 mod tests {
     use super::*;
     use crate::agent::RandomPolicy;
-    use crate::domain::{ActionType, Class, Role, SkillKind, Subtask};
+    use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
     use crate::episode::branches::{Taken, Tree};
     use crate::explore::session_export;
     use crate::explore::session_export::SessionExport;
@@ -291,22 +422,23 @@ mod tests {
             vec![Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None }];
         (task.id, task.start, task.instruction) = ("main".into(), Some(world.clone()), "Take the mug.".into());
         let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
-        let mut rollout = Rollout::new(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
+        let mut rollout =
+            Rollout::in_house(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
         let mut policy = RandomPolicy::new();
-        policy.begin(9);
+        policy.reset(0, 9);
         let random = Author { policy: "random".into(), checkpoint: None, seed: 9, samples: false };
-        let mut tree = Tree::new(Moment::of(&rollout, &random, policy.carried()));
+        let mut tree = Tree::new(Moment::of(&rollout, &random, policy.state(0)));
         for step in 0..8 {
             if step == 5 {
                 rollout.instruction = "Dance.".into();
-                rollout.grader = None;
+                rollout.env.grader = None;
             }
             let mut decision = rollout.decide(&mut policy).unwrap();
             let by_hand = (3..5).contains(&step);
             if by_hand {
                 decision.action = Action::navigate(ActionType::LookUp);
             }
-            let tick = rollout.carry_out(decision.clone());
+            let tick = rollout.carry_out(decision.clone()).unwrap();
             let taken = Taken {
                 decision,
                 step: Step::of(&tick, &rollout),
@@ -314,14 +446,14 @@ mod tests {
                 author: if by_hand { Author::hand() } else { random.clone() },
                 values: None,
             };
-            let moment = Moment::of(&rollout, &random, policy.carried());
+            let moment = Moment::of(&rollout, &random, policy.state(0));
             tree.grow(taken, || moment, String::new);
         }
         SessionExport { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }
     }
 
-    fn random(author: &Author) -> anyhow::Result<Option<Box<dyn Policy>>> {
-        Ok((author.policy == "random").then(|| Box::new(RandomPolicy::new()) as Box<dyn Policy>))
+    fn random(author: &Author) -> anyhow::Result<Option<PolicySource>> {
+        Ok((author.policy == "random").then(PolicySource::random))
     }
 
     fn verified(explored: &SessionExport) -> Verdict {
@@ -330,7 +462,7 @@ mod tests {
         session_export::write(explored, &path).unwrap();
         let run = Recorded::open(&path, None).unwrap();
         assert_eq!(run.episodes, explored.episodes);
-        verify(&run, &mut random, &mut |_| ()).unwrap()
+        verify(&run, &mut random, 2, &mut |_| ()).unwrap()
     }
 
     #[test]
@@ -368,7 +500,7 @@ mod tests {
         let path = folder.path().join("run");
         session_export::write(&explored, &path).unwrap();
         let run = Recorded::open(&path, None).unwrap();
-        let verdict = verify(&run, &mut |_| Ok(None), &mut |_| ()).unwrap();
+        let verdict = verify(&run, &mut |_| Ok(None), 1, &mut |_| ()).unwrap();
         assert_eq!((verdict.steps, verdict.choices, verdict.missing), (8, 0, vec!["random".to_string()]));
     }
 }

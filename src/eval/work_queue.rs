@@ -6,29 +6,29 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::run_dir::episode_spec::EpisodeSpec;
 
-/// What is wanted, by seat.
+/// What is wanted, by slot.
 pub(crate) struct WorkQueue {
-    by_seat: Vec<Vec<(usize, EpisodeSpec)>>,
+    by_slot: Vec<Vec<(usize, EpisodeSpec)>>,
     next: Vec<AtomicUsize>,
-    /// Episodes that a failure of a whole team interrupted: each is played again with nobody beside it, which shows whose the
+    /// Episodes that a failure of a whole policy interrupted: each is played again with nobody beside it, which shows whose the
     /// failure was.
     alone: Mutex<VecDeque<(usize, EpisodeSpec)>>,
 }
 
 impl WorkQueue {
-    /// By the seats of their places in the run.
-    pub fn new(wanted: &[EpisodeSpec], seats: usize) -> WorkQueue {
-        let mut by_seat = vec![Vec::new(); seats];
+    /// By the slots of their places in the run.
+    pub fn new(wanted: &[EpisodeSpec], slots: usize) -> WorkQueue {
+        let mut by_slot = vec![Vec::new(); slots];
         for (at, spec) in wanted.iter().enumerate() {
-            by_seat[spec.place % seats].push((at, *spec));
+            by_slot[spec.slot(slots)].push((at, *spec));
         }
-        WorkQueue { by_seat, next: (0..seats).map(|_| AtomicUsize::new(0)).collect(), alone: Mutex::default() }
+        WorkQueue { by_slot, next: (0..slots).map(|_| AtomicUsize::new(0)).collect(), alone: Mutex::default() }
     }
 
-    /// The next episode for a seat.
-    pub fn next(&self, seat: usize) -> Option<(usize, EpisodeSpec)> {
-        let at = self.next[seat].fetch_add(1, Ordering::Relaxed);
-        self.by_seat[seat].get(at).copied()
+    /// The next episode for a slot.
+    pub fn next(&self, slot: usize) -> Option<(usize, EpisodeSpec)> {
+        let at = self.next[slot].fetch_add(1, Ordering::Relaxed);
+        self.by_slot[slot].get(at).copied()
     }
 
     /// Has these played again with nobody beside them.

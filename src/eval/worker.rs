@@ -1,36 +1,41 @@
-//! One thread of an evaluation: a table at which a team acts in several episodes at once.
+//! One thread of an evaluation: a policy that acts in several episodes at once, an episode a slot.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use anyhow::Context;
 
-use super::executor::{Executor, Note};
+use super::executor::{Executor, Message};
 use super::in_flight::{InFlight, Watchdog, guarded};
-use crate::agent::{Decision, ExpertPolicy, Policy, Team};
+use crate::agent::{Decision, ExpertPolicy, Policy};
+use crate::env::{Environment, HouseEnvironment};
 use crate::episode::record::{Episode, Step};
-use crate::episode::rollout::Rollout;
+use crate::episode::rollout::{AfterEach, Rollout, decide_all};
 use crate::house::House;
-use crate::house::grading::Grader;
 use crate::run_dir::episode_spec::{EpisodeSpec, policy_seed};
 
-/// A table. Episodes sit at it; what is recorded of them stands in the watch.
+/// An episode under way in whatever environment it plays.
+type AnyRollout = Rollout<Box<dyn Environment>>;
+
+/// A worker. What is recorded of its episodes stands in the watchdog.
 pub(crate) struct Worker {
-    play: Arc<Executor>,
-    watch: Arc<Watchdog>,
-    team: Option<Box<dyn Team>>,
-    rollouts: Vec<Option<Rollout>>,
-    /// Who sits here is to be played with nobody beside it.
+    executor: Arc<Executor>,
+    watchdog: Arc<Watchdog>,
+    policy: Option<Box<dyn Policy>>,
+    rollouts: Vec<Option<AnyRollout>>,
+    /// The one episode under way is to be played with no other beside it.
     is_alone: bool,
 }
 
-/// Nobody waits for this table any more.
-struct Left;
+/// Nobody waits for this worker any more.
+struct Abandoned;
 
 impl Worker {
-    pub fn new(play: Arc<Executor>, watch: Arc<Watchdog>, team: Option<Box<dyn Team>>) -> Worker {
-        let seats = watch.lock().seats.len();
-        Worker { play, watch, team, rollouts: (0..seats).map(|_| None).collect(), is_alone: false }
+    pub fn new(executor: Arc<Executor>, watchdog: Arc<Watchdog>, policy: Option<Box<dyn Policy>>) -> Worker {
+        let slots = watchdog.lock().slots.len();
+        let rollouts = (0..slots).map(|_| None).collect();
+        Worker { executor, watchdog, policy, rollouts, is_alone: false }
     }
 
     /// Plays what is wanted until there is nothing left, or nobody waits for it any more.
@@ -39,30 +44,29 @@ impl Worker {
     }
 
     /// Whether there is more to play.
-    fn round(&mut self) -> Result<bool, Left> {
-        if self.play.stop.load(Ordering::Relaxed) || self.play.give_up.load(Ordering::Relaxed) {
+    fn round(&mut self) -> Result<bool, Abandoned> {
+        if self.executor.stop.load(Ordering::Relaxed) || self.executor.give_up.load(Ordering::Relaxed) {
             return Ok(false);
         }
         self.fill()?;
         let over = self.over()?;
         if over.is_empty() {
-            if self.empty()? {
+            if self.is_idle()? {
                 return Ok(false);
             }
             self.step()?;
         }
-        for seat in over {
-            let Some(in_flight) = self.record(|seats| seats[seat].clone())? else { continue };
-            if let Some(again) = in_flight.again(&self.play.evaluation) {
-                self.sit(seat, in_flight.at, again)?;
+        for slot in over {
+            let Some(in_flight) = self.record(|slots| slots[slot].clone())? else { continue };
+            if let Some(again) = in_flight.again(&self.executor.evaluation) {
+                self.begin(slot, in_flight.at, again)?;
                 continue;
             }
-            // Why it fell short is found while it still sits, so that somebody waits for that too.
+            // Why it fell short is found while it is still watched, so that a hang there is noticed too.
             let at = in_flight.at;
-            let evaluation = &self.play.evaluation;
-            let episode = in_flight.close(evaluation);
-            self.rollouts[seat] = None;
-            if self.record(|seats| seats[seat].take())?.is_some() && !self.play.tell(Note::Over(at, episode)) {
+            let episode = in_flight.close(&self.executor.evaluation);
+            self.rollouts[slot] = None;
+            if self.record(|slots| slots[slot].take())?.is_some() && !self.executor.send(Message::Over(at, episode)) {
                 return Ok(false);
             }
         }
@@ -70,119 +74,115 @@ impl Worker {
     }
 
     /// Reads or writes what is recorded, unless nobody waits for it any more.
-    fn record<T>(&self, change: impl FnOnce(&mut Vec<Option<InFlight>>) -> T) -> Result<T, Left> {
-        let mut state = self.watch.lock();
-        if state.is_left { Err(Left) } else { Ok(change(&mut state.seats)) }
+    fn record<T>(&self, change: impl FnOnce(&mut Vec<Option<InFlight>>) -> T) -> Result<T, Abandoned> {
+        let mut state = self.watchdog.lock();
+        if state.is_abandoned { Err(Abandoned) } else { Ok(change(&mut state.slots)) }
     }
 
-    fn empty(&self) -> Result<bool, Left> {
-        self.record(|seats| seats.iter().all(Option::is_none))
+    fn is_idle(&self) -> Result<bool, Abandoned> {
+        self.record(|slots| slots.iter().all(Option::is_none))
     }
 
-    /// Seats whose episode is over.
-    fn over(&self) -> Result<Vec<usize>, Left> {
-        let ended = |seat: usize| self.rollouts[seat].as_ref().is_none_or(|rollout| rollout.end().is_some());
-        self.record(|seats| {
-            let is_over = |seat: &usize| {
-                seats[*seat].as_ref().is_some_and(|in_flight| in_flight.episode.error.is_some() || ended(*seat))
+    /// Slots whose episode is over.
+    fn over(&self) -> Result<Vec<usize>, Abandoned> {
+        let ended = |slot: usize| self.rollouts[slot].as_ref().is_none_or(|rollout| rollout.end().is_some());
+        self.record(|slots| {
+            let is_over = |slot: &usize| {
+                slots[*slot].as_ref().is_some_and(|in_flight| in_flight.episode.error.is_some() || ended(*slot))
             };
-            (0..seats.len()).filter(is_over).collect()
+            (0..slots.len()).filter(is_over).collect()
         })
     }
 
-    fn fill(&mut self) -> Result<(), Left> {
-        let seats = self.rollouts.len();
-        let is_empty = self.empty()?;
-        self.is_alone &= !is_empty;
-        if self.is_alone || (self.play.queues.someone_waits_alone() && !is_empty) {
+    fn fill(&mut self) -> Result<(), Abandoned> {
+        let slots = self.rollouts.len();
+        let is_idle = self.is_idle()?;
+        self.is_alone &= !is_idle;
+        if self.is_alone || (self.executor.queue.someone_waits_alone() && !is_idle) {
             return Ok(());
         }
-        if let Some((at, spec)) = self.play.queues.next_alone() {
+        if let Some((at, spec)) = self.executor.queue.next_alone() {
             self.is_alone = true;
-            return self.sit(spec.place % seats, at, spec);
+            return self.begin(spec.slot(slots), at, spec);
         }
-        for seat in 0..seats {
-            if self.record(|seats| seats[seat].is_none())?
-                && let Some((at, spec)) = self.play.queues.next(seat)
+        for slot in 0..slots {
+            if self.record(|slots| slots[slot].is_none())?
+                && let Some((at, spec)) = self.executor.queue.next(slot)
             {
-                self.sit(seat, at, spec)?;
+                self.begin(slot, at, spec)?;
             }
         }
         Ok(())
     }
 
     /// Sets an episode to its start; an error is recorded in it.
-    fn sit(&mut self, seat: usize, at: usize, spec: EpisodeSpec) -> Result<(), Left> {
-        let play = self.play.clone();
-        let in_flight = InFlight::new(&play.evaluation, at, spec);
+    fn begin(&mut self, slot: usize, at: usize, spec: EpisodeSpec) -> Result<(), Abandoned> {
+        let executor = self.executor.clone();
+        let in_flight = InFlight::new(&executor.evaluation, at, spec);
         let mut episode = in_flight.episode.clone();
-        self.record(|seats| seats[seat] = Some(in_flight))?;
-        self.rollouts[seat] = None;
+        self.record(|slots| slots[slot] = Some(in_flight))?;
+        self.rollouts[slot] = None;
         let ready = guarded(|| {
-            self.rollouts[seat] = Some(begin(&play, spec, &mut episode)?);
-            self.team()?.begin(seat, policy_seed(spec.task, spec.seed));
+            self.rollouts[slot] = Some(start(&executor, spec, &mut episode)?);
+            self.policy()?.reset(slot, policy_seed(spec.task, spec.seed));
             Ok(())
         });
         episode.error = ready.err();
-        self.record(|seats| {
-            if let Some(in_flight) = &mut seats[seat] {
+        self.record(|slots| {
+            if let Some(in_flight) = &mut slots[slot] {
                 in_flight.episode = episode;
             }
         })
     }
 
-    /// The team; made again where a panic left the last one in an unknown state.
-    fn team(&mut self) -> anyhow::Result<&mut dyn Team> {
-        let team = match self.team.take() {
-            Some(team) => team,
-            None => (self.play.make_team)().context("the policy could not be made again")?,
+    /// The policy; made again where a panic left the last one in an unknown state.
+    fn policy(&mut self) -> anyhow::Result<&mut dyn Policy> {
+        let policy = match self.policy.take() {
+            Some(policy) => policy,
+            None => (self.executor.make_policy)().context("the policy could not be made again")?,
         };
-        Ok(&mut **self.team.insert(team))
+        Ok(&mut **self.policy.insert(policy))
     }
 
-    /// One decision and one step in every seat.
-    fn step(&mut self) -> Result<(), Left> {
-        let mut team = match self.team() {
-            Ok(_) => self.team.take(),
+    /// One decision and one step in every slot.
+    fn step(&mut self) -> Result<(), Abandoned> {
+        let mut policy = match self.policy() {
+            Ok(_) => self.policy.take(),
             Err(error) => return self.fail_all(&format!("{error:#}")),
         };
         let rollouts = &mut self.rollouts;
-        let decided = guarded(|| {
-            let mut situations: Vec<_> =
-                rollouts.iter_mut().map(|rollout| rollout.as_mut().map(Rollout::situation)).collect();
-            team.as_mut().context("there is no policy")?.decide(&mut situations)
-        });
+        let decided = guarded(|| decide_all(policy.as_deref_mut().context("there is no policy")?, rollouts));
         match decided {
             Ok(decisions) => {
-                self.team = team;
-                for (seat, decision) in decisions.into_iter().enumerate() {
+                self.policy = policy;
+                for (slot, decision) in decisions.into_iter().enumerate() {
                     if let Some(decision) = decision {
-                        self.take(seat, decision)?;
+                        self.carry_out(slot, decision)?;
                     }
                 }
                 Ok(())
             }
-            // Whatever state a failure left the team in is not carried on.
+            // Whatever state a failure left the policy in is not carried on.
             Err(problem) if self.rollouts.iter().flatten().count() == 1 => self.fail_all(&problem),
             Err(_) => {
-                let begun: Vec<InFlight> = self.record(|seats| seats.iter_mut().filter_map(Option::take).collect())?;
+                let begun: Vec<InFlight> = self.record(|slots| slots.iter_mut().filter_map(Option::take).collect())?;
                 self.rollouts.iter_mut().for_each(|rollout| *rollout = None);
-                self.play.queues.play_alone(begun.iter().map(|in_flight| (in_flight.at, in_flight.spec)));
+                self.executor.queue.play_alone(begun.iter().map(|in_flight| (in_flight.at, in_flight.spec)));
                 Ok(())
             }
         }
     }
 
-    /// Carries out what was decided in a seat.
-    fn take(&mut self, seat: usize, decision: anyhow::Result<Decision>) -> Result<(), Left> {
-        let Some(rollout) = self.rollouts[seat].as_mut() else { return Ok(()) };
+    /// Carries out what was decided in a slot.
+    fn carry_out(&mut self, slot: usize, decision: anyhow::Result<Decision>) -> Result<(), Abandoned> {
+        let Some(rollout) = self.rollouts[slot].as_mut() else { return Ok(()) };
         let taken = guarded(|| {
-            let tick = rollout.carry_out(decision?);
+            let tick = rollout.carry_out(decision?)?;
             Ok(Step::of(&tick, rollout))
         });
-        let (limit, goes_on) = (self.play.evaluation.options.timeout, rollout.end().is_none());
-        self.record(|seats| {
-            let Some(in_flight) = &mut seats[seat] else { return };
+        let (limit, goes_on) = (self.executor.evaluation.options.timeout, rollout.end().is_none());
+        self.record(|slots| {
+            let Some(in_flight) = &mut slots[slot] else { return };
             match taken {
                 Ok(step) => in_flight.episode.trace.push(step),
                 Err(problem) => in_flight.fail(&problem),
@@ -193,19 +193,20 @@ impl Worker {
         })
     }
 
-    fn fail_all(&mut self, problem: &str) -> Result<(), Left> {
-        self.record(|seats| seats.iter_mut().flatten().for_each(|in_flight| in_flight.fail(problem)))
+    fn fail_all(&mut self, problem: &str) -> Result<(), Abandoned> {
+        self.record(|slots| slots.iter_mut().flatten().for_each(|in_flight| in_flight.fail(problem)))
     }
 }
 
 /// Sets an episode to its start.
-fn begin(play: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyhow::Result<Rollout> {
-    let task = &play.evaluation.tasks[spec.task];
-    let setting = play.evaluation.scenes.setting(task)?;
+fn start(executor: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyhow::Result<AnyRollout> {
+    let evaluation = &executor.evaluation;
+    let task = &evaluation.tasks[spec.task];
+    let setting = evaluation.scenes.setting(task)?;
     episode.start_hash = setting.world.digest();
-    let grader = Grader::new(play.evaluation.options.grading, &task.roles, &task.subtasks, task.goal.as_ref());
     let house = House::new(setting.scene, setting.world);
-    let mut rollout = Rollout::new(house, episode.instruction.clone(), Some(grader), Some(task.horizon));
+    let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));
+    let mut rollout = Rollout::new(env, episode.instruction.clone(), Some(task.horizon));
     if spec.from > 0 {
         lead(&mut rollout, spec.from, episode)?;
         rollout.horizon = Some(episode.prefix + task.horizon);
@@ -214,18 +215,20 @@ fn begin(play: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyhow::R
 }
 
 /// Lets the expert act until `from` subtasks are done.
-fn lead(rollout: &mut Rollout, from: u32, episode: &mut Episode) -> anyhow::Result<()> {
+fn lead(rollout: &mut AnyRollout, from: u32, episode: &mut Episode) -> anyhow::Result<()> {
     let mut expert = ExpertPolicy::new();
-    expert.begin(0);
-    while rollout.grader.as_ref().is_some_and(|grader| grader.completed() < from as usize) {
-        anyhow::ensure!(
-            rollout.end().is_none(),
-            "the expert did not come to subtask {from} within the task's {} steps",
-            rollout.steps()
-        );
-        let tick = rollout.step(&mut expert).with_context(|| format!("the expert could not lead to subtask {from}"))?;
-        episode.trace.push(Step::of(&tick, rollout));
+    expert.reset(0, 0);
+    let reached = |rollout: &AnyRollout| rollout.env.grading().is_none_or(|(completed, _)| completed >= from as usize);
+    let mut record = AfterEach(|rollout: &mut AnyRollout, tick: &_| {
+        episode.trace.push(Step::of(tick, rollout));
         episode.prefix += 1;
-    }
+        Ok(if reached(rollout) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    });
+    rollout.run(&mut expert, &mut record).with_context(|| format!("the expert could not lead to subtask {from}"))?;
+    anyhow::ensure!(
+        reached(rollout),
+        "the expert did not come to subtask {from} within the task's {} steps",
+        rollout.steps()
+    );
     Ok(())
 }

@@ -57,7 +57,7 @@ impl Sort {
 /// Every legal action, interactions once for each class that is a candidate.
 pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
     let class_of = |action: Action| action.target.and_then(|target| now.world.class_of(&now.scene, target));
-    let mind = decision.mind.as_ref();
+    let mind = decision.distribution.as_ref();
     let joint = match mind {
         Some(mind) => mind.joint(&now.candidates),
         None => legal(now),

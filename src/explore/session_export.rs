@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context, ensure};
 use sha2::{Digest, Sha256};
 
-use crate::agent::{ExpertPolicy, Policy};
+use crate::agent::ExpertPolicy;
 use crate::data::{atomic_file, json, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
@@ -104,7 +104,7 @@ pub fn ungraded(scene: SceneRef) -> Task {
 /// # Errors
 /// When nobody grades it, nothing is left, or the expert cannot do it.
 pub fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
-    let grader = rollout.grader.as_ref().context("nobody grades this instruction, so it cannot be a task")?;
+    let grader = rollout.env.grader.as_ref().context("nobody grades this instruction, so it cannot be a task")?;
     let done = grader.completed();
     let subtasks = grader.subtasks().get(done..).unwrap_or_default().to_vec();
     ensure!(!subtasks.is_empty(), "every subtask is done here; go back to a step where something is left to do");
@@ -121,7 +121,7 @@ pub fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
     if rest.sentences.len() != rest.subtasks.len() {
         rest.sentences.clear();
     }
-    rest.expert_steps = expert_steps(&rest, rollout.house.scene())?;
+    rest.expert_steps = expert_steps(&rest, rollout.env.house.scene())?;
     rest.horizon = 2 * rest.expert_steps;
     Ok(rest)
 }
@@ -130,12 +130,8 @@ fn expert_steps(task: &Task, scene: &Arc<Scene>) -> anyhow::Result<u32> {
     let world = task.start.clone().context("the task has no start")?;
     let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
     let house = House::new(scene.clone(), world);
-    let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(MOST));
-    let mut expert = ExpertPolicy::new();
-    expert.begin(0);
-    while rollout.end().is_none() {
-        rollout.step(&mut expert)?;
-    }
+    let mut rollout = Rollout::in_house(house, task.instruction.clone(), Some(grader), Some(MOST));
+    rollout.run(&mut ExpertPolicy::new(), &mut ())?;
     ensure!(rollout.end() == Some(End::Success), "the expert does not finish this within {MOST} steps");
     Ok(rollout.steps())
 }

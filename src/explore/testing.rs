@@ -109,7 +109,8 @@ pub fn thought(now: &Snapshot) -> Report {
     Report::Thought(
         Decision {
             action,
-            mind: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),
+            distribution: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),
+            values: None,
         },
         "Pickup Mug".into(),
         None,

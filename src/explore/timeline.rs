@@ -63,7 +63,7 @@ pub struct Bough {
 
 impl Beat {
     fn of(taken: &Taken, before: Option<&Taken>, forks: bool) -> Beat {
-        let mind = taken.decision.mind.as_ref();
+        let mind = taken.decision.distribution.as_ref();
         let kind = taken.decision.action.kind;
         Beat {
             kind,

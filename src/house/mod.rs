@@ -11,6 +11,7 @@ pub mod occlusion;
 pub mod outcome;
 pub mod placing;
 pub mod render;
+pub mod replay;
 pub mod rules;
 pub mod session;
 #[cfg(test)]
@@ -19,4 +20,5 @@ pub mod validate;
 pub mod view;
 
 pub use outcome::{Outcome, Reason};
+pub use replay::Replay;
 pub use session::House;

@@ -1,6 +1,7 @@
 //! A run as one HTML page that needs nothing else: figures, the plot, and every episode with frames from its way.
 
 use std::io::Cursor;
+use std::ops::ControlFlow;
 
 use anyhow::Context;
 use base64::Engine;
@@ -12,9 +13,9 @@ use serde_json::json;
 use super::charts::drawing::escape;
 use super::charts::progress_by_length;
 use super::summary::Summary;
-use crate::domain::{Action, Task};
-use crate::episode::record::Episode;
-use crate::episode::rollout::Rollout;
+use crate::domain::Task;
+use crate::episode::record::{Episode, Step};
+use crate::episode::rollout::{AfterEach, Rollout, Tick};
 use crate::house::House;
 use crate::house::grading::describe;
 use crate::run_dir::reader::FinishedRun;
@@ -85,21 +86,25 @@ fn strip(run: &FinishedRun, task: &Task, episode: &Episode, most: usize) -> anyh
         steps.remove(steps.len() / 2);
     }
     let setting = run.scenes.setting(task)?;
-    let mut rollout = Rollout::new(House::new(setting.scene, setting.world), String::new(), None, None);
+    let mut rollout = Rollout::in_house(House::new(setting.scene, setting.world), String::new(), None, None);
     let mut shown = Vec::new();
-    for step in 0..=episode.trace.len() {
+    let mut show = |rollout: &mut Rollout, step: usize| -> anyhow::Result<()> {
         if steps.contains(&step) {
-            shown.push(json!({"step": step, "png": picture(&mut rollout)?}));
+            shown.push(json!({"step": step, "png": picture(rollout)?}));
         }
-        if let Some(step) = episode.trace.get(step) {
-            rollout.act(Action { kind: step.kind, target: step.target });
-        }
-    }
+        Ok(())
+    };
+    show(&mut rollout, 0)?;
+    let mut after_each = AfterEach(|rollout: &mut Rollout, tick: &Tick| {
+        show(rollout, tick.step as usize)?;
+        Ok(ControlFlow::Continue(()))
+    });
+    rollout.replay(episode.trace.iter().map(Step::action), &mut after_each)?;
     Ok(shown)
 }
 
 fn picture(rollout: &mut Rollout) -> anyhow::Result<String> {
-    let frame = rollout.house.frame();
+    let frame = rollout.env.house.frame();
     let (width, height) = (frame.width as u32, frame.height as u32);
     let image = RgbImage::from_raw(width, height, frame.rgb.clone()).context("a frame has another size")?;
     let small = imageops::thumbnail(&image, SIDE, SIDE);

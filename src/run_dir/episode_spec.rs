@@ -24,6 +24,12 @@ pub struct EpisodeSpec {
 }
 
 impl EpisodeSpec {
+    /// The slot of a policy that acts in so many episodes at once: it follows from the episode's place alone, so that its
+    /// record does not depend on what is played beside it.
+    pub fn slot(&self, slots: usize) -> usize {
+        self.place % slots.max(1)
+    }
+
     /// What tells it apart from the other episodes of the run.
     pub fn key(&self, tasks: &[Task]) -> Key {
         Key { task: tasks[self.task].id.clone(), seed: self.seed, wording: self.wording, from: self.from }

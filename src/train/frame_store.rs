@@ -11,7 +11,7 @@ use crate::data::dataset::Dataset;
 use crate::data::items::Label;
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Trajectory, World};
-use crate::house::{generate, rules, validate};
+use crate::house::{Replay, generate, validate};
 
 /// The trajectories of datasets with the scenes they play in.
 pub struct FrameStore {
@@ -110,12 +110,14 @@ impl FrameStore {
     ) -> anyhow::Result<()> {
         let scene = self.scene(trajectory)?;
         let recorded = &self.trajectories[trajectory];
-        let mut world = recorded.start.clone();
-        for (step, &action) in recorded.actions.iter().enumerate() {
-            visit(scene, &world, step)?;
-            rules::apply(scene, &mut world, action);
+        let mut replay = Replay::new(scene, recorded.start.clone(), &recorded.actions);
+        for step in 0.. {
+            visit(scene, replay.world(), step)?;
+            if replay.step().is_none() {
+                break;
+            }
         }
-        visit(scene, &world, recorded.actions.len())
+        Ok(())
     }
 
     /// One frame's scene and state, by the frame's number.
@@ -126,11 +128,8 @@ impl FrameStore {
         anyhow::ensure!(frame < self.frames(), "there is no frame {frame}");
         let trajectory = self.trajectory_of(frame);
         let (scene, recorded) = (self.scene(trajectory)?, &self.trajectories[trajectory]);
-        let mut world = recorded.start.clone();
-        for &action in &recorded.actions[..frame - self.firsts[trajectory]] {
-            rules::apply(scene, &mut world, action);
-        }
-        Ok((scene, world))
+        let before = &recorded.actions[..frame - self.firsts[trajectory]];
+        Ok((scene, Replay::new(scene, recorded.start.clone(), before).finish()))
     }
 
     /// What a learner should do in every frame, which is what the expert would do; nothing in the last of a trajectory. Where

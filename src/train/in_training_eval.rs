@@ -9,11 +9,11 @@ use tch::Device;
 
 use super::metrics::Scalars;
 use crate::agent::learned::SharedEmbedder;
-use crate::agent::{LearnedPolicy, LearnedTeam, Team};
+use crate::agent::policy_source::MakePolicy;
+use crate::agent::{LearnedPolicy, Policy};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
-use crate::eval::executor::MakeTeam;
 use crate::eval::options::Options;
 use crate::house::grading::Grading;
 
@@ -60,12 +60,11 @@ pub fn hold(
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
     let (folder, sentences) = (folder.to_owned(), sentences.clone());
-    let make_team: Arc<MakeTeam> = Arc::new(move || -> anyhow::Result<Box<dyn Team>> {
-        let policy = LearnedPolicy::load(&folder, sentences.clone(), device)?;
-        Ok(Box::new(LearnedTeam::new(policy, LearnedTeam::SEATS)))
+    let make_policy: Arc<MakePolicy> = Arc::new(move || -> anyhow::Result<Box<dyn Policy>> {
+        Ok(Box::new(LearnedPolicy::load(&folder, sentences.clone(), device)?))
     });
     let (mut episodes, mut successes, mut completed) = (0u32, 0u32, 0u32);
-    evaluation.play(&evaluation.all(), &make_team, stop, &mut |episode| {
+    evaluation.play(&evaluation.all(), &make_policy, stop, &mut |episode| {
         episodes += 1;
         successes += u32::from(episode.success);
         completed += episode.completed;

@@ -1,6 +1,7 @@
 //! Measures a policy in generated houses that no training saw: one-skill tasks, and whether it follows what it is told.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use rand::{Rng, SeedableRng};
@@ -9,11 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::metrics::{Report, Scalars};
 use super::preset::Appraisal;
-use crate::agent::{Policy, RandomPolicy};
+use crate::agent::{ExpertPolicy, Policy, RandomPolicy};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
-use crate::episode::rollout::{End, Rollout};
-use crate::house::expert::Expert;
+use crate::episode::rollout::{AfterEach, End, Rollout, Tick};
 use crate::house::grading::{Grader, Grading};
 use crate::house::{House, generate};
 use crate::language::phrases;
@@ -86,11 +86,9 @@ pub fn appraise(
         let solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
             let house = House::new(scene.clone(), start.clone());
-            let mut rollout = Rollout::new(house, task.instruction.clone(), Some(grader), Some(task.horizon));
-            policy.begin(number);
-            while rollout.end().is_none() {
-                rollout.step(policy)?;
-            }
+            let mut rollout = Rollout::in_house(house, task.instruction.clone(), Some(grader), Some(task.horizon));
+            policy.reset(0, number);
+            rollout.run(policy, &mut ())?;
             Ok(rollout.end() == Some(End::Success))
         };
         let solved = solve(policy)?;
@@ -176,13 +174,8 @@ fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> 
     let (roles, subtasks) = pickup(class);
     let grader = Grader::new(Grading::Class, &roles, &subtasks, None);
     let house = House::new(scene.clone(), world.clone());
-    let mut rollout = Rollout::new(house, String::new(), Some(grader), Some(TOO_MANY));
-    let mut expert = Expert::new();
-    while rollout.end().is_none() {
-        let grader = rollout.grader.as_ref()?;
-        let action = expert.next(&mut rollout.house, grader).ok()?;
-        rollout.act(action);
-    }
+    let mut rollout = Rollout::in_house(house, String::new(), Some(grader), Some(TOO_MANY));
+    rollout.run(&mut ExpertPolicy::new(), &mut ()).ok()?;
     (rollout.end() == Some(End::Success)).then_some(rollout.steps())
 }
 
@@ -197,15 +190,15 @@ impl Pair {
         let (roles, subtasks) = pickup(self.objects[told]);
         let instruction = phrases::sentence(&roles, &subtasks[0], rng);
         let house = House::new(self.scene.clone(), self.world.clone());
-        let mut rollout = Rollout::new(house, instruction, None, Some(self.horizons[told]));
-        policy.begin(told as u64);
-        while rollout.end().is_none() {
-            rollout.step(policy)?;
-            let world = rollout.house.world();
-            if let Some(object) = world.held.and_then(|index| world.object(index)) {
-                return Ok(Some(object.class));
-            }
-        }
-        Ok(None)
+        let mut rollout = Rollout::in_house(house, instruction, None, Some(self.horizons[told]));
+        policy.reset(0, told as u64);
+        let mut first = None;
+        let mut until_pickup = AfterEach(|rollout: &mut Rollout, _: &Tick| {
+            let world = rollout.env.house.world();
+            first = world.held.and_then(|index| world.object(index)).map(|object| object.class);
+            Ok(if first.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        });
+        rollout.run(policy, &mut until_pickup)?;
+        Ok(first)
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::Context;
 use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::agent::config::Config;
-use sprint_explorer::agent::{RandomPolicy, Solo, Team};
+use sprint_explorer::agent::policy_source::PolicySource;
 use sprint_explorer::data::alfred::{self, tasks as lists};
 use sprint_explorer::data::features::{self, Features};
 use sprint_explorer::data::summaries::{Ledger, Summaries, Summary};
@@ -17,7 +17,6 @@ use sprint_explorer::domain::{Room, TaskSet};
 use sprint_explorer::episode::scenes::Scenes;
 use sprint_explorer::eval::evaluation::Evaluation;
 use sprint_explorer::eval::evaluation::evaluate;
-use sprint_explorer::eval::executor::MakeTeam;
 use sprint_explorer::eval::options::Options;
 use sprint_explorer::eval::tasks::check;
 use sprint_explorer::eval::tasks::sample;
@@ -155,9 +154,8 @@ fn run(at: &Path, file: &str) -> Vec<Vec<u8>> {
     let evaluation = Evaluation::prepare(&set, Scenes::of(&path, &set.value), options, "random", None).unwrap();
     let mut folder = RunFolder::open(&at.join("run"), evaluation.manifest()).unwrap();
     folder.write_tasks(&set.value).unwrap();
-    let make: Arc<MakeTeam> =
-        Arc::new(|| -> anyhow::Result<Box<dyn Team>> { Ok(Box::new(Solo(Box::new(RandomPolicy::new())))) });
-    evaluate(&evaluation, &make, &mut folder, &Arc::new(AtomicBool::new(false)), &mut |_| ()).unwrap();
+    evaluate(&evaluation, &PolicySource::random().make, &mut folder, &Arc::new(AtomicBool::new(false)), &mut |_| ())
+        .unwrap();
     vec![std::fs::read(at.join("run").join(file)).unwrap()]
 }
 
@@ -176,7 +174,7 @@ fn finished(at: &Path) -> anyhow::Result<()> {
     run.episode_specs();
     Comparison::of(&[FinishedRun::open(&path)?, run])?.0.markdown();
     let recorded = Recorded::open(&path, None)?;
-    verify(&recorded, &mut |_| Ok(None), &mut |_| ())?;
+    verify(&recorded, &mut |_| Ok(None), 1, &mut |_| ())?;
     RunFolder::open(&path, &recorded.manifest).map(drop)
 }
 

@@ -2,25 +2,38 @@
 
 use anyhow::Context;
 
-use crate::agent::policy::{Decision, Observation, Policy, PolicyState};
+use crate::agent::decision::Decision;
+use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
+use crate::env::HouseEnvironment;
 use crate::house::expert::{Expert, TurnTiming};
+use crate::house::grading::Grader;
 
-/// Acts as the expert would.
+/// Acts as the expert would; in one episode at a time.
 #[derive(Default)]
 pub struct ExpertPolicy {
     expert: Expert,
 }
 
 impl ExpertPolicy {
-    /// A steady expert.
+    /// An expert that turns as late as it may.
     pub fn new() -> ExpertPolicy {
         ExpertPolicy::default()
     }
 
-    /// An expert that goes about things so.
-    pub fn of(pace: TurnTiming) -> ExpertPolicy {
-        ExpertPolicy { expert: Expert::of(pace) }
+    /// An expert that turns at that time.
+    pub fn of(timing: TurnTiming) -> ExpertPolicy {
+        ExpertPolicy { expert: Expert::of(timing) }
     }
+}
+
+/// The house that an expert knows, with the grader that it reads.
+pub(super) fn task_in<'a>(observation: &'a mut Observation<'_>) -> anyhow::Result<(&'a mut HouseEnvironment, Grader)> {
+    let name = observation.environment.name().to_owned();
+    let house =
+        observation.environment.house().with_context(|| format!("the expert knows its way in House, not in {name}"))?;
+    let grader = house.grader.clone();
+    let grader = grader.context("the expert needs a task with subtasks; it does not read instructions")?;
+    Ok((house, grader))
 }
 
 impl Policy for ExpertPolicy {
@@ -28,23 +41,27 @@ impl Policy for ExpertPolicy {
         "expert"
     }
 
-    fn begin(&mut self, _seed: u64) {
+    fn slots(&self) -> usize {
+        1
+    }
+
+    fn reset(&mut self, _slot: usize, _seed: u64) {
         self.expert.forget();
     }
 
-    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let grader =
-            situation.grader.context("the expert needs a task with subtasks; it does not read instructions")?;
-        let action = self.expert.next(situation.house, grader)?;
-        Ok(Decision { action, mind: None })
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        each_alone(observations, |_, here| {
+            let (environment, grader) = task_in(here)?;
+            Ok(Decision::of(self.expert.next(&mut environment.house, &grader)?))
+        })
     }
 
-    fn carried(&self) -> PolicyState {
+    fn state(&self, _slot: usize) -> PolicyState {
         PolicyState::Plan(Box::new(self.expert.plan()))
     }
 
-    fn put_back(&mut self, carried: PolicyState) {
-        if let PolicyState::Plan(plan) = carried {
+    fn restore(&mut self, _slot: usize, state: PolicyState) {
+        if let PolicyState::Plan(plan) = state {
             self.expert.follow(*plan);
         }
     }

@@ -3,10 +3,11 @@
 
 use std::collections::BTreeSet;
 
-use anyhow::Context;
-
-use crate::agent::policy::{Decision, Observation, Policy};
+use super::expert::task_in;
+use crate::agent::decision::Decision;
+use crate::agent::policy::{Decisions, Observation, Policy, each_alone};
 use crate::domain::{Action, ActionType, Cell, Instance};
+use crate::env::HouseEnvironment;
 use crate::house::expert::{Expert, TurnTiming};
 
 /// Turns to the right while it looks for something: with the first view, a full circle.
@@ -14,7 +15,7 @@ const TURNS: u32 = 3;
 
 /// The expert, who first turns around until it has seen what it is going for.
 pub struct ScanningExpert {
-    pace: TurnTiming,
+    timing: TurnTiming,
     expert: Expert,
     /// Everything that came into view in this episode.
     seen: BTreeSet<Instance>,
@@ -24,8 +25,8 @@ pub struct ScanningExpert {
 
 impl ScanningExpert {
     /// A demonstrator at the start of an episode.
-    pub fn new(pace: TurnTiming) -> ScanningExpert {
-        ScanningExpert { pace, expert: Expert::of(pace), seen: BTreeSet::new(), search: None }
+    pub fn new(timing: TurnTiming) -> ScanningExpert {
+        ScanningExpert { timing, expert: Expert::of(timing), seen: BTreeSet::new(), search: None }
     }
 
     /// Whether to turn on the spot before going for `aim`.
@@ -51,21 +52,31 @@ impl ScanningExpert {
 
 impl Policy for ScanningExpert {
     fn name(&self) -> &str {
-        "seeker"
+        "scanning-expert"
     }
 
-    fn begin(&mut self, _seed: u64) {
-        *self = ScanningExpert::new(self.pace);
+    fn slots(&self) -> usize {
+        1
     }
 
-    fn decide(&mut self, situation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let grader = situation.grader.context("only a task can be demonstrated")?;
-        let action = self.expert.next(situation.house, grader)?;
-        self.seen.extend(situation.house.view().sightings.iter().map(|sighting| sighting.instance));
-        let cell = situation.house.world().agent.cell;
+    fn reset(&mut self, _slot: usize, _seed: u64) {
+        *self = ScanningExpert::new(self.timing);
+    }
+
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        each_alone(observations, |_, here| self.decide(here))
+    }
+}
+
+impl ScanningExpert {
+    fn decide(&mut self, observation: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        let (HouseEnvironment { house, .. }, grader) = task_in(observation)?;
+        let action = self.expert.next(house, &grader)?;
+        self.seen.extend(house.view().sightings.iter().map(|sighting| sighting.instance));
+        let cell = house.world().agent.cell;
         let aim = self.expert.aim().and_then(|aim| aim.target);
         let looks = action.target.is_none() && aim.is_some_and(|aim| self.must_look(aim, cell));
         let action = if looks { Action::navigate(ActionType::RotateRight) } else { action };
-        Ok(Decision { action, mind: None })
+        Ok(Decision::of(action))
     }
 }

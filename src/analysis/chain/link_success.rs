@@ -1,11 +1,12 @@
 //! Which link breaks a chain: each by itself, with drawn actions, from where the expert begins it and from where the agent does.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Chain, ChainRun, PATIENCE, SLACK};
 use crate::agent::Policy;
 use crate::domain::{Instance, World};
-use crate::episode::rollout::Rollout;
+use crate::episode::rollout::{AfterEach, Rollout, Tick};
 use crate::house::grading::{Grader, Grading};
 
 /// How often a link was done from one entry state.
@@ -101,12 +102,18 @@ pub fn trials(
                     return Ok(found);
                 }
                 let house = chain.house(start);
-                let mut rollout = Rollout::new(house, chain.links[link].clone(), Some(grader), None);
-                policy.begin(u64::from(draw) * 1000 + link as u64);
+                let mut rollout = Rollout::in_house(house, chain.links[link].clone(), Some(grader), None);
+                policy.reset(0, u64::from(draw) * 1000 + link as u64);
+                rollout.horizon = Some(PATIENCE * steps + SLACK);
                 let mut done = false;
-                while !done && rollout.steps() < PATIENCE * steps + SLACK && !stop.load(Ordering::Relaxed) {
-                    done = rollout.step(policy)?.completed_one;
-                }
+                let mut until_done = AfterEach(|_: &mut Rollout, tick: &Tick| {
+                    done = tick.completed_one;
+                    Ok(match done || stop.load(Ordering::Relaxed) {
+                        true => ControlFlow::Break(()),
+                        false => ControlFlow::Continue(()),
+                    })
+                });
+                rollout.run(policy, &mut until_done)?;
                 let rate = if by_expert { &mut found.expert[link] } else { &mut found.own[link] };
                 rate.done += u32::from(done);
                 rate.of += 1;

@@ -8,11 +8,12 @@ pub use link_success::{Draws, LinkRate, LinkSuccess, trials};
 pub use play::{ChainRun, Handover, LinkOutcome};
 pub use split::split;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::agent::{ExpertPolicy, Policy as _};
 use crate::domain::{Role, Scene, Subtask, World};
-use crate::episode::rollout::Rollout;
+use crate::episode::rollout::{AfterEach, End, Rollout, Tick};
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 
@@ -59,24 +60,25 @@ impl Chain {
     /// The steps that the expert takes for each link, each from the expert's own end of the one before; with the state in which
     /// each begins. `None` where nobody grades the chain, or the expert fails.
     pub fn expert(&self) -> Option<Vec<(u32, World, Grader)>> {
-        let mut rollout = Rollout::new(self.house(&self.start), self.whole(), Some(self.grader()?), None);
+        let mut rollout = Rollout::in_house(self.house(&self.start), self.whole(), Some(self.grader()?), Some(1000));
         let mut expert = ExpertPolicy::new();
-        expert.begin(0);
-        let mut entries = vec![(0, self.start.clone(), rollout.grader.clone()?)];
+        expert.reset(0, 0);
+        let mut entries = vec![(0, self.start.clone(), rollout.env.grader.clone()?)];
         let mut since = 0;
-        while rollout.end().is_none() && rollout.steps() < 1000 {
-            let tick = rollout.step(&mut expert).ok()?;
+        let mut note_entries = AfterEach(|rollout: &mut Rollout, tick: &Tick| {
             if tick.completed_one {
                 if let Some(entry) = entries.last_mut() {
                     entry.0 = tick.step - since;
                 }
                 since = tick.step;
-                if entries.len() < self.links.len() {
-                    entries.push((0, rollout.house.world().clone(), rollout.grader.clone()?));
+                if let Some(grader) = rollout.env.grader.clone().filter(|_| entries.len() < self.links.len()) {
+                    entries.push((0, rollout.env.house.world().clone(), grader));
                 }
             }
-        }
-        (entries.len() == self.links.len() && rollout.end().is_some()).then_some(entries)
+            Ok(ControlFlow::Continue(()))
+        });
+        rollout.run(&mut expert, &mut note_entries).ok()?;
+        (entries.len() == self.links.len() && rollout.end() == Some(End::Success)).then_some(entries)
     }
 
     fn limits(&self) -> Vec<u32> {

@@ -1,11 +1,13 @@
 //! A chain that is followed: how each link came out, and how warm every link was on the way.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Chain;
 use crate::agent::{Decision, Policy};
 use crate::domain::World;
-use crate::episode::rollout::Rollout;
+use crate::env::{Environment, HouseEnvironment};
+use crate::episode::rollout::{Observer, Rollout, Tick};
 
 /// How a link came out.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,41 +73,35 @@ impl Chain {
     ) -> anyhow::Result<ChainRun> {
         let limits = self.limits();
         let told = |link: usize| if whole { self.whole() } else { self.links[link].clone() };
-        let mut rollout = Rollout::new(self.house(&self.start), told(0), self.grader(), None);
-        policy.begin(0);
-        let mut play = ChainRun::default();
+        let mut rollout = Rollout::in_house(self.house(&self.start), told(0), self.grader(), None);
+        policy.reset(0, 0);
+        let mut run = ChainRun::default();
         let all: u32 = limits.iter().sum();
         for (link, &limit) in limits.iter().enumerate() {
-            let entry = rollout.house.world().clone();
+            let entry = rollout.env.house.world().clone();
             let begun = rollout.steps();
             rollout.instruction = told(link);
-            let mut done = self.graded.is_some().then_some(false);
-            let spent = |rollout: &Rollout| match whole {
-                true => rollout.steps() >= all,
-                false => rollout.steps() - begun >= limit,
-            };
-            let mut last = None;
             let breaks = |before: &LinkOutcome| !before.reached || before.done == Some(false);
-            let failed = play.outcomes.last().is_some_and(breaks);
-            while !failed && !spent(&rollout) && !stop.load(Ordering::Relaxed) {
-                let decision = rollout.decide(policy)?;
-                last = self.feel(policy, &mut rollout, &decision, link, &mut play)?;
-                visit(&play);
-                if rollout.carry_out(decision).completed_one {
-                    done = Some(true);
-                    break;
-                }
+            let failed = run.outcomes.last().is_some_and(breaks);
+            let until = if whole { all } else { begun + limit };
+            let mut follower =
+                LinkFollower { chain: self, link, until, stop, visit, run: &mut run, done: false, last: None };
+            if !failed && !follower.is_over(&rollout) {
+                rollout.run(policy, &mut follower)?;
             }
+            let (completed, last) = (follower.done, follower.last);
             let handover = match (self.links.get(link + 1), last) {
-                (Some(told), Some((next, joined))) => {
-                    let values =
-                        asked(policy, &mut rollout, told, |policy, rollout| policy.values(&mut rollout.situation()))?;
+                (Some(next_instruction), Some((next, joined))) => {
+                    let values = asked(policy, &mut rollout, next_instruction, |policy, rollout| {
+                        policy.values(0, &mut rollout.observation())
+                    })?;
                     values.map(|values| Handover { worth: values.state, next, joined })
                 }
                 _ => None,
             };
-            let (steps, exit) = (rollout.steps() - begun, rollout.house.world().clone());
-            play.outcomes.push(LinkOutcome {
+            let (steps, exit) = (rollout.steps() - begun, rollout.env.house.world().clone());
+            let done = self.graded.is_some().then_some(completed);
+            run.outcomes.push(LinkOutcome {
                 reached: !failed,
                 done: done.filter(|_| !failed),
                 steps,
@@ -114,46 +110,84 @@ impl Chain {
                 handover,
             });
         }
-        Ok(play)
+        Ok(run)
+    }
+}
+
+/// Watches one link being followed.
+struct LinkFollower<'a> {
+    chain: &'a Chain,
+    link: usize,
+    /// The step at which its time is over.
+    until: u32,
+    stop: &'a AtomicBool,
+    visit: &'a mut dyn FnMut(&ChainRun),
+    run: &'a mut ChainRun,
+    done: bool,
+    /// Of the last step: min Q of what was done, under the next link's instruction and under both joined.
+    last: Option<(f32, f32)>,
+}
+
+impl LinkFollower<'_> {
+    fn is_over(&self, rollout: &Rollout) -> bool {
+        self.done || rollout.steps() >= self.until || self.stop.load(Ordering::Relaxed)
     }
 
-    /// How warm every link is before a step. With critics also min Q of what is done, under the next link's instruction and
+    /// The value of every link before a step. With critics also min Q of what is done, under the next link's instruction and
     /// under both joined.
-    fn feel(
-        &self,
-        policy: &mut dyn Policy,
+    fn link_values(
+        &mut self,
         rollout: &mut Rollout,
+        policy: &mut dyn Policy,
         decision: &Decision,
-        at: usize,
-        play: &mut ChainRun,
     ) -> anyhow::Result<Option<(f32, f32)>> {
         let action = decision.action;
-        let class = action.target.and_then(|target| rollout.house.world().class_of(rollout.house.scene(), target));
-        let values = |policy: &mut dyn Policy, rollout: &mut Rollout| policy.values(&mut rollout.situation());
-        let mut heat = Vec::with_capacity(self.links.len());
+        let class = action.target.and_then(|target| rollout.env.class_of(target));
+        let values = |policy: &mut dyn Policy, rollout: &mut Rollout| policy.values(0, &mut rollout.observation());
+        let mut heat = Vec::with_capacity(self.chain.links.len());
         let mut next = None;
-        for (link, told) in self.links.iter().enumerate() {
-            let felt = match asked(policy, rollout, told, values)? {
+        for (link, instruction) in self.chain.links.iter().enumerate() {
+            let value = match asked(policy, rollout, instruction, values)? {
                 Some(values) => {
-                    play.by_value = true;
-                    if link == at + 1 {
+                    self.run.by_value = true;
+                    if link == self.link + 1 {
                         next = values.q(action.kind, class);
                     }
                     values.state
                 }
                 None => {
-                    let mind = asked(policy, rollout, told, |policy, rollout| rollout.decide(policy))?.mind;
-                    mind.and_then(|mind| mind.actions[action.kind.index()]).unwrap_or(0.0)
+                    let decided = asked(policy, rollout, instruction, |policy, rollout| rollout.decide(policy))?;
+                    decided.distribution.and_then(|it| it.actions[action.kind.index()]).unwrap_or(0.0)
                 }
             };
-            heat.push(felt);
+            heat.push(value);
         }
-        play.heat.push(heat);
-        play.in_force.push(at);
+        self.run.heat.push(heat);
+        self.run.in_force.push(self.link);
         let Some(next) = next else { return Ok(None) };
-        let both = self.links[at..=at + 1].join(" ");
+        let both = self.chain.links[self.link..=self.link + 1].join(" ");
         let joined = asked(policy, rollout, &both, values)?.and_then(|values| values.q(action.kind, class));
         Ok(joined.map(|joined| (next, joined)))
+    }
+}
+
+impl Observer<HouseEnvironment> for LinkFollower<'_> {
+    fn before(
+        &mut self,
+        rollout: &mut Rollout,
+        policy: Option<&mut dyn Policy>,
+        decision: &Decision,
+    ) -> anyhow::Result<ControlFlow<()>> {
+        if let Some(policy) = policy {
+            self.last = self.link_values(rollout, policy, decision)?;
+        }
+        (self.visit)(self.run);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn after(&mut self, rollout: &mut Rollout, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
+        self.done = tick.completed_one;
+        Ok(if self.is_over(rollout) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 }
 
@@ -161,14 +195,14 @@ impl Chain {
 fn asked<T>(
     policy: &mut dyn Policy,
     rollout: &mut Rollout,
-    told: &str,
+    instruction: &str,
     ask: impl FnOnce(&mut dyn Policy, &mut Rollout) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
-    let carried = policy.carried();
-    let before = std::mem::replace(&mut rollout.instruction, told.to_string());
+    let state = policy.state(0);
+    let before = std::mem::replace(&mut rollout.instruction, instruction.to_string());
     let answer = ask(policy, rollout);
     rollout.instruction = before;
-    policy.put_back(carried);
+    policy.restore(0, state);
     answer
 }
 

@@ -11,7 +11,7 @@ use crate::domain::skill::Original;
 use crate::domain::task::{Task, TaskSet};
 use crate::domain::world::{Instance, World};
 use crate::domain::{Role, Scene, Subtask, Trajectory};
-use crate::house::rules;
+use crate::house::{Outcome, Replay};
 
 /// One of the official sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,12 +184,15 @@ pub fn span_task(id: String, trajectory: &Trajectory, scene: &Scene, span: Range
     let until = trajectory.skill_range(span.end - 1).end;
     let before = trajectory.actions.get(..from).filter(|_| from < until && until <= trajectory.actions.len());
     let before = before.ok_or_else(|| format!("skill_starts: skills {span:?} are not a run of its actions"))?;
-    let mut start = trajectory.start.clone();
-    for (number, &action) in before.iter().enumerate() {
-        if let crate::house::Outcome::Impossible(reason) = rules::apply(scene, &mut start, action) {
+    let mut replay = Replay::new(scene, trajectory.start.clone(), before);
+    let mut number = 0;
+    while let Some((_, outcome)) = replay.step() {
+        if let Outcome::Impossible(reason) = outcome {
             return Err(format!("the expert's action {number} is not possible: {reason}"));
         }
+        number += 1;
     }
+    let start = replay.finish();
     let (roles, subtasks) = roles(trajectory, span.clone(), &start)?;
     let expert_steps = (until - from) as u32;
     Ok(Task {

@@ -29,8 +29,8 @@ impl Moment {
     /// The present state of a rollout.
     pub fn of(rollout: &Rollout, author: &Author, carried: PolicyState) -> Moment {
         Moment {
-            world: Arc::new(rollout.house.world().clone()),
-            grader: rollout.grader.clone(),
+            world: Arc::new(rollout.env.house.world().clone()),
+            grader: rollout.env.grader.clone(),
             horizon: rollout.horizon,
             instruction: rollout.instruction.clone(),
             author: author.clone(),
@@ -42,7 +42,9 @@ impl Moment {
     pub fn restore(&self, rollout: &mut Rollout, steps: u32) {
         rollout.instruction.clone_from(&self.instruction);
         rollout.horizon = self.horizon;
-        rollout.resume((*self.world).clone(), self.grader.clone(), steps);
+        rollout.env.house.restore((*self.world).clone());
+        rollout.env.grader.clone_from(&self.grader);
+        rollout.set_steps(steps);
     }
 }
 
@@ -52,7 +54,7 @@ pub const FRAMES: usize = 5;
 /// Lets a policy begin in the middle of an episode as if it had been there all along: it looks at the states before this one
 /// (`before`, the newest first), `now` steps into the episode.
 pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout, before: &[Moment], now: u32) {
-    policy.begin(author.seed);
+    policy.reset(0, author.seed);
     policy.set_sampling(author.samples);
     if before.is_empty() {
         return;

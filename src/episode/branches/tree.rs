@@ -261,7 +261,7 @@ mod tests {
         let step =
             Step { kind, target: None, class: None, outcome: Outcome::Done, subtask: None, told: None, by: None };
         Taken {
-            decision: Decision { action: Action::navigate(kind), mind: None },
+            decision: Decision::of(Action::navigate(kind)),
             step,
             instruction: told.into(),
             author: Author::hand(),

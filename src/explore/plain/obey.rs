@@ -58,7 +58,7 @@ impl Plain {
             }
             Verb::Think => {
                 let (decision, values) = self.engine.think()?.clone();
-                let top = decision.mind.as_ref().map_or(String::new(), |mind| format!(" ({})", top(mind)));
+                let top = decision.distribution.as_ref().map_or(String::new(), |mind| format!(" ({})", top(mind)));
                 let value = values.map_or(String::new(), |values| format!(", V {:.2}", values.state));
                 writeln!(out, "next: {}{top}{value}", self.engine.words(decision.action))?;
             }
@@ -225,7 +225,7 @@ impl Plain {
 
 fn act(engine: &mut Session, action: Action, out: &mut impl Write) -> anyhow::Result<()> {
     anyhow::ensure!(engine.end().is_none(), "the episode is over; `back`, `reset` or `next`");
-    let event = engine.act(action);
+    let event = engine.act(action)?;
     step_line(engine, &event, None, out)
 }
 
@@ -238,7 +238,7 @@ fn seek(engine: &mut Session, step: u32, out: &mut impl Write) -> anyhow::Result
 fn steps(engine: &mut Session, count: u32, until: &[Condition], out: &mut impl Write) -> anyhow::Result<()> {
     anyhow::ensure!(engine.end().is_none(), "the episode is over; `back`, `reset` or `next`");
     for _ in 0..count {
-        let mind = engine.think()?.0.mind.clone();
+        let mind = engine.think()?.0.distribution.clone();
         let before = engine.facts();
         let event = engine.step()?;
         step_line(engine, &event, mind.as_ref(), out)?;

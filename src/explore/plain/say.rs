@@ -115,7 +115,7 @@ pub(crate) fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()
 pub(crate) fn choices(engine: &mut Session, sort: Sort, out: &mut impl Write) -> anyhow::Result<()> {
     let (decision, values) = engine.think()?.clone();
     let now = engine.snapshot();
-    let entropy = decision.mind.as_ref().map_or(String::new(), |mind| format!(", entropy {:.2}", mind.entropy));
+    let entropy = decision.distribution.as_ref().map_or(String::new(), |mind| format!(", entropy {:.2}", mind.entropy));
     let value = values.as_ref().map_or("no critic".to_string(), |values| format!("V {:.2}", values.state));
     writeln!(out, "{}: {value}{entropy}; sorted by {}", now.acts, sort.name())?;
     for choice in table(&now, &decision, values.as_ref(), sort) {

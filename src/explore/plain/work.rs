@@ -43,7 +43,7 @@ impl Plain {
 
     /// The cells that are worth most.
     pub(crate) fn values(&self, out: &mut impl Write) -> anyhow::Result<()> {
-        let house = &self.engine.rollout().house;
+        let house = &self.engine.rollout().env.house;
         let mut policy = self.engine.another_policy()?;
         let (stop, told) = (AtomicBool::new(false), self.engine.instruction());
         let mut found = survey(policy.as_mut(), house.scene(), house.world(), told, &stop, &mut |_| true)?;

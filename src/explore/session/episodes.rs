@@ -41,7 +41,7 @@ impl Session {
         self.decision = None;
         self.frame = None;
         if let Some(policy) = &mut self.policy {
-            policy.begin(self.seed);
+            policy.reset(0, self.seed);
         }
         self.tree = Tree::new(self.moment());
         self.examples = Arc::new(self.suggest());
@@ -66,10 +66,10 @@ impl Session {
         let asked = self.task.as_ref().is_some_and(|task| {
             instruction::normalise(&task.instruction) == instruction::normalise(&self.rollout.instruction)
         });
-        Ok(match (self.rollout.grader.is_some(), asked) {
+        Ok(match (self.rollout.env.grader.is_some(), asked) {
             (true, true) => "the task's own words",
             (true, false) => {
-                self.rollout.grader = None;
+                self.rollout.env.grader = None;
                 self.rollout.horizon = None;
                 "the task no longer applies"
             }
@@ -83,11 +83,11 @@ pub(crate) fn rollout_of(opening: &Opening) -> Rollout {
     let house = House::new(opening.scene.clone(), opening.world.clone());
     match &opening.task {
         // What a person made up is not graded.
-        Some(task) if task.subtasks.is_empty() => Rollout::new(house, task.instruction.clone(), None, None),
+        Some(task) if task.subtasks.is_empty() => Rollout::in_house(house, task.instruction.clone(), None, None),
         Some(task) => {
             let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
-            Rollout::new(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
+            Rollout::in_house(house, task.instruction.clone(), Some(grader), opening.limited.then_some(task.horizon))
         }
-        None => Rollout::new(house, "look around".into(), None, None),
+        None => Rollout::in_house(house, "look around".into(), None, None),
     }
 }

@@ -94,7 +94,7 @@ impl Session {
     }
 
     fn moment(&self) -> Moment {
-        let carried = self.policy.as_ref().map_or(PolicyState::Nothing, |policy| policy.carried());
+        let carried = self.policy.as_ref().map_or(PolicyState::Nothing, |policy| policy.state(0));
         Moment::of(&self.rollout, &self.author, carried)
     }
 
@@ -186,8 +186,8 @@ mod tests {
     fn a_reset_brings_back_the_world_and_the_path_begins_anew() {
         let mut engine = testing::engine();
         let start = engine.snapshot();
-        engine.act(Action::navigate(ActionType::MoveAhead));
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::MoveAhead)).unwrap();
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         assert_eq!(engine.snapshot().step, 2);
         engine.reset();
         let again = engine.snapshot();
@@ -206,7 +206,7 @@ mod tests {
             "{world} {told} {:?} {:?} {thought} {sum} {:?}",
             moment.grader,
             moment.horizon,
-            engine.policy.as_ref().unwrap().carried()
+            engine.policy.as_ref().unwrap().state(0)
         )
     }
 
@@ -242,7 +242,7 @@ mod tests {
             engine.step().unwrap();
         }
         engine.seek(1);
-        let event = engine.act(Action::navigate(ActionType::LookDown));
+        let event = engine.act(Action::navigate(ActionType::LookDown)).unwrap();
         assert!(event.forked.unwrap().starts_with("b1: "));
         engine.switch(0).unwrap();
         engine.seek(2);
@@ -250,7 +250,7 @@ mod tests {
         assert!(engine.step().unwrap().forked.unwrap().contains("told: Dance."));
         engine.switch(0).unwrap();
         engine.seek(1);
-        assert!(engine.rollout.grader.is_some(), "the task is back where it applied");
+        assert!(engine.rollout.env.grader.is_some(), "the task is back where it applied");
         engine.reseed(77, false);
         assert!(engine.step().unwrap().forked.unwrap().starts_with("b3: "));
         engine.switch(0).unwrap();

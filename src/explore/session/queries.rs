@@ -15,17 +15,17 @@ impl Session {
     /// What conditions ask of the present state.
     pub fn facts(&mut self) -> Facts {
         let classes = |engine: &mut Session| {
-            let seen = engine.rollout.house.view().sightings.clone();
-            let house = &engine.rollout.house;
+            let seen = engine.rollout.env.house.view().sightings.clone();
+            let house = &engine.rollout.env.house;
             seen.iter().filter_map(|seen| house.world().class_of(house.scene(), seen.instance)).collect()
         };
         let (mind, values) = match &self.decision {
-            Some((decision, values)) => (decision.mind.as_ref(), values.as_ref()),
+            Some((decision, values)) => (decision.distribution.as_ref(), values.as_ref()),
             None => (None, None),
         };
         Facts {
             step: self.tree.at(),
-            completed: self.rollout.grader.as_ref().map_or(0, |grader| grader.completed() as u32),
+            completed: self.rollout.env.grader.as_ref().map_or(0, |grader| grader.completed() as u32),
             failed: self.tree.last_taken().is_some_and(|taken| !taken.step.outcome.is_done()),
             value: values.map(|values| values.state),
             gap: gap(mind, values),
@@ -51,8 +51,8 @@ impl Session {
     /// # Errors
     /// When there is neither text nor task.
     pub fn chain(&self, text: &str) -> anyhow::Result<Chain> {
-        let house = &self.rollout.house;
-        let left = self.rollout.grader.as_ref().map(|grader| {
+        let house = &self.rollout.env.house;
+        let left = self.rollout.env.grader.as_ref().map(|grader| {
             let mut roles = grader.roles().to_vec();
             for (at, role) in (0u8..).zip(&mut roles) {
                 role.bound = grader.binding(at);
@@ -96,7 +96,7 @@ impl Session {
                 found.push(instruction::normalise(&phrases::sentence(&task.roles, subtask, &mut rng)));
             }
         }
-        let objects = &self.rollout.house.world().objects;
+        let objects = &self.rollout.env.house.world().objects;
         let mut names: Vec<&str> =
             objects.iter().filter(|o| o.class.info().pickupable).map(|object| object.class.spoken()).collect();
         names.sort_unstable();

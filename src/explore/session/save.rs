@@ -20,7 +20,7 @@ impl Session {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
         SessionExport {
-            scene: self.rollout.house.scene().clone(),
+            scene: self.rollout.env.house.scene().clone(),
             tasks,
             episodes: branches().map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
         }
@@ -33,7 +33,7 @@ impl Session {
     pub fn recording(&self) -> anyhow::Result<FrameSequence> {
         let start = &self.tree.beginning(self.tree.branch());
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
-        let setting = Setting { scene: self.rollout.house.scene().clone(), world: (*start.world).clone() };
+        let setting = Setting { scene: self.rollout.env.house.scene().clone(), world: (*start.world).clone() };
         FrameSequence::of(&setting, &self.task_at(start, name), &self.tree.episode(self.tree.branch(), name))
     }
 
@@ -43,9 +43,9 @@ impl Session {
     /// When nobody grades the instruction, nothing is left to do, or the expert sees no way.
     pub fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
-        let id = format!("{}-{name}-{}", self.rollout.house.scene().name, self.tree.at());
+        let id = format!("{}-{name}-{}", self.rollout.env.house.scene().name, self.tree.at());
         let base = self.task_at(self.tree.moment(), &id);
-        Ok((session_export::rest_of(base, &self.rollout)?, self.rollout.house.scene().clone()))
+        Ok((session_export::rest_of(base, &self.rollout)?, self.rollout.env.house.scene().clone()))
     }
 
     /// The task that begins at a moment; without subtasks where nobody grades the instruction.
@@ -97,9 +97,11 @@ impl Session {
 
 #[cfg(test)]
 mod tests {
+    use crate::agent::policy_source::PolicySource;
     use crate::agent::registry::PolicyKind;
     use crate::data::taskset;
     use crate::domain::{Action, ActionType};
+    use crate::episode::record::Author;
     use crate::eval::verify::{Recorded, verify};
     use crate::explore::testing;
 
@@ -112,7 +114,7 @@ mod tests {
             engine.step().unwrap();
         }
         engine.seek(3);
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         engine.instruct("dance").unwrap();
         engine.step().unwrap();
         engine.rename(1, "1").unwrap();
@@ -121,10 +123,8 @@ mod tests {
         assert!(engine.keep(Some(path.clone())).unwrap().contains("2 branches"));
         assert!(engine.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));
         let run = Recorded::open(&path, None).unwrap();
-        let mut summon = |_: &crate::episode::record::Author| -> anyhow::Result<Option<Box<dyn crate::agent::Policy>>> {
-            Ok(Some(Box::new(crate::agent::RandomPolicy::new())))
-        };
-        let verdict = verify(&run, &mut summon, &mut |_| ()).unwrap();
+        let mut find = |_: &Author| Ok(Some(PolicySource::random()));
+        let verdict = verify(&run, &mut find, 1, &mut |_| ()).unwrap();
         assert!(verdict.differences.is_empty(), "{verdict:?}");
         assert_eq!((verdict.episodes, verdict.steps, verdict.choices), (2, 6 + 5, 6 + 4));
 
@@ -143,7 +143,7 @@ mod tests {
     fn a_branch_is_exported_by_its_ending() {
         let folder = tempfile::tempdir().unwrap();
         let mut engine = testing::engine();
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         for name in ["a.gif", "a.strip.png", "a.txt", "a.html", "a.png"] {
             assert!(engine.export(&folder.path().join(name)).unwrap().contains(name));
         }
@@ -159,7 +159,7 @@ mod tests {
         let own = engine.instruction().to_string();
         engine.instruct("look around").unwrap();
         engine.plant();
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         engine.instruct(&own).unwrap();
         engine.reset();
         while engine.end().is_none() {

@@ -74,15 +74,15 @@ pub struct Progress {
 impl Session {
     /// The present state for a screen; draws the frame when it changed.
     pub fn snapshot(&mut self) -> Snapshot {
-        let candidates = self.rollout.house.candidates();
+        let candidates = self.rollout.env.house.candidates();
         let frame = match &self.frame {
             Some(frame) => frame.clone(),
-            None => self.frame.insert(Arc::new(self.rollout.house.frame().clone())).clone(),
+            None => self.frame.insert(Arc::new(self.rollout.env.house.frame().clone())).clone(),
         };
-        let view = self.rollout.house.view().clone();
+        let view = self.rollout.env.house.view().clone();
         let progress = self.progress();
         let recent = self.recent();
-        let house = &self.rollout.house;
+        let house = &self.rollout.env.house;
         let mut path: Vec<Cell> = self.tree.past().map(|moment| moment.world.agent.cell).collect();
         path.dedup();
         Snapshot {
@@ -96,7 +96,11 @@ impl Session {
             instruction: self.rollout.instruction.clone(),
             step: self.rollout.steps(),
             horizon: self.rollout.horizon,
-            expert_steps: self.task.as_ref().filter(|_| self.rollout.grader.is_some()).map(|task| task.expert_steps),
+            expert_steps: self
+                .task
+                .as_ref()
+                .filter(|_| self.rollout.env.grader.is_some())
+                .map(|task| task.expert_steps),
             progress,
             end: self.rollout.end(),
             path,
@@ -112,7 +116,7 @@ impl Session {
 
     /// How far the task has come, where one applies.
     pub fn progress(&self) -> Option<Progress> {
-        let (grader, house) = (self.rollout.grader.as_ref()?, &self.rollout.house);
+        let (grader, house) = (self.rollout.env.grader.as_ref()?, &self.rollout.env.house);
         let steps = (1..=self.tree.at()).zip(self.tree.steps());
         Some(Progress {
             subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
@@ -126,7 +130,7 @@ impl Session {
         if !self.looks_back {
             return Vec::new();
         }
-        let scene = self.rollout.house.scene().clone();
+        let scene = self.rollout.env.house.scene().clone();
         let mut worlds: Vec<Arc<World>> =
             self.tree.past().rev().skip(1).take(FRAMES - 1).map(|m| m.world.clone()).collect();
         // Before the first frame there was the first one.

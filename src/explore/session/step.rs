@@ -37,11 +37,11 @@ impl Session {
             Some(thought) => thought,
             None => {
                 let policy = self.policy.as_deref_mut().ok_or_else(|| anyhow::anyhow!("no policy is loaded"))?;
-                if self.kind == PolicyKind::Expert && self.rollout.grader.is_none() {
+                if self.kind == PolicyKind::Expert && self.rollout.env.grader.is_none() {
                     anyhow::bail!("the expert needs a task: it reads the subtasks, not the instruction");
                 }
                 let decision = self.rollout.decide(policy)?;
-                let values = policy.values(&mut self.rollout.situation())?;
+                let values = self.rollout.values(policy, &decision)?;
                 (decision, values)
             }
         };
@@ -55,22 +55,26 @@ impl Session {
     pub fn step(&mut self) -> anyhow::Result<Event> {
         anyhow::ensure!(!self.tree.is_full(), "no more steps are remembered in this episode: N opens the next one");
         let decision = self.think()?.0.clone();
-        Ok(self.carry_out(decision, self.author.clone()))
+        self.carry_out(decision, self.author.clone())
     }
 
     /// Takes one step that a person chose. The policy sees that state too, so that it has seen every frame.
-    pub fn act(&mut self, action: Action) -> Event {
+    pub fn act(&mut self, action: Action) -> anyhow::Result<Event> {
         let _ = self.think();
-        self.carry_out(Decision { action, mind: None }, Author::hand())
+        self.carry_out(Decision::of(action), Author::hand())
     }
 
-    pub(crate) fn carry_out(&mut self, decision: Decision, author: Author) -> Event {
+    pub(crate) fn carry_out(&mut self, decision: Decision, author: Author) -> anyhow::Result<Event> {
         let words = self.words(decision.action);
         let current = self.current_subtask();
-        let (mind, values) = self.decision.take().map_or((None, None), |(thought, values)| (thought.mind, values));
-        let tick = self.rollout.carry_out(decision.clone());
+        let (thought, values) = self.decision.take().unzip();
+        let values = values.flatten();
+        let tick = self.rollout.carry_out(decision.clone())?;
         let taken = Taken {
-            decision: Decision { action: decision.action, mind: decision.mind.or(mind) },
+            decision: Decision {
+                distribution: decision.distribution.or(thought.and_then(|thought| thought.distribution)),
+                ..decision
+            },
             step: Step::of(&tick, &self.rollout),
             instruction: self.rollout.instruction.as_str().into(),
             author,
@@ -89,7 +93,7 @@ impl Session {
             Growth::Forked(branch) => self.tree.branches().get(branch).map(|b| format!("{}: {}", b.name, b.why)),
             Growth::Longer | Growth::Known => None,
         };
-        Event { step, action: words, outcome, by_hand, completed: current.filter(|_| completed_one), forked }
+        Ok(Event { step, action: words, outcome, by_hand, completed: current.filter(|_| completed_one), forked })
     }
 
     /// What is new about a step that is not the one which is there already.
@@ -105,14 +109,14 @@ impl Session {
     }
 
     fn current_subtask(&self) -> Option<String> {
-        let grader = self.rollout.grader.as_ref()?;
+        let grader = self.rollout.env.grader.as_ref()?;
         let subtask = grader.subtasks().get(grader.completed())?;
         Some(describe(grader.roles(), subtask))
     }
 
     /// An action with the name of its target.
     pub fn words(&self, action: Action) -> String {
-        let house = &self.rollout.house;
+        let house = &self.rollout.env.house;
         let class = action.target.and_then(|target| house.world().class_of(house.scene(), target));
         match class {
             Some(class) => format!("{} {}", action.kind, class.name()),

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::{Session, rollout_of};
 use crate::agent::{Decision, PolicyState};
-use crate::domain::Action;
 use crate::episode::branches;
 use crate::episode::branches::{FRAMES, Moment};
 use crate::episode::record::{Author, Episode};
@@ -64,7 +63,7 @@ impl Session {
         let stories = [self.tree.story(self.tree.branch()), self.tree.story(other)];
         let wanted = self.tree.at().max(divergence.shared + 1);
         let steps = stories.each_ref().map(|story| wanted.min(story.len().saturating_sub(1) as u32));
-        let mut house = House::new(self.rollout.house.scene().clone(), self.rollout.house.world().clone());
+        let mut house = House::new(self.rollout.env.house.scene().clone(), self.rollout.env.house.world().clone());
         let mut draw = |side: usize| {
             let (moment, _) = stories[side].get(steps[side] as usize)?;
             house.restore((*moment.world).clone());
@@ -84,7 +83,7 @@ impl Session {
         self.decision = None;
         if moment.author == self.author && !matches!(moment.carried, PolicyState::Nothing) {
             if let Some(policy) = self.policy.as_deref_mut() {
-                policy.put_back(moment.carried);
+                policy.restore(0, moment.carried);
             }
         } else {
             self.look_back();
@@ -104,13 +103,13 @@ impl Session {
         let instruction = self.rollout.instruction.clone();
         self.seek(0);
         let fresh = rollout_of(&Opening {
-            scene: self.rollout.house.scene().clone(),
-            world: self.rollout.house.world().clone(),
+            scene: self.rollout.env.house.scene().clone(),
+            world: self.rollout.env.house.world().clone(),
             task: self.task.clone(),
             reference: self.reference.clone(),
             limited: self.limited,
         });
-        self.rollout.grader = fresh.grader;
+        self.rollout.env.grader = fresh.env.grader;
         self.rollout.horizon = fresh.horizon;
         // The text was checked when it came in.
         let _ = self.instruct(&instruction);
@@ -137,14 +136,14 @@ impl Session {
             if let Some(by) = &recorded.by {
                 author = by.clone();
             }
-            let action = Action { kind: recorded.kind, target: recorded.target };
+            let action = recorded.action();
             if thinks && number > episode.prefix {
                 let would = self.think().map(|(decision, _)| decision.action);
                 if !author.is_hand() && author == self.author && would.ok() != Some(action) {
                     parted = parted.or(Some(number));
                 }
             }
-            self.carry_out(Decision { action, mind: None }, author.clone());
+            self.carry_out(Decision::of(action), author.clone())?;
             let found = self.tree.steps().nth(number as usize - 1).map(|taken| taken.step.outcome);
             anyhow::ensure!(
                 found == Some(recorded.outcome),
@@ -174,7 +173,7 @@ mod tests {
             let other = crate::episode::record::Episode { instruction: told.into(), ..episode.clone() };
             again.retrace(&other, engine.author(), false).unwrap();
             assert_eq!((again.instruction(), again.tree().at()), (told, 3));
-            assert!(again.rollout().grader.is_some());
+            assert!(again.rollout().env.grader.is_some());
         }
     }
 }

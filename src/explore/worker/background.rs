@@ -93,7 +93,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
     /// Surveys the cells in the background, unless that was done before.
     pub(crate) fn survey(&mut self) -> bool {
         let (told, step) = (self.engine.instruction().to_string(), self.engine.tree().at());
-        let house = &self.engine.rollout().house;
+        let house = &self.engine.rollout().env.house;
         let (scene, world) = (house.scene().clone(), house.world().clone());
         let key = (self.engine.who(), told.clone(), without_agent(&scene, &world).digest());
         let known = self.surveys.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();

@@ -23,8 +23,10 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
                 if self.over() {
                     return true;
                 }
-                let event = self.engine.act(action);
-                self.stepped(event)
+                match self.engine.act(action) {
+                    Ok(event) => self.stepped(event),
+                    Err(error) => self.refuse(&error),
+                }
             }
             Command::Instruct(text) => {
                 let old = self.engine.instruction().to_string();

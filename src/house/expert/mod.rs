@@ -1,5 +1,6 @@
 //! The expert: shortest paths and interactions for any task in any scene, from any state.
 
+pub mod demonstrate;
 pub mod paths;
 pub mod plan;
 pub mod stands;
@@ -12,6 +13,7 @@ use super::rules;
 use super::session::House;
 use super::view;
 use crate::domain::{Action, ActionType, Pose, Scene, World};
+pub use demonstrate::{ExpertStep, Unfinished, demonstrate};
 use paths::{Floor, Paths, Turning};
 use plan::Intent;
 use stands::{Scout, Stand, WELL_SEEN};

@@ -1,18 +1,23 @@
 //! One task demonstrated: what the demonstrator would do in every state, while chance or a learner disturbs what is done.
 
+use std::ops::ControlFlow;
+
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::agent::experts::scanning::ScanningExpert;
 use crate::agent::learned::LearnedPolicy;
-use crate::agent::{Decision, ExpertPolicy, Policy};
+use crate::agent::policy::each_alone;
+use crate::agent::{Decision, Decisions, ExpertPolicy, Observation, Policy};
 use crate::domain::trajectory::Annotation;
 use crate::domain::{Action, ActionType, Scene, Task, Trajectory, World};
-use crate::episode::rollout::Rollout;
+use crate::env::HouseEnvironment;
+use crate::episode::rollout::{AfterEach, End, Rollout, Tick};
 use crate::episode::scenes::Setting;
 use crate::house::House;
 use crate::house::expert::TurnTiming;
-use crate::house::grading::{Grader, Grading};
+use crate::house::grading::Grading;
+use crate::house::view::Candidate;
 use crate::language::phrases;
 
 /// The longest disturbance, in steps.
@@ -95,41 +100,42 @@ impl Demonstration<'_> {
     ) -> anyhow::Result<Option<Trajectory>> {
         let Task { roles, subtasks, .. } = self.task;
         let told = self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
-        let grader = Grader::new(Grading::Class, roles, subtasks, self.task.goal.as_ref());
         let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
-        let mut rollout = Rollout::new(house, told, Some(grader), None);
-        let mut demonstrator = self.manner.demonstrator.policy(self.manner.pace);
+        let mut rollout = Rollout::new(HouseEnvironment::of_task(self.task, house, Grading::Class), told, None);
+        rollout.horizon = Some(3 * self.task.expert_steps + SLACK + 1);
         if let Some(learner) = learner.as_deref_mut() {
-            learner.begin(rng.random());
+            learner.reset(0, rng.random());
             // Half of the episodes it acts as when it is measured.
             learner.set_sampling(rng.random());
         }
         // Some episodes are left undisturbed.
         let noise = if rng.random_bool(0.3) { 0.0 } else { self.manner.noise };
-        let (mut actions, mut choices, mut skill_starts) = (Vec::new(), Vec::new(), vec![0]);
-        let mut disturbed = 0;
-        while rollout.end().is_none() {
-            if rollout.steps() > 3 * self.task.expert_steps + SLACK {
-                return Ok(None);
-            }
-            let Ok(choice) = rollout.decide(demonstrator.as_mut()) else { return Ok(None) };
-            if disturbed == 0 && rng.random_bool(noise) {
-                disturbed = rng.random_range(1..=LONGEST);
-            }
-            let action = match learner.as_deref_mut().filter(|_| rollout.steps() < self.task.horizon) {
-                _ if disturbed > 0 => {
-                    disturbed -= 1;
-                    disturbance(&mut rollout.house, rng)
-                }
-                Some(learner) => rollout.decide(learner)?.action,
-                None => choice.action,
-            };
-            actions.push(action);
-            choices.push(choice.action);
-            let tick = rollout.carry_out(Decision { action, mind: None });
+        let mut policy = DisturbedPolicy {
+            demonstrator: self.manner.demonstrator.policy(self.manner.pace),
+            learner,
+            learner_until: self.task.horizon,
+            noise,
+            disturbed: 0,
+            rng,
+            choices: Vec::new(),
+            sees_no_way: false,
+        };
+        let (mut actions, mut skill_starts) = (Vec::new(), vec![0]);
+        let mut record = AfterEach(|rollout: &mut Rollout, tick: &Tick| {
+            actions.push(tick.decision.action);
             if tick.completed_one && rollout.end().is_none() {
                 skill_starts.push(tick.step);
             }
+            Ok(ControlFlow::Continue(()))
+        });
+        let played = rollout.run(&mut policy, &mut record);
+        if policy.sees_no_way {
+            return Ok(None);
+        }
+        let mut choices = policy.choices;
+        played?;
+        if rollout.end() != Some(End::Success) {
+            return Ok(None);
         }
         if choices == actions {
             choices.clear();
@@ -151,9 +157,66 @@ impl Demonstration<'_> {
     }
 }
 
+/// Acts as a demonstrator, a learner or chance would, and notes what the demonstrator would have done.
+struct DisturbedPolicy<'a> {
+    demonstrator: Box<dyn Policy>,
+    /// Acts in the demonstrator's stead, where there is one.
+    learner: Option<&'a mut LearnedPolicy>,
+    /// The step from which the learner acts no more.
+    learner_until: u32,
+    /// The share of steps at which chance takes over for a few steps.
+    noise: f64,
+    /// Steps for which chance goes on acting.
+    disturbed: u32,
+    rng: &'a mut ChaCha8Rng,
+    choices: Vec<Action>,
+    /// The demonstrator could not go on.
+    sees_no_way: bool,
+}
+
+impl DisturbedPolicy<'_> {
+    fn decide(&mut self, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        let again = |here: &mut Observation<'_>, policy: &mut dyn Policy| {
+            let Observation { environment, instruction, step } = here;
+            policy.act_in(0, Observation { environment: &mut **environment, instruction, step: *step })
+        };
+        let choice = again(here, self.demonstrator.as_mut()).inspect_err(|_| self.sees_no_way = true)?.action;
+        if self.disturbed == 0 && self.rng.random_bool(self.noise) {
+            self.disturbed = self.rng.random_range(1..=LONGEST);
+        }
+        let action = match self.learner.as_deref_mut().filter(|_| here.step < self.learner_until) {
+            _ if self.disturbed > 0 => {
+                self.disturbed -= 1;
+                disturbance(&here.environment.legal_actions()?, self.rng)
+            }
+            Some(learner) => again(here, learner)?.action,
+            None => choice,
+        };
+        self.choices.push(choice);
+        Ok(Decision::of(action))
+    }
+}
+
+impl Policy for DisturbedPolicy<'_> {
+    fn name(&self) -> &str {
+        self.demonstrator.name()
+    }
+
+    fn slots(&self) -> usize {
+        1
+    }
+
+    fn reset(&mut self, slot: usize, seed: u64) {
+        self.demonstrator.reset(slot, seed);
+    }
+
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        each_alone(observations, |_, here| self.decide(here))
+    }
+}
+
 /// Something that could happen by chance: mostly a step or a turn, at times an interaction.
-fn disturbance(house: &mut House, rng: &mut ChaCha8Rng) -> Action {
-    let candidates = house.candidates();
+fn disturbance(candidates: &[Candidate], rng: &mut ChaCha8Rng) -> Action {
     if !candidates.is_empty() && rng.random_bool(0.08) {
         return candidates[rng.random_range(0..candidates.len())].action();
     }

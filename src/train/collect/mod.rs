@@ -291,8 +291,9 @@ mod tests {
         assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![told]));
         let scene = dataset.scenes().unwrap().into_values().next().unwrap();
         let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None);
-        let mut rollout = Rollout::new(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
-        made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision { action, mind: None })));
+        let mut rollout =
+            Rollout::in_house(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
+        made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision::of(action))));
         assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
     }
 

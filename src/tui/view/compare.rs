@@ -54,7 +54,7 @@ fn head(contrast: &Contrast, when: &str, area: Rect, buf: &mut Buffer) {
             Span::styled(fit(&side.instruction, width - 3), THEME.instruction),
         ]);
         line.render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
-        let mind = side.decision.mind.as_ref();
+        let mind = side.decision.distribution.as_ref();
         let entropy = mind.map_or(String::new(), |mind| format!(" · entropy {:.2}", mind.entropy));
         let value = match &side.values {
             Some(values) => format!("V {:.2}{}", values.state, difference(contrast, row > 0)),

@@ -23,7 +23,7 @@ const OBJECTS: u16 = 26;
 impl Widget for MindPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let mind = app.thought.as_ref().and_then(|(decision, _)| decision.mind.as_ref());
+        let mind = app.thought.as_ref().and_then(|(decision, _)| decision.distribution.as_ref());
         let right = match (&app.busy, mind) {
             (Some(busy), _) => format!("{busy} ..."),
             (None, Some(mind)) => {

@@ -50,7 +50,8 @@ impl Thoughts<'_> {
             }
             return;
         };
-        let entropy = decision.mind.as_ref().map_or(String::new(), |mind| format!(" · entropy {:.2}", mind.entropy));
+        let entropy =
+            decision.distribution.as_ref().map_or(String::new(), |mind| format!(" · entropy {:.2}", mind.entropy));
         let value = match &app.values {
             Some(values) => format!("V {:.2}", values.state),
             None => "this checkpoint has no critic".into(),
@@ -69,7 +70,7 @@ impl Thoughts<'_> {
         }
         let hidden = rows.len().saturating_sub(first + room);
         let more = if hidden > 0 { format!(" ({hidden} more below: j)") } else { String::new() };
-        let greedy = decision.mind.as_ref().filter(|mind| mind.greedy != decision.action);
+        let greedy = decision.distribution.as_ref().filter(|mind| mind.greedy != decision.action);
         let drawn = if greedy.is_some() { "; drawn by chance, + is the likeliest" } else { "" };
         put(buf, inner, inner.height - 1, format!("> {words}{drawn}{more}"), THEME.quiet);
     }

@@ -1,0 +1,70 @@
+//! What a policy decided, and the distribution over everything that it could have done.
+
+use super::value_estimates::Values;
+use crate::domain::{Action, ActionType, Class};
+use crate::house::view::Candidate;
+
+/// The next action, and what led to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// What to do.
+    pub action: Action,
+    /// The distribution behind it, where the policy has one.
+    pub distribution: Option<ActionDistribution>,
+    /// What the critics say of the state, where the decision was weighed by them.
+    pub values: Option<Values>,
+}
+
+impl Decision {
+    /// An action with nothing behind it, as a person or a script chooses.
+    pub fn of(action: Action) -> Decision {
+        Decision { action, distribution: None, values: None }
+    }
+}
+
+/// A policy's distribution over what it could do now.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActionDistribution {
+    /// Probability of each action in the order of [`ActionType::ALL`], balanced, weighed and masked; `None` where masked.
+    pub actions: [Option<f32>; ActionType::COUNT],
+    /// Object classes by falling probability (before restriction to candidates and weighing), with whether one of that class
+    /// is a candidate of the chosen or likeliest interaction.
+    pub objects: Vec<(Class, f32, bool)>,
+    /// The weight of each class among those that an interaction could name; all weigh alike where none is listed.
+    pub choices: Vec<(ActionType, Class, f32)>,
+    /// Entropy of the masked action distribution, in nats.
+    pub entropy: f32,
+    /// The action that argmax would choose.
+    pub greedy: Action,
+}
+
+impl ActionDistribution {
+    /// The distribution over everything that could be done now: navigation, and each interaction with each class that is a
+    /// candidate of it, in the order of actions. Sums to 1.
+    pub fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
+        let share = |kind: ActionType, class: Class| {
+            let mut weights = self.choices.iter().filter(|choice| (choice.0, choice.1) == (kind, class));
+            weights.next().map_or(0.0, |choice| choice.2)
+        };
+        let mut found = Vec::new();
+        for kind in ActionType::ALL {
+            let p = self.actions[kind.index()].unwrap_or(0.0);
+            if !kind.is_interaction() {
+                found.push((kind, None, p));
+                continue;
+            }
+            let mut classes: Vec<Class> = Vec::new();
+            for candidate in candidates.iter().filter(|candidate| candidate.kind == kind) {
+                if !classes.contains(&candidate.class) {
+                    classes.push(candidate.class);
+                }
+            }
+            let all: f32 = classes.iter().map(|&class| share(kind, class)).sum();
+            for &class in &classes {
+                let part = if all > 0.0 { share(kind, class) / all } else { 1.0 / classes.len() as f32 };
+                found.push((kind, Some(class), p * part));
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,193 @@
+//! Where policies come from: a checkpoint folder, the expert, chance. Each can make as many as are asked for.
+
+use std::cell::OnceCell;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use anyhow::Context;
+use sha2::{Digest, Sha256};
+
+use super::config::Config;
+use super::experts::expert::ExpertPolicy;
+use super::learned::LearnedPolicy;
+use super::policy::Policy;
+use super::random::RandomPolicy;
+use super::registry::{Agent, Loaded};
+use crate::data::json;
+use crate::nets::device;
+use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
+
+/// Makes a policy; whoever acts on a thread of his own has one of his own.
+pub type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync;
+
+/// A policy that can be made, and what identifies it in a run.
+#[derive(Clone)]
+pub struct PolicySource {
+    /// What it is called in reports.
+    pub name: String,
+    /// SHA-256 over its checkpoint's configuration and weights.
+    pub checkpoint_hash: Option<String>,
+    /// Makes one.
+    pub make: Arc<MakePolicy>,
+    /// The checkpoint's folder.
+    folder: Option<PathBuf>,
+}
+
+impl PolicySource {
+    /// The expert, who knows everything.
+    pub fn expert() -> PolicySource {
+        PolicySource::plain("expert", || Box::new(ExpertPolicy::new()))
+    }
+
+    /// A possible action by chance.
+    pub fn random() -> PolicySource {
+        PolicySource::plain("random", || Box::new(RandomPolicy::new()))
+    }
+
+    fn plain(name: &str, make: fn() -> Box<dyn Policy>) -> PolicySource {
+        PolicySource { name: name.into(), checkpoint_hash: None, make: Arc::new(move || Ok(make())), folder: None }
+    }
+
+    /// A trained agent; all that are made share one sentence encoder. It draws its actions where `sampling`, else it takes the
+    /// likeliest.
+    ///
+    /// # Errors
+    /// When the checkpoint or its sentence encoder cannot be used.
+    pub fn checkpoint(folder: PathBuf, sampling: bool) -> anyhow::Result<PolicySource> {
+        // More threads than one would make sums depend on how many there are, and workers get in each other's way.
+        device::set_threads(1);
+        let checkpoint_hash = hash(&folder)?;
+        let computes = device::best_device();
+        let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), computes)?));
+        let load = {
+            let (folder, chosen) = (folder.clone(), checkpoint_hash.clone());
+            move || -> anyhow::Result<Box<dyn Policy>> {
+                let mut agent = LearnedPolicy::load(&folder, sentences.clone(), computes)?;
+                // What was loaded is what the run's manifest names.
+                check_hash(&folder, &chosen)?;
+                agent.set_sampling(sampling);
+                Ok(Box::new(agent))
+            }
+        };
+        let name = load()?.name().to_owned();
+        Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make: Arc::new(load), folder: Some(folder) })
+    }
+
+    /// Notices when the checkpoint is no longer the one that was chosen.
+    ///
+    /// # Errors
+    /// When its files changed or are gone.
+    pub fn check_unchanged(&self) -> anyhow::Result<()> {
+        let (Some(folder), Some(chosen)) = (&self.folder, &self.checkpoint_hash) else { return Ok(()) };
+        check_hash(folder, chosen)
+    }
+}
+
+fn check_hash(folder: &Path, chosen: &str) -> anyhow::Result<()> {
+    let now = hash(folder)?;
+    anyhow::ensure!(
+        now == chosen,
+        "{}: the checkpoint was replaced while the run was under way (its hash was {chosen}, now it is {now}); what is \
+         recorded is of the first one: put that back, or evaluate the new one with another --out",
+        folder.display()
+    );
+    Ok(())
+}
+
+/// SHA-256 over a checkpoint's configuration and weights.
+fn hash(folder: &Path) -> anyhow::Result<String> {
+    Config::check_there(folder)?;
+    let mut digest = Sha256::new();
+    for file in ["config.json", "model.safetensors"] {
+        let path = folder.join(file);
+        digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
+    }
+    Ok(json::hex(&digest.finalize()))
+}
+
+/// The policy that a run was made with, by its name and the hash of its checkpoint, which may be `named` or lie where
+/// [`checkpoints`] do; `None` where it is not at hand.
+///
+/// # Errors
+/// When it is there and cannot be used.
+pub fn find(
+    name: &str,
+    checkpoint: Option<&str>,
+    sampling: bool,
+    named: Option<&Path>,
+) -> anyhow::Result<Option<PolicySource>> {
+    let Some(wanted) = checkpoint else {
+        return Ok(match name {
+            "expert" => Some(PolicySource::expert()),
+            "random" => Some(PolicySource::random()),
+            _ => None,
+        });
+    };
+    for folder in named.map(Path::to_owned).into_iter().chain(checkpoints()) {
+        if hash(&folder)? == wanted {
+            return PolicySource::checkpoint(folder, sampling).map(Some);
+        }
+    }
+    Ok(None)
+}
+
+/// The agents that an explorer may let act: the named one first, then those that are found.
+pub fn agents(named: Option<&Path>) -> Vec<Agent> {
+    let mut folders: Vec<PathBuf> = named.map(Path::to_owned).into_iter().chain(checkpoints()).collect();
+    let mut seen = Vec::new();
+    folders.retain(|folder| {
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        let new = !seen.contains(&whole);
+        seen.push(whole);
+        new
+    });
+    let agent = |folder: PathBuf| {
+        let name = folder.file_name().map_or_else(|| "agent".into(), |name| name.to_string_lossy().into_owned());
+        let loaded = OnceCell::new();
+        let load = move || -> anyhow::Result<Loaded> {
+            let chosen = match loaded.get() {
+                Some(chosen) => chosen,
+                None => {
+                    let chosen = PolicySource::checkpoint(folder.clone(), false)?;
+                    loaded.get_or_init(|| chosen)
+                }
+            };
+            Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
+        };
+        Agent { name, load: Box::new(load) }
+    };
+    folders.into_iter().map(agent).collect()
+}
+
+/// The agent that is at home here: it acts when none is named.
+const OWN: &str = "sprint";
+
+/// The agent that acts when none is named: the first that is found.
+pub fn shipped() -> anyhow::Result<PathBuf> {
+    checkpoints().into_iter().next().context(
+        "there is no trained agent in checkpoints/: name one with --checkpoint, or let --policy expert or random act",
+    )
+}
+
+/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in: [`OWN`]
+/// first, then by name.
+pub fn checkpoints() -> Vec<PathBuf> {
+    let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
+    let near: Option<PathBuf> = program
+        .iter()
+        .flat_map(|path| path.ancestors().skip(1).take(3))
+        .map(|folder| folder.join("checkpoints"))
+        .find(|folder| folder.is_dir());
+    let here = Path::new("checkpoints").canonicalize().ok().filter(|folder| folder.is_dir());
+    let mut folders: Vec<PathBuf> = here.into_iter().chain(near).collect();
+    folders.dedup();
+    let in_folder = |folder: &PathBuf| -> Vec<PathBuf> {
+        let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path());
+        let whole = |path: &PathBuf| path.join("config.json").is_file() && path.join("model.safetensors").is_file();
+        let mut found: Vec<PathBuf> = entries.filter(whole).collect();
+        found.sort_by_key(|path| (path.file_name() != Some(OWN.as_ref()), path.clone()));
+        found
+    };
+    folders.iter().flat_map(in_folder).collect()
+}

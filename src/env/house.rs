@@ -1,0 +1,157 @@
+//! House as an environment: the simulator, and the grader that follows it.
+
+use std::sync::Arc;
+
+use anyhow::Context;
+
+use super::environment::{Environment, Snapshot, Transition};
+use crate::domain::{Action, Class, Instance, Task, World};
+use crate::house::House;
+use crate::house::expert::demonstrate;
+use crate::house::grading::{Grader, Grading};
+use crate::house::view::{Candidate, Frame};
+
+/// Longer than any demonstration.
+const LONGEST: usize = 1000;
+
+/// A house with what is asked in it.
+pub struct HouseEnvironment {
+    /// The simulator.
+    pub house: House,
+    /// Follows the subtasks, where there is a task.
+    pub grader: Option<Grader>,
+    start: HouseState,
+}
+
+/// A state of a house and of its grader.
+#[derive(Clone)]
+struct HouseState {
+    world: World,
+    grader: Option<Grader>,
+}
+
+impl HouseEnvironment {
+    /// A house whose present state is the episode's start.
+    pub fn new(house: House, grader: Option<Grader>) -> HouseEnvironment {
+        let start = HouseState { world: house.world().clone(), grader: grader.clone() };
+        HouseEnvironment { house, grader, start }
+    }
+
+    /// A task's start, graded.
+    pub fn of_task(task: &Task, house: House, grading: Grading) -> HouseEnvironment {
+        let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        HouseEnvironment::new(house, Some(grader))
+    }
+
+    /// Frames of the last `count` states, oldest first, of the expert who goes on from here until the task is done.
+    ///
+    /// # Errors
+    /// When there is no task, or the expert sees no way.
+    pub fn goal_frames(&self, count: usize) -> anyhow::Result<Vec<Frame>> {
+        let grader = self.grader.as_ref();
+        let grader = grader.context("the agent is shown its goal, which a task has; it reads no instructions")?;
+        let mut house = House::new(Arc::clone(self.house.scene()), self.house.world().clone());
+        let mut states = vec![house.world().clone()];
+        demonstrate(&mut house, &mut grader.clone(), LONGEST, &mut |house, _| states.push(house.world().clone()))
+            .context("the expert, who shows the goal")?;
+        let last = states.split_off(states.len().saturating_sub(count));
+        let draw = |world| {
+            house.restore(world);
+            house.frame().clone()
+        };
+        Ok(last.into_iter().map(draw).collect())
+    }
+}
+
+impl Environment for HouseEnvironment {
+    fn name(&self) -> &str {
+        "House"
+    }
+
+    fn reset(&mut self) -> anyhow::Result<()> {
+        self.house.restore(self.start.world.clone());
+        self.grader.clone_from(&self.start.grader);
+        Ok(())
+    }
+
+    fn frame(&mut self) -> anyhow::Result<&Frame> {
+        Ok(self.house.frame())
+    }
+
+    fn legal_actions(&mut self) -> anyhow::Result<Vec<Candidate>> {
+        Ok(self.house.candidates())
+    }
+
+    fn step(&mut self, action: Action) -> anyhow::Result<Transition> {
+        let outcome = self.house.step(action);
+        let completed_subtask = match &mut self.grader {
+            Some(grader) => grader.observe(self.house.scene(), self.house.world(), action, outcome),
+            None => false,
+        };
+        Ok(Transition { outcome, completed_subtask })
+    }
+
+    fn class_of(&self, instance: Instance) -> Option<Class> {
+        self.house.world().class_of(self.house.scene(), instance)
+    }
+
+    fn fingerprint(&self) -> Option<String> {
+        Some(self.house.world().digest())
+    }
+
+    fn grading(&self) -> Option<(usize, usize)> {
+        self.grader.as_ref().map(|grader| (grader.completed(), grader.total()))
+    }
+
+    fn snapshot(&self) -> Option<Snapshot> {
+        Some(Snapshot::of(HouseState { world: self.house.world().clone(), grader: self.grader.clone() }))
+    }
+
+    fn restore(&mut self, snapshot: &Snapshot) -> anyhow::Result<()> {
+        let state: &HouseState = snapshot.get().context("this state is of another environment than House")?;
+        self.house.restore(state.world.clone());
+        self.grader.clone_from(&state.grader);
+        Ok(())
+    }
+
+    fn house(&mut self) -> Option<&mut HouseEnvironment> {
+        Some(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{ActionType, SkillKind};
+    use crate::house::testing::{kitchen_house, role, subtask};
+
+    fn environment() -> HouseEnvironment {
+        let grader = Grader::new(Grading::Class, &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
+        HouseEnvironment::new(kitchen_house(), Some(grader))
+    }
+
+    #[test]
+    fn a_snapshot_brings_back_world_and_grading_and_a_reset_the_start() {
+        let mut environment = environment();
+        let start = environment.fingerprint();
+        let snapshot = environment.snapshot().unwrap();
+        let mug = environment.legal_actions().unwrap().into_iter().find(|it| it.kind == ActionType::Pickup);
+        if let Some(mug) = mug {
+            environment.step(mug.action()).unwrap();
+        }
+        environment.step(Action::navigate(ActionType::RotateLeft)).unwrap();
+        let turned = environment.fingerprint();
+        assert_ne!(turned, start);
+        environment.restore(&snapshot).unwrap();
+        assert_eq!((environment.fingerprint(), environment.grading()), (start.clone(), Some((0, 1))));
+        environment.step(Action::navigate(ActionType::RotateLeft)).unwrap();
+        environment.reset().unwrap();
+        assert_eq!(environment.fingerprint(), start);
+    }
+
+    #[test]
+    fn a_state_of_another_environment_is_refused() {
+        let error = environment().restore(&Snapshot::of(7_u32)).unwrap_err().to_string();
+        assert!(error.contains("another environment"), "{error}");
+    }
+}

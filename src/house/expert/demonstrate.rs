@@ -1,0 +1,61 @@
+//! The expert left alone with a task, for whoever needs to know how it is done before an agent tries.
+
+use super::{Expert, NoWay};
+use crate::domain::Action;
+use crate::house::grading::Grader;
+use crate::house::outcome::Outcome;
+use crate::house::session::House;
+
+/// A step of the expert's: what it did, what that came to, and the subtask that it completed, by number.
+#[derive(Clone, Copy, Debug)]
+pub struct ExpertStep {
+    /// What it did.
+    pub action: Action,
+    /// What that came to.
+    pub outcome: Outcome,
+    /// The subtask that was completed by it, from 0.
+    pub completed: Option<usize>,
+}
+
+/// Why the expert did not finish.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unfinished {
+    /// It knows no way.
+    #[error(transparent)]
+    NoWay(#[from] NoWay),
+    /// It took too long.
+    #[error("did not get there in {limit} steps: {waits_for}")]
+    TooLong {
+        /// The most steps it had.
+        limit: usize,
+        /// What the grader waits for.
+        waits_for: String,
+    },
+}
+
+/// Lets the expert act until the grader is satisfied, for at most `limit` steps; `visit` sees the house after each.
+///
+/// # Errors
+/// When it sees no way, or has not finished in time.
+pub fn demonstrate(
+    house: &mut House,
+    grader: &mut Grader,
+    limit: usize,
+    visit: &mut dyn FnMut(&House, ExpertStep),
+) -> Result<(), Unfinished> {
+    let mut expert = Expert::new();
+    let mut steps = 0;
+    while !grader.is_done() {
+        if steps >= limit {
+            let waits_for = grader.waits_for(house.scene(), house.world());
+            return Err(Unfinished::TooLong { limit, waits_for });
+        }
+        let action = expert.next(house, grader)?;
+        let outcome = house.step(action);
+        steps += 1;
+        let current = grader.completed();
+        let completed = grader.observe(house.scene(), house.world(), action, outcome).then_some(current);
+        visit(house, ExpertStep { action, outcome, completed });
+    }
+    Ok(())
+}
