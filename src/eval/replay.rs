@@ -2,16 +2,20 @@
 //! do their targets appear where they were recorded?
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use anyhow::Context;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::agent::{Decision, Policy};
 use crate::data::Dataset;
 use crate::domain::task::SceneRef;
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Scene, Task, Trajectory, World};
+use crate::env::HouseEnvironment;
+use crate::episode::rollout::{Observer, Rollout, Tick};
 use crate::house::camera::projected_bounds;
 use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
@@ -214,15 +218,40 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
 
 /// The first action that an agent could not have taken because its target was out of view or reach, if there is one.
 fn unseen(scene: &Arc<Scene>, trajectory: &Trajectory) -> Option<String> {
-    let mut house = House::new(scene.clone(), trajectory.start.clone());
-    for (number, &action) in trajectory.actions.iter().enumerate() {
-        let mut by_rules = Replay::new(scene, house.world().clone(), std::slice::from_ref(&action));
-        let possible = by_rules.step().is_some_and(|(_, outcome)| outcome.is_done());
-        if let (true, Outcome::Impossible(reason)) = (possible, house.step(action)) {
-            return Some(format!("action {number}, {}: {reason}", action.kind));
+    /// Knows which action the rules alone would have allowed.
+    #[derive(Default)]
+    struct Sight {
+        possible: bool,
+        unseen: Option<String>,
+    }
+    impl Observer<HouseEnvironment> for Sight {
+        fn before(
+            &mut self,
+            rollout: &mut Rollout,
+            _policy: Option<&mut dyn Policy>,
+            decision: &Decision,
+        ) -> anyhow::Result<ControlFlow<()>> {
+            let house = &rollout.env.house;
+            let mut by_rules =
+                Replay::new(house.scene(), house.world().clone(), std::slice::from_ref(&decision.action));
+            self.possible = by_rules.step().is_some_and(|(_, outcome)| outcome.is_done());
+            Ok(ControlFlow::Continue(()))
+        }
+
+        fn after(&mut self, _rollout: &mut Rollout, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
+            let Tick { step, decision, outcome, .. } = tick;
+            if let (true, Outcome::Impossible(reason)) = (self.possible, outcome) {
+                self.unseen = Some(format!("action {}, {}: {reason}", step - 1, decision.action.kind));
+                return Ok(ControlFlow::Break(()));
+            }
+            Ok(ControlFlow::Continue(()))
         }
     }
-    None
+    let house = House::new(scene.clone(), trajectory.start.clone());
+    let mut rollout = Rollout::in_house(house, String::new(), None, None);
+    let mut sight = Sight::default();
+    rollout.replay(trajectory.actions.iter().copied(), &mut sight).ok()?;
+    sight.unseen
 }
 
 /// Marks an object and all it carries as moved.

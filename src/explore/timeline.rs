@@ -184,12 +184,12 @@ mod tests {
     #[test]
     fn events_are_what_one_jumps_to() {
         let mut engine = testing::engine();
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         for _ in 0..4 {
-            engine.act(Action::navigate(ActionType::LookDown));
+            engine.act(Action::navigate(ActionType::LookDown)).unwrap();
         }
         engine.instruct("dance").unwrap();
-        engine.act(Action::navigate(ActionType::RotateLeft));
+        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         let time = Timeline::of(engine.tree());
         let events: Vec<u32> =
             (1..).zip(&time.beats).filter(|(_, beat)| beat.is_event()).map(|(step, _)| step).collect();
@@ -205,11 +205,11 @@ mod tests {
     fn parted_branches_are_told_side_by_side() {
         let mut engine = testing::engine();
         let turn = |kind| Action::navigate(kind);
-        engine.act(turn(ActionType::RotateLeft));
-        engine.act(turn(ActionType::RotateLeft));
+        engine.act(turn(ActionType::RotateLeft)).unwrap();
+        engine.act(turn(ActionType::RotateLeft)).unwrap();
         engine.seek(1);
-        engine.act(turn(ActionType::RotateRight));
-        engine.act(turn(ActionType::LookUp));
+        engine.act(turn(ActionType::RotateRight)).unwrap();
+        engine.act(turn(ActionType::LookUp)).unwrap();
         let parted = engine.divergence(0);
         assert_eq!((parted.names.clone(), parted.shared), (["b1".into(), "main".into()], 1));
         assert_eq!(parted.rows.len(), 2);
