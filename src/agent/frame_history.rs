@@ -43,14 +43,14 @@ impl Default for FrameHistory {
 }
 
 impl Clone for FrameHistory {
-    /// The maps and what was told are shared, not copied: nothing ever writes into them.
+    /// The maps and what conditions it are shared, not copied: nothing ever writes into them.
     fn clone(&self) -> FrameHistory {
         FrameHistory {
             seen: self.seen.iter().map(Tensor::shallow_clone).collect(),
             seen_at: self.seen_at,
             last_image: self.last_image.clone(),
             loop_guard: self.loop_guard.clone(),
-            read: self.read.as_ref().map(|(text, told)| (text.clone(), told.shallow_clone())),
+            read: self.read.as_ref().map(|(text, conditioning)| (text.clone(), conditioning.shallow_clone())),
             rng: self.rng.clone(),
         }
     }
@@ -77,7 +77,7 @@ impl FrameHistory {
     pub fn look(&mut self, image: &[u8], step: u32) {
         let changed = self.last_image != image;
         if self.seen_at != Some(step) {
-            self.loop_guard.note(&self.last_image, changed);
+            self.loop_guard.record(&self.last_image, changed);
         }
         if changed {
             image.clone_into(&mut self.last_image);
@@ -109,24 +109,24 @@ impl FrameHistory {
         instruction: &str,
         condition: impl FnOnce() -> anyhow::Result<Tensor>,
     ) -> anyhow::Result<Tensor> {
-        if let Some((text, told)) = &self.read
+        if let Some((text, conditioning)) = &self.read
             && text == instruction
         {
-            return Ok(told.shallow_clone());
+            return Ok(conditioning.shallow_clone());
         }
-        let told = condition()?;
-        self.loop_guard.allow_all();
-        self.read = Some((instruction.to_string(), told.shallow_clone()));
-        Ok(told)
+        let conditioning = condition()?;
+        self.loop_guard.clear();
+        self.read = Some((instruction.to_string(), conditioning.shallow_clone()));
+        Ok(conditioning)
     }
 
     /// Decides from what the networks say, and remembers the choice. Nothing that the loop guard knows to repeat is chosen
     /// while there is something else.
     pub fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        let (candidates, tried) = self.loop_guard.open(&self.last_image, candidates);
+        let (candidates, tried) = self.loop_guard.untried(&self.last_image, candidates);
         let decision = select::decide(heads, &candidates, &tried, selection);
-        self.loop_guard.choose(decision.action, &candidates);
+        self.loop_guard.chose(decision.action, &candidates);
         decision
     }
 }

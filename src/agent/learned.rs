@@ -209,4 +209,4 @@ impl Policy for LearnedPolicy {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,5 +1,5 @@
-//! What keeps an agent from going in rounds. With a few frames of memory it would come to where it was, and do there what it
-//! did: a demonstrator never has to.
+//! What keeps an agent from repeating itself. With a few frames of memory it would come back to a view and do there what it
+//! did before, for ever: a demonstrator never has to.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -7,40 +7,40 @@ use std::hash::{DefaultHasher, Hasher};
 use crate::domain::{Action, ActionType, Class, Instance};
 use crate::house::view::Candidate;
 
-/// How a view can be left: what is done, and to which class of things.
-type Way = (ActionType, Option<Class>);
+/// An action as the guard remembers it: what is done, and to which class of things.
+type Tried = (ActionType, Option<Class>);
 
-/// How views were left, and what was put down.
+/// What was tried at each view, and what was put down.
 ///
-/// * No view is left twice in the same way until something is taken, put or cut, or another instruction is given: a wall that
-///   the agent stands before, a round that it goes, a door that it opens and shuts.
-/// * What it has put down it does not take up again before it has acted on something else.
+/// * At no view is the same action tried twice until something is picked up, put down or sliced, or another instruction is
+///   given: this ends pushing against a wall, walking in a circle, opening and closing a door.
+/// * What was put down is not picked up again before the agent has acted on something else.
 #[derive(Clone, Debug, Default)]
 pub struct LoopGuard {
-    /// How each view was left since something was last moved, by the view's digest.
-    left_by: HashMap<u64, Vec<Way>>,
+    /// What was tried at each view since something was last moved, by the view's digest.
+    tried_at: HashMap<u64, Vec<Tried>>,
     last: Option<(ActionType, Option<Candidate>)>,
     held: Option<Instance>,
     put_down: Option<Instance>,
 }
 
 impl LoopGuard {
-    /// Another instruction may lead the same way again.
-    pub fn allow_all(&mut self) {
-        self.left_by.clear();
+    /// Forgets what was tried: another instruction may ask for it again.
+    pub fn clear(&mut self) {
+        self.tried_at.clear();
         self.put_down = None;
     }
 
-    /// Notes what came of the last choice, which was made at `view`: whether the picture changed.
-    pub fn note(&mut self, view: &[u8], changed: bool) {
+    /// Records what came of the last action, which was chosen at `view`: whether the picture changed.
+    pub fn record(&mut self, view: &[u8], changed: bool) {
         let Some((kind, target)) = self.last else { return };
         if changed && kind.is_interaction() {
             self.acted(kind, target.map(|target| target.instance));
         }
         if changed && matches!(kind, ActionType::Pickup | ActionType::Put | ActionType::Slice) {
-            self.left_by.clear();
+            self.tried_at.clear();
         } else {
-            self.left_by.entry(digest(view)).or_default().push((kind, target.map(|target| target.class)));
+            self.tried_at.entry(digest(view)).or_default().push((kind, target.map(|target| target.class)));
         }
     }
 
@@ -52,19 +52,19 @@ impl LoopGuard {
         }
     }
 
-    /// Of the candidates at `view` those that lead no round, and how the view was left without any.
-    pub fn open(&self, view: &[u8], candidates: &[Candidate]) -> (Vec<Candidate>, Vec<ActionType>) {
-        let tried = self.left_by.get(&digest(view)).map_or(&[][..], Vec::as_slice);
+    /// Of the candidates at `view` those that repeat nothing, and the navigation that was tried there.
+    pub fn untried(&self, view: &[u8], candidates: &[Candidate]) -> (Vec<Candidate>, Vec<ActionType>) {
+        let tried = self.tried_at.get(&digest(view)).map_or(&[][..], Vec::as_slice);
         let is_new = |candidate: &&Candidate| {
             let undoes = candidate.kind == ActionType::Pickup && self.put_down == Some(candidate.instance);
             !undoes && !tried.contains(&(candidate.kind, Some(candidate.class)))
         };
-        let moves = tried.iter().filter(|way| way.1.is_none()).map(|way| way.0).collect();
+        let moves = tried.iter().filter(|tried| tried.1.is_none()).map(|tried| tried.0).collect();
         (candidates.iter().filter(is_new).copied().collect(), moves)
     }
 
-    /// Remembers what is done next.
-    pub fn choose(&mut self, action: Action, candidates: &[Candidate]) {
+    /// Remembers which action was chosen.
+    pub fn chose(&mut self, action: Action, candidates: &[Candidate]) {
         let named = candidates.iter().find(|candidate| candidate.action() == action);
         self.last = Some((action.kind, named.copied()));
     }
@@ -85,19 +85,19 @@ mod tests {
 
     #[derive(Default)]
     struct Walk {
-        rounds: LoopGuard,
+        guard: LoopGuard,
         view: Vec<u8>,
     }
 
     impl Walk {
-        /// Comes to a view and does the first thing that leads no round: a candidate, else a move in the order of the head.
+        /// Comes to a view and does the first thing that repeats nothing: a candidate, else a move in the order of the head.
         fn leave(&mut self, view: u8, candidates: &[Candidate]) -> ActionType {
-            self.rounds.note(&self.view, self.view != [view]);
+            self.guard.record(&self.view, self.view != [view]);
             self.view = vec![view];
-            let (candidates, tried) = self.rounds.open(&self.view, candidates);
+            let (candidates, tried) = self.guard.untried(&self.view, candidates);
             let untried = ActionType::ALL.into_iter().find(|kind| !kind.is_interaction() && !tried.contains(kind));
             let action = candidates.first().map_or_else(|| Action::navigate(untried.unwrap()), Candidate::action);
-            self.rounds.choose(action, &candidates);
+            self.guard.chose(action, &candidates);
             action.kind
         }
     }
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn no_view_is_left_twice_in_the_same_way_until_something_is_moved() {
+    fn nothing_is_tried_twice_at_a_view_until_something_is_moved() {
         let mut walk = Walk::default();
         let went: Vec<ActionType> = [7, 7, 8, 7, 8].into_iter().map(|view| walk.leave(view, &[])).collect();
         assert_eq!(went, [MoveAhead, RotateLeft, MoveAhead, RotateRight, RotateLeft]);
@@ -120,13 +120,13 @@ mod tests {
     fn another_instruction_allows_everything_again() {
         let mut walk = Walk::default();
         assert_eq!([walk.leave(7, &[]), walk.leave(7, &[])], [MoveAhead, RotateLeft]);
-        walk.rounds.allow_all();
+        walk.guard.clear();
         // The last way was taken before and is noted after.
         assert_eq!([walk.leave(7, &[]), walk.leave(7, &[])], [MoveAhead, RotateRight]);
     }
 
     #[test]
-    fn no_door_is_opened_and_shut_in_rounds() {
+    fn no_door_is_opened_and_closed_for_ever() {
         let door = |kind| [with(kind, Instance::Fixture(0), "Cabinet")];
         let mut walk = Walk::default();
         let (shut, open) = (7, 8);
@@ -145,7 +145,7 @@ mod tests {
         assert_eq!([walk.leave(3, &[keys]), walk.leave(4, &[keys])], [MoveAhead; 2]);
         // What only looks like it may be taken; and then the first again.
         assert_eq!([walk.leave(5, &[keys, others]), walk.leave(6, &[sofa])], [Pickup, Put]);
-        assert_eq!(walk.rounds.put_down, None, "not known until the next view");
+        assert_eq!(walk.guard.put_down, None, "not known until the next view");
         assert_eq!([walk.leave(8, &[others]), walk.leave(9, &[others, keys])], [MoveAhead, Pickup]);
         // A thing is put in, the door shut and opened: it may be taken out.
         let door = |kind| with(kind, Instance::Fixture(1), "Fridge");

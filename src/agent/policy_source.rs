@@ -12,7 +12,7 @@ use super::experts::expert::ExpertPolicy;
 use super::learned::LearnedPolicy;
 use super::policy::Policy;
 use super::random::RandomPolicy;
-use super::registry::{Agent, Loaded};
+use super::registry::{Loaded, NamedAgent};
 use crate::data::json;
 use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
@@ -45,8 +45,13 @@ impl PolicySource {
         PolicySource::plain("random", || Box::new(RandomPolicy::new()))
     }
 
+    /// A policy of that name, which `make` makes.
+    pub fn of(name: &str, make: Arc<MakePolicy>) -> PolicySource {
+        PolicySource { name: name.into(), checkpoint_hash: None, make, folder: None }
+    }
+
     fn plain(name: &str, make: fn() -> Box<dyn Policy>) -> PolicySource {
-        PolicySource { name: name.into(), checkpoint_hash: None, make: Arc::new(move || Ok(make())), folder: None }
+        PolicySource::of(name, Arc::new(move || Ok(make())))
     }
 
     /// A trained agent; all that are made share one sentence encoder. It draws its actions where `sampling`, else it takes the
@@ -133,7 +138,7 @@ pub fn find(
 }
 
 /// The agents that an explorer may let act: the named one first, then those that are found.
-pub fn agents(named: Option<&Path>) -> Vec<Agent> {
+pub fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
     let mut folders: Vec<PathBuf> = named.map(Path::to_owned).into_iter().chain(checkpoints()).collect();
     let mut seen = Vec::new();
     folders.retain(|folder| {
@@ -155,13 +160,13 @@ pub fn agents(named: Option<&Path>) -> Vec<Agent> {
             };
             Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
         };
-        Agent { name, load: Box::new(load) }
+        NamedAgent { name, load: Box::new(load) }
     };
     folders.into_iter().map(agent).collect()
 }
 
-/// The agent that is at home here: it acts when none is named.
-const OWN: &str = "sprint";
+/// The agent that acts when none is named.
+const DEFAULT: &str = "sprint";
 
 /// The agent that acts when none is named: the first that is found.
 pub fn shipped() -> anyhow::Result<PathBuf> {
@@ -170,7 +175,7 @@ pub fn shipped() -> anyhow::Result<PathBuf> {
     )
 }
 
-/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in: [`OWN`]
+/// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in: [`DEFAULT`]
 /// first, then by name.
 pub fn checkpoints() -> Vec<PathBuf> {
     let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
@@ -186,7 +191,7 @@ pub fn checkpoints() -> Vec<PathBuf> {
         let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path());
         let whole = |path: &PathBuf| path.join("config.json").is_file() && path.join("model.safetensors").is_file();
         let mut found: Vec<PathBuf> = entries.filter(whole).collect();
-        found.sort_by_key(|path| (path.file_name() != Some(OWN.as_ref()), path.clone()));
+        found.sort_by_key(|path| (path.file_name() != Some(DEFAULT.as_ref()), path.clone()));
         found
     };
     folders.iter().flat_map(in_folder).collect()

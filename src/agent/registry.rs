@@ -35,7 +35,7 @@ impl PolicyKind {
 
 /// What tells policies apart: a name, and the hash of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Who {
+pub struct PolicyIdentity {
     /// What it is called.
     pub name: String,
     /// SHA-256 of its checkpoint, where it has one.
@@ -54,7 +54,7 @@ pub struct Loaded {
 pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Loaded>>;
 
 /// An agent that may act.
-pub struct Agent {
+pub struct NamedAgent {
     /// The name of its checkpoint.
     pub name: String,
     /// Loads it.
@@ -63,13 +63,13 @@ pub struct Agent {
 
 /// Makes policies.
 pub struct Policies {
-    agents: Vec<Agent>,
+    agents: Vec<NamedAgent>,
     chosen: usize,
 }
 
 impl Policies {
     /// With these agents; the first acts.
-    pub fn new(agents: Vec<Agent>) -> Policies {
+    pub fn new(agents: Vec<NamedAgent>) -> Policies {
         Policies { agents, chosen: 0 }
     }
 

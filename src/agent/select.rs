@@ -106,7 +106,7 @@ fn classes_of(kind: ActionType, candidates: &[Candidate]) -> Vec<usize> {
     classes
 }
 
-/// How many object classes a mind lists.
+/// How many object classes a distribution lists.
 const LISTED: usize = 12;
 
 /// The likeliest classes before restriction, each with whether it is a candidate of the interaction at hand: the shown
@@ -228,10 +228,10 @@ mod tests {
                 );
                 let kind = decision.action.kind;
                 assert!(!kind.is_interaction() || kind == ActionType::Pickup);
-                let mind = decision.distribution.unwrap();
-                assert!(mind.actions[ActionType::Slice.index()].is_none());
-                let sum: f32 = mind.actions.iter().flatten().sum();
-                assert!((sum - 1.0).abs() < 1e-5 && mind.entropy >= 0.0);
+                let thought = decision.distribution.unwrap();
+                assert!(thought.actions[ActionType::Slice.index()].is_none());
+                let sum: f32 = thought.actions.iter().flatten().sum();
+                assert!((sum - 1.0).abs() < 1e-5 && thought.entropy >= 0.0);
             }
         }
     }
@@ -283,7 +283,8 @@ mod tests {
             [alone, weighed].map(|heads| decide(&heads, &candidates, &[], Selection::Greedy).distribution);
         let (before, after) = (before.unwrap(), after.unwrap());
         let times = |kind: ActionType| {
-            let odds = |mind: &ActionDistribution| mind.actions[kind.index()].unwrap() / mind.actions[1].unwrap();
+            let odds =
+                |thought: &ActionDistribution| thought.actions[kind.index()].unwrap() / thought.actions[1].unwrap();
             odds(&after) / odds(&before)
         };
         assert!(
@@ -343,7 +344,7 @@ mod tests {
     fn all_probability_on_masked_actions_leaves_a_uniform_choice() {
         let mut logits = vec![f32::NEG_INFINITY; ActionType::COUNT];
         logits[ActionType::Slice.index()] = 0.0;
-        let mind = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Greedy).distribution.unwrap();
-        assert_eq!(mind.actions[0], Some(0.2));
+        let thought = decide(&Heads::of(&logits, &objects("Mug")), &[], &[], Selection::Greedy).distribution.unwrap();
+        assert_eq!(thought.actions[0], Some(0.2));
     }
 }

@@ -27,14 +27,14 @@ pub struct ChoiceValue {
 }
 
 impl Values {
-    /// What a critic makes of an observation [1, ...] under what is told [1, ...], where there are these candidates.
+    /// What a critic makes of an observation [1, ...] under its conditioning [1, ...], where there are these candidates.
     ///
     /// # Errors
     /// When the critic's answer cannot be read.
     pub fn of(
         critic: &Critic,
         observation: &Tensor,
-        told: &Tensor,
+        conditioning: &Tensor,
         candidates: &[Candidate],
     ) -> anyhow::Result<Values> {
         let mut possible: Vec<(ActionType, Option<Class>)> =
@@ -49,7 +49,7 @@ impl Values {
             (kind.index() as i64, class.map_or(0, |class| class.index() as i64))
         };
         let pairs: Vec<(i64, i64)> = possible.iter().map(index).collect();
-        let (value, q) = critic.evaluate_actions(observation, told, &pairs);
+        let (value, q) = critic.evaluate_actions(observation, conditioning, &pairs);
         let q = Vec::<f32>::try_from(q.to_device(Device::Cpu))?;
         let choices = possible.into_iter().zip(q).map(|((kind, class), q)| ChoiceValue { kind, class, q }).collect();
         Ok(Values { state: value.double_value(&[0]) as f32, choices })

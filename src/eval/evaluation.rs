@@ -286,7 +286,7 @@ pub(crate) mod tests {
     }
 
     /// Three tasks in the test kitchen, and the folder that they live in.
-    fn tasks() -> (tempfile::TempDir, Document<TaskSet>) {
+    pub(crate) fn tasks() -> (tempfile::TempDir, Document<TaskSet>) {
         let folder = tempfile::tempdir().unwrap();
         let (scene, world) = kitchen();
         json::write(&folder.path().join(format!("{}.json", scene.name)), &*scene).unwrap();

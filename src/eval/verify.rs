@@ -406,8 +406,12 @@ impl Again<'_> {
 mod tests {
     use super::*;
     use crate::agent::RandomPolicy;
+    use crate::agent::learned::tests::undecided;
+    use crate::agent::policy_source::MakePolicy;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
     use crate::episode::branches::{Taken, Tree};
+    use crate::eval::evaluation::tests::{options, tasks};
+    use crate::eval::evaluation::{Evaluation, evaluate};
     use crate::explore::session_export;
     use crate::explore::session_export::SessionExport;
     use crate::house::testing::kitchen;
@@ -502,5 +506,31 @@ mod tests {
         let run = Recorded::open(&path, None).unwrap();
         let verdict = verify(&run, &mut |_| Ok(None), 1, &mut |_| ()).unwrap();
         assert_eq!((verdict.steps, verdict.choices, verdict.missing), (8, 0, vec!["random".to_string()]));
+    }
+
+    #[test]
+    fn an_evaluation_by_any_number_of_threads_verifies_bit_for_bit_near_ties_included() {
+        let _chance = crate::nets::testing::chance();
+        if undecided().is_none() {
+            return;
+        }
+        crate::nets::device::set_threads(1);
+        let make: Arc<MakePolicy> = Arc::new(|| Ok(Box::new(undecided().context("no sentence encoder")?)));
+        let source = PolicySource::of("undecided", make.clone());
+        let (folder, set) = tasks();
+        let file = folder.path().join("tasks.json");
+        for jobs in [1, 2, 3] {
+            let path = folder.path().join(format!("run-{jobs}"));
+            let options = Options { jobs, ..options() };
+            let scenes = Scenes::of(&file, &set.value);
+            let evaluation = Evaluation::prepare(&set, scenes, options, "undecided", None).unwrap();
+            let mut run_folder = RunFolder::open(&path, evaluation.manifest()).unwrap();
+            let stop = Arc::new(AtomicBool::new(false));
+            evaluate(&evaluation, &make, &mut run_folder, &stop, &mut |_| ()).unwrap();
+            let run = Recorded::open(&path, Some(&file)).unwrap();
+            let verdict = verify(&run, &mut |_| Ok(Some(source.clone())), 4 - jobs, &mut |_| ()).unwrap();
+            assert!(verdict.is_equal() && verdict.episodes == 12, "{jobs} jobs: {verdict:?}");
+            assert_eq!(verdict.choices, verdict.steps);
+        }
     }
 }

@@ -4,14 +4,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::worker::Report;
 use crate::agent::Policy;
-use crate::agent::registry::Who;
+use crate::agent::registry::PolicyIdentity;
 use crate::analysis::chain::{Chain, ChainRun, Draws, LinkSuccess, trials};
 
 /// What is known of a chain so far, followed by one policy.
 #[derive(Clone, Debug, Default)]
 pub struct Chained {
-    /// Who follows it.
-    pub who: Who,
+    /// PolicyIdentity follows it.
+    pub who: PolicyIdentity,
     /// The instructions.
     pub links: Vec<String>,
     /// The digest of the state in which it begins.
@@ -28,7 +28,7 @@ pub struct Chained {
 
 impl Chained {
     /// Nothing is known yet.
-    pub fn new(chain: &Chain, who: Who) -> Chained {
+    pub fn new(chain: &Chain, who: PolicyIdentity) -> Chained {
         Chained {
             who,
             links: chain.links.clone(),

@@ -43,6 +43,21 @@ fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
     LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
 }
 
+/// A fresh agent whose logits are all but equal, so that whatever rounds otherwise decides otherwise; nothing where there is no
+/// sentence encoder.
+pub(crate) fn undecided() -> Option<LearnedPolicy> {
+    tch::manual_seed(7);
+    let agent = fresh(None)?;
+    tch::no_grad(|| {
+        for (_, mut weight) in
+            agent.networks.policy_store.variables().into_iter().filter(|(name, _)| name.contains("out"))
+        {
+            let _ = weight.g_mul_scalar_(1e-7);
+        }
+    });
+    Some(agent)
+}
+
 fn shipped(name: &str) -> Option<LearnedPolicy> {
     device::set_threads(1);
     let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
@@ -101,13 +116,13 @@ fn what_a_decision_was_weighed_by_is_what_the_critic_says() {
 #[test]
 fn an_agent_says_how_much_of_an_instruction_it_reads() {
     let _chance = crate::nets::testing::chance();
-    let Some(mut told) = fresh(None) else { return };
-    let read = told.reading("take the mug").unwrap();
+    let Some(mut agent) = fresh(None) else { return };
+    let read = agent.reading("take the mug").unwrap();
     assert!(read.tokens > 3 && read.cut == 0, "{read:?}");
     assert_eq!(fresh(Some([4; 4])).unwrap().reading("take the mug"), None, "it is shown its goal");
-    told.config.policy.attention = Some(AttentionSpec { words: 9, layers: 1, heads: 1, inner: 4 });
-    assert_eq!(told.reading("take the mug"), Some(Reading { tokens: 3, cut: 0 }));
-    assert_eq!(told.reading(&"mug ".repeat(130)), Some(Reading { tokens: 128, cut: 2 }));
+    agent.config.policy.attention = Some(AttentionSpec { words: 9, layers: 1, heads: 1, inner: 4 });
+    assert_eq!(agent.reading("take the mug"), Some(Reading { tokens: 3, cut: 0 }));
+    assert_eq!(agent.reading(&"mug ".repeat(130)), Some(Reading { tokens: 128, cut: 2 }));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
 use super::Plain;
-use crate::agent::registry::{Loaded, Who};
+use crate::agent::registry::{Loaded, PolicyIdentity};
 use crate::analysis::chain::{ChainRun, Draws, LinkRate, LinkSuccess};
 use crate::analysis::value_map::survey;
 use crate::explore::chained::Chained;
@@ -22,7 +22,9 @@ impl Plain {
         };
         let own = self.engine.who();
         let (who, mut policy) = match rival {
-            Some(Loaded { policy, checkpoint }) => (Who { name: policy.name().to_string(), checkpoint }, policy),
+            Some(Loaded { policy, checkpoint }) => {
+                (PolicyIdentity { name: policy.name().to_string(), checkpoint }, policy)
+            }
             None => (own.clone(), self.engine.another_policy()?),
         };
         anyhow::ensure!(

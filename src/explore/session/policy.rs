@@ -1,8 +1,8 @@
-//! Who decides: which policy, which checkpoint, which chance.
+//! PolicyIdentity decides: which policy, which checkpoint, which chance.
 
 use super::Session;
 use crate::agent::Policy;
-use crate::agent::registry::{Loaded, PolicyKind, Who};
+use crate::agent::registry::{Loaded, PolicyIdentity, PolicyKind};
 use crate::episode::record::Author;
 
 impl Session {
@@ -72,11 +72,11 @@ impl Session {
     }
 
     /// What tells the policy that decides from others.
-    pub fn who(&self) -> Who {
-        Who { name: self.author.policy.clone(), checkpoint: self.author.checkpoint.clone() }
+    pub fn who(&self) -> PolicyIdentity {
+        PolicyIdentity { name: self.author.policy.clone(), checkpoint: self.author.checkpoint.clone() }
     }
 
-    /// Who decides, and by which chance.
+    /// PolicyIdentity decides, and by which chance.
     pub fn author(&self) -> &Author {
         &self.author
     }

@@ -6,20 +6,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Report, Worker};
 use crate::agent::Policy;
-use crate::agent::registry::{Loaded, Who};
+use crate::agent::registry::{Loaded, PolicyIdentity};
 use crate::analysis::chain::Draws;
 use crate::analysis::value_map::{ValueMap, survey};
 use crate::domain::{Heading, Scene, World};
 use crate::explore::chained::Chained;
 
 /// Finished surveys by who was asked, what it was told, and the house without the agent.
-pub(crate) type Surveys = Arc<Mutex<HashMap<(Who, String, String), Arc<ValueMap>>>>;
+pub(crate) type Surveys = Arc<Mutex<HashMap<(PolicyIdentity, String, String), Arc<ValueMap>>>>;
 
 /// The policy that worked in the background last: loading one takes a while.
-pub(crate) type Spare = Arc<Mutex<Option<(Who, Box<dyn Policy>)>>>;
+pub(crate) type Spare = Arc<Mutex<Option<(PolicyIdentity, Box<dyn Policy>)>>>;
 
 /// What is known of the chain, by each policy that followed it.
-pub(crate) type Followed = Arc<Mutex<HashMap<Who, Chained>>>;
+pub(crate) type Followed = Arc<Mutex<HashMap<PolicyIdentity, Chained>>>;
 
 /// Work on a thread of its own, one at a time.
 #[derive(Default)]
@@ -156,7 +156,7 @@ impl<T: Fn(Report) -> bool + Send + Sync + 'static> Worker<T> {
         let own = self.engine.who();
         let mut runs = Vec::new();
         if let Some(Loaded { policy, checkpoint }) = rival {
-            let who = Who { name: policy.name().to_string(), checkpoint };
+            let who = PolicyIdentity { name: policy.name().to_string(), checkpoint };
             if who == own {
                 return (self.tell)(Report::Refused(format!("{} acts already: name another", who.name)));
             }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use termprofile::TermProfile;
 
-use crate::agent::registry::{PolicyKind, Who};
+use crate::agent::registry::{PolicyIdentity, PolicyKind};
 use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
 use crate::analysis::value_map::{CellValue, Measure, ValueMap};
 use crate::domain::{Action, ActionType, World};
@@ -289,7 +289,7 @@ fn chained(name: &str, second: bool, by_value: bool) -> Chained {
         in_force: (0..23).map(|step| usize::from(step >= 9)).collect(),
     };
     Chained {
-        who: Who { name: name.into(), checkpoint: Some(name.into()) },
+        who: PolicyIdentity { name: name.into(), checkpoint: Some(name.into()) },
         links: vec!["Pick up the knife.".into(), "Slice the tomato.".into(), "Put a slice in the fridge.".into()],
         start: "a kitchen".into(),
         graded: true,
