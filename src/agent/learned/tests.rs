@@ -49,10 +49,11 @@ pub(crate) fn undecided() -> Option<LearnedPolicy> {
     tch::manual_seed(7);
     let agent = fresh(None)?;
     tch::no_grad(|| {
-        for (_, mut weight) in
-            agent.networks.policy_store.variables().into_iter().filter(|(name, _)| name.contains("out"))
-        {
-            let _ = weight.g_mul_scalar_(1e-7);
+        let is_head = |name: &str| name.starts_with("actions") || name.starts_with("objects");
+        for (name, mut weight) in agent.networks.policy_store.variables() {
+            if is_head(&name) {
+                let _ = weight.g_mul_scalar_(1e-7);
+            }
         }
     });
     Some(agent)
