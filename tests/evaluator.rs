@@ -113,17 +113,17 @@ fn every_file_satisfies_its_schema() {
     assert!(progress.len() > 10);
     progress.into_iter().for_each(|line| satisfies("progress", line));
     let summary: Value = serde_json::from_str(&sprint.read("b/summary.json")).unwrap();
-    // 4 tasks, 2 seeds: 5 wordings and one later start each; the expert, who reads no words, solves them all.
+    // 4 tasks, 2 seeds: 5 instruction variants and one later start each; the expert, who reads no words, solves them all.
     assert_eq!(sprint.read("b/episodes.jsonl").lines().count(), 4 * 2 * 6);
     assert_eq!((&summary["episodes"], &summary["success"]), (&Value::from(8), &Value::from(1.0)));
-    assert_eq!(summary["language"]["emptied"]["successes"], 8);
-    assert_eq!(summary["starts"]["1"]["first"]["completed"], 8);
+    assert_eq!(summary["instruction_variants"]["empty"]["successes"], 8);
+    assert_eq!(summary["start_subtasks"]["1"]["first_subtask"]["completed"], 8);
     let page = sprint.read("b/summary.md");
-    assert!(page.contains("| told in words") && page.contains("| from subtask"), "{page}");
+    assert!(page.contains("| instruction variant") && page.contains("| start subtask"), "{page}");
     assert!(page.contains("Wilson") && page.contains("bootstrap over tasks"), "both methods are named");
-    for line in sprint.read("b/episodes.jsonl").lines().filter(|line| line.contains("\"from\":1")) {
+    for line in sprint.read("b/episodes.jsonl").lines().filter(|line| line.contains("\"start_subtask\":1")) {
         let episode: Value = serde_json::from_str(line).unwrap();
-        let (prefix, steps) = (episode["prefix"].as_u64().unwrap(), episode["steps"].as_u64().unwrap());
+        let (prefix, steps) = (episode["prefix_steps"].as_u64().unwrap(), episode["steps"].as_u64().unwrap());
         assert_eq!((prefix + steps) as usize, episode["trace"].as_array().unwrap().len());
         assert_eq!(episode["of"], 1);
     }

@@ -80,7 +80,7 @@ impl Open {
         let (at, task, _) = recorded.setting(&recorded.episodes[reference.episode])?;
         let (task, episode) = (task.clone(), recorded.episodes[reference.episode].clone());
         let author = recorded.author(at, &episode);
-        let first = episode.trace.iter().filter_map(|step| step.by.as_ref()).find(|by| !by.is_hand());
+        let first = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
         let acts = first.cloned().unwrap_or_else(|| author.clone());
         let kind = kind_of(&acts);
         let checkpoint = self.checkpoint.clone();

@@ -14,7 +14,7 @@ use super::{Ending, streams};
 use crate::agent::policy_source::PolicySource;
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
-use crate::episode::instruction_variant::told;
+use crate::episode::instruction_variant::task_instruction;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
 use crate::eval::options::Options;
@@ -210,7 +210,7 @@ impl Show {
         match wanted {
             None => {
                 for (number, task) in (1..).zip(&set.tasks) {
-                    writeln!(out, "{number:>4}  {}  [{}]", told(task, false), task.id)?;
+                    writeln!(out, "{number:>4}  {}  [{}]", task_instruction(task, false), task.id)?;
                 }
             }
             Some(wanted) => {
@@ -227,7 +227,7 @@ fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()
     let setting = scenes.setting(task)?;
     let (scene, world) = (&setting.scene, &setting.world);
     writeln!(out, "task         {}", task.id)?;
-    writeln!(out, "instruction  {}", told(task, false))?;
+    writeln!(out, "instruction  {}", task_instruction(task, false))?;
     writeln!(out, "scene        {} ({})", scene.name, scene.room.spoken())?;
     let pose = world.agent;
     let (x, z) = (f64::from(pose.cell.x) / 4.0, f64::from(pose.cell.z) / 4.0);

@@ -41,7 +41,7 @@ impl Verify {
             policy_source::find(
                 author.policy.as_str(),
                 author.checkpoint.as_deref(),
-                author.samples,
+                author.sampling,
                 self.checkpoint.as_deref(),
             )
         };

@@ -91,7 +91,7 @@ impl FrameSequence {
         let mut recorded = (1..).zip(&episode.trace);
         let mut record = AfterEach(|rollout: &mut Rollout, tick: &Tick| {
             let Some((number, step)) = recorded.next() else { return Ok(ControlFlow::Break(())) };
-            if let Some(text) = &step.told {
+            if let Some(text) = &step.instruction {
                 told.clone_from(text);
             }
             let outcome = tick.outcome;
@@ -157,8 +157,8 @@ pub(crate) mod tests {
                 class: None,
                 outcome: Outcome::Done,
                 subtask: (kind == ActionType::LookUp).then_some(0),
-                told: None,
-                by: None,
+                instruction: None,
+                author: None,
             })
             .collect();
         let episode = Episode {

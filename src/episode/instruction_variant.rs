@@ -1,4 +1,4 @@
-//! What the agent is told of a task: its own words, or others that show whether it listens.
+//! The instruction an agent gets for a task: the task's own, or a variant that shows whether the agent listens to it.
 
 use std::collections::BTreeSet;
 
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 use crate::domain::Task;
 use crate::language::{instruction, phrases};
 
-/// Whose words the agent hears.
+/// How the instruction is derived from the task's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum InstructionVariant {
     /// The task's own.
     #[default]
-    Own,
-    /// Those of another task of the set.
+    Original,
+    /// Another task's of the set.
     Swapped,
     /// Nothing at all.
-    Emptied,
+    Empty,
     /// The task's own words in another order.
     Shuffled,
     /// The same task in the words of the program's grammar.
@@ -28,34 +28,34 @@ pub enum InstructionVariant {
 }
 
 impl InstructionVariant {
-    /// Every wording, the task's own first.
+    /// Every variant, the task's own first.
     pub const ALL: [InstructionVariant; 5] = [
-        InstructionVariant::Own,
+        InstructionVariant::Original,
         InstructionVariant::Swapped,
-        InstructionVariant::Emptied,
+        InstructionVariant::Empty,
         InstructionVariant::Shuffled,
         InstructionVariant::Paraphrased,
     ];
 
     /// Whether it is the task's own.
-    pub fn is_own(&self) -> bool {
-        *self == InstructionVariant::Own
+    pub fn is_original(&self) -> bool {
+        *self == InstructionVariant::Original
     }
 
     /// What it is called in files and reports.
     pub fn name(self) -> &'static str {
         match self {
-            InstructionVariant::Own => "own",
+            InstructionVariant::Original => "original",
             InstructionVariant::Swapped => "swapped",
-            InstructionVariant::Emptied => "emptied",
+            InstructionVariant::Empty => "empty",
             InstructionVariant::Shuffled => "shuffled",
             InstructionVariant::Paraphrased => "paraphrased",
         }
     }
 }
 
-/// The task's instruction, or all its steps, each normalised, in one line.
-pub fn told(task: &Task, step_by_step: bool) -> String {
+/// The task's own instruction, or all its steps, each normalised, in one line.
+pub fn task_instruction(task: &Task, step_by_step: bool) -> String {
     if step_by_step {
         task.sentences.iter().map(|sentence| instruction::normalise(sentence)).collect::<Vec<_>>().join(" ")
     } else {
@@ -63,15 +63,21 @@ pub fn told(task: &Task, step_by_step: bool) -> String {
     }
 }
 
-/// What the agent is told of the task at `index`; `chance` drives what is drawn.
-pub fn say(tasks: &[Task], index: usize, wording: InstructionVariant, step_by_step: bool, chance: u64) -> String {
+/// The instruction for the task at `index`; `rng_seed` drives what is drawn.
+pub fn instruction_for(
+    tasks: &[Task],
+    index: usize,
+    variant: InstructionVariant,
+    step_by_step: bool,
+    rng_seed: u64,
+) -> String {
     let task = &tasks[index];
-    let own = told(task, step_by_step);
-    let mut rng = ChaCha8Rng::seed_from_u64(chance);
-    match wording {
-        InstructionVariant::Own => own,
+    let own = task_instruction(task, step_by_step);
+    let mut rng = ChaCha8Rng::seed_from_u64(rng_seed);
+    match variant {
+        InstructionVariant::Original => own,
         InstructionVariant::Swapped => swapped(tasks, index, step_by_step).unwrap_or(own),
-        InstructionVariant::Emptied => String::new(),
+        InstructionVariant::Empty => String::new(),
         InstructionVariant::Shuffled => shuffled(&own, &mut rng),
         InstructionVariant::Paraphrased => {
             let mut said = String::new();
@@ -87,16 +93,16 @@ pub fn say(tasks: &[Task], index: usize, wording: InstructionVariant, step_by_st
     }
 }
 
-/// The words of the next task that is told something else.
+/// The instruction of the next task that has another one.
 fn swapped(tasks: &[Task], index: usize, step_by_step: bool) -> Option<String> {
-    let own = told(&tasks[index], step_by_step);
-    let others = (1..tasks.len()).map(|ahead| told(&tasks[(index + ahead) % tasks.len()], step_by_step));
+    let own = task_instruction(&tasks[index], step_by_step);
+    let others = (1..tasks.len()).map(|ahead| task_instruction(&tasks[(index + ahead) % tasks.len()], step_by_step));
     others.into_iter().find(|other| *other != own)
 }
 
-/// Whether some task of the set is told something else than another.
+/// Whether the instructions of the set differ, so that they can be swapped.
 pub fn can_swap(tasks: &[Task], step_by_step: bool) -> bool {
-    tasks.iter().map(|task| told(task, step_by_step)).collect::<BTreeSet<_>>().len() > 1
+    tasks.iter().map(|task| task_instruction(task, step_by_step)).collect::<BTreeSet<_>>().len() > 1
 }
 
 fn shuffled(own: &str, rng: &mut ChaCha8Rng) -> String {
@@ -124,18 +130,18 @@ mod tests {
     fn every_wording_says_what_it_should_and_the_same_each_time() {
         let mut tasks = sample_set().tasks;
         tasks[1].instruction = "Heat the potato.".into();
-        let say = |wording, chance| say(&tasks, 0, wording, false, chance);
-        assert_eq!(say(InstructionVariant::Own, 1), "Put the apple in the fridge.");
+        let say = |variant, chance| instruction_for(&tasks, 0, variant, false, chance);
+        assert_eq!(say(InstructionVariant::Original, 1), "Put the apple in the fridge.");
         assert_eq!(say(InstructionVariant::Swapped, 1), "Heat the potato.");
-        assert_eq!(say(InstructionVariant::Emptied, 1), "");
+        assert_eq!(say(InstructionVariant::Empty, 1), "");
         let mut words: Vec<String> =
             say(InstructionVariant::Shuffled, 1).to_lowercase().replace('.', "").split(' ').map(String::from).collect();
         words.sort();
         assert_eq!(words, ["apple", "fridge", "in", "put", "the", "the"]);
         for chance in 0..20 {
-            for wording in [InstructionVariant::Shuffled, InstructionVariant::Paraphrased] {
-                assert_eq!(say(wording, chance), say(wording, chance));
-                assert_ne!(say(wording, chance), say(InstructionVariant::Own, chance), "{wording:?}");
+            for variant in [InstructionVariant::Shuffled, InstructionVariant::Paraphrased] {
+                assert_eq!(say(variant, chance), say(variant, chance));
+                assert_ne!(say(variant, chance), say(InstructionVariant::Original, chance), "{variant:?}");
             }
         }
         assert!(say(InstructionVariant::Paraphrased, 3).to_lowercase().contains("apple"));
@@ -154,7 +160,7 @@ mod tests {
         let mut task = sample_set().tasks.remove(0);
         task.instruction = "  put it   AWAY".into();
         task.sentences = vec!["take   it".into(), "drop it!".into()];
-        assert_eq!(told(&task, false), "Put it away.");
-        assert_eq!(told(&task, true), "Take it. Drop it!");
+        assert_eq!(task_instruction(&task, false), "Put it away.");
+        assert_eq!(task_instruction(&task, true), "Take it. Drop it!");
     }
 }

@@ -18,15 +18,15 @@ pub struct Episode {
     pub task: String,
     /// Which of the run's seeds.
     pub seed: u64,
-    /// Whose words the agent heard.
-    #[serde(default, skip_serializing_if = "InstructionVariant::is_own")]
-    pub wording: InstructionVariant,
+    /// How the instruction was derived from the task's own; the task's own where absent.
+    #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
+    pub variant: InstructionVariant,
     /// The subtask from which the agent acted; the expert did those before.
     #[serde(default, skip_serializing_if = "is_zero")]
-    pub from: u32,
+    pub start_subtask: u32,
     /// Fingerprint of the world at the start.
     pub start_hash: String,
-    /// What the agent was told.
+    /// The instruction at the start, as the agent got it.
     pub instruction: String,
     /// How many subtasks the agent completed.
     pub completed: u32,
@@ -46,7 +46,7 @@ pub struct Episode {
     pub attempts: u32,
     /// How many of the trace's steps the expert took first.
     #[serde(default, skip_serializing_if = "is_zero")]
-    pub prefix: u32,
+    pub prefix_steps: u32,
     /// What was done, step by step.
     pub trace: Vec<Step>,
 }
@@ -58,20 +58,20 @@ pub struct Key {
     pub task: String,
     /// Which seed.
     pub seed: u64,
-    /// Whose words.
-    pub wording: InstructionVariant,
+    /// How the instruction was derived from the task's own.
+    pub variant: InstructionVariant,
     /// From which subtask.
-    pub from: u32,
+    pub start_subtask: u32,
 }
 
 impl std::fmt::Display for Key {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "task {:?} and seed {}", self.task, self.seed)?;
-        if !self.wording.is_own() {
-            write!(f, " ({})", self.wording.name())?;
+        if !self.variant.is_original() {
+            write!(f, " ({})", self.variant.name())?;
         }
-        if self.from > 0 {
-            write!(f, " from subtask {}", self.from)?;
+        if self.start_subtask > 0 {
+            write!(f, " from subtask {}", self.start_subtask)?;
         }
         Ok(())
     }
@@ -80,12 +80,12 @@ impl std::fmt::Display for Key {
 impl Episode {
     /// What tells it apart from others of its run.
     pub fn key(&self) -> Key {
-        Key { task: self.task.clone(), seed: self.seed, wording: self.wording, from: self.from }
+        Key { task: self.task.clone(), seed: self.seed, variant: self.variant, start_subtask: self.start_subtask }
     }
 
-    /// Whether it was played as the task asks: from its start, in its own words.
+    /// Whether it was played as the task asks: from its start, with its own instruction.
     pub fn is_plain(&self) -> bool {
-        self.wording.is_own() && self.from == 0
+        self.variant.is_original() && self.start_subtask == 0
     }
 
     /// 1 for a success, else 0.
@@ -118,10 +118,10 @@ fn once() -> u32 {
 #[serde(deny_unknown_fields)]
 pub struct Step {
     /// What was done.
-    #[serde(rename = "do")]
+    #[serde(rename = "action")]
     pub kind: ActionType,
     /// To what.
-    #[serde(rename = "to", default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<Instance>,
     /// The target's class.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -131,12 +131,12 @@ pub struct Step {
     /// The subtask that it completed, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subtask: Option<u32>,
-    /// What the agent was told from this step on, where that changed.
+    /// The instruction from this step on, where it changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub told: Option<String>,
+    pub instruction: Option<String>,
     /// Who chose from this step on, where that changed; without any, the run's policy did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub by: Option<Author>,
+    pub author: Option<Author>,
 }
 
 /// Who chose a step of an explored episode.
@@ -150,9 +150,9 @@ pub struct Author {
     pub checkpoint: Option<String>,
     /// The seed of its chance.
     pub seed: u64,
-    /// It drew its actions by chance instead of taking the likeliest.
+    /// It drew its actions from its distribution instead of taking the likeliest.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub samples: bool,
+    pub sampling: bool,
 }
 
 impl Author {
@@ -161,7 +161,7 @@ impl Author {
 
     /// A person.
     pub fn hand() -> Author {
-        Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, samples: false }
+        Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, sampling: false }
     }
 
     /// Whether a person chose.
@@ -186,8 +186,8 @@ impl Step {
             class: action.target.and_then(|target| rollout.env.class_of(target)),
             outcome: tick.outcome,
             subtask: tick.completed_one.then(|| completed.saturating_sub(1)),
-            told: None,
-            by: None,
+            instruction: None,
+            author: None,
         }
     }
 }

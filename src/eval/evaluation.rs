@@ -65,7 +65,7 @@ impl Evaluation {
         let scenes_hash = scenes.check(&tasks)?;
         let manifest = Manifest {
             format_version: Manifest::FORMAT,
-            sprint: env!("CARGO_PKG_VERSION").into(),
+            sprint_version: env!("CARGO_PKG_VERSION").into(),
             task_set: set.value.name.clone(),
             task_set_hash: set.digest.clone(),
             scenes_hash,
@@ -76,8 +76,8 @@ impl Evaluation {
             grader: options.grading,
             step_by_step: options.step_by_step,
             sampling: options.sampling,
-            language: options.language,
-            every_start: options.every_start,
+            instruction_variants: options.language,
+            all_start_subtasks: options.every_start,
             shard: options.shard,
         };
         manifest.check()?;

@@ -31,10 +31,16 @@ impl InFlight {
         let episode = Episode {
             task: task.id.clone(),
             seed: spec.seed,
-            wording: spec.wording,
-            from: spec.from,
-            instruction: instruction_variant::say(&evaluation.tasks, spec.task, spec.wording, step_by_step, chance),
-            of: (task.subtasks.len() as u32).saturating_sub(spec.from),
+            variant: spec.variant,
+            start_subtask: spec.start_subtask,
+            instruction: instruction_variant::instruction_for(
+                &evaluation.tasks,
+                spec.task,
+                spec.variant,
+                step_by_step,
+                chance,
+            ),
+            of: (task.subtasks.len() as u32).saturating_sub(spec.start_subtask),
             attempts: spec.attempts + 1,
             ..Episode::default()
         };
@@ -56,7 +62,7 @@ impl InFlight {
     /// The record of what it came to.
     pub fn close(mut self, evaluation: &EvaluationPlan) -> Episode {
         let episode = &mut self.episode;
-        let own = &episode.trace[(episode.prefix as usize).min(episode.trace.len())..];
+        let own = &episode.trace[(episode.prefix_steps as usize).min(episode.trace.len())..];
         episode.steps = own.len() as u32;
         episode.completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
         episode.success = episode.error.is_none() && episode.completed == episode.of;

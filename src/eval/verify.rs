@@ -115,7 +115,7 @@ impl Recorded {
             policy: self.manifest.policy.clone(),
             checkpoint: self.manifest.checkpoint_hash.clone(),
             seed: policy_seed(task, episode.seed),
-            samples: self.manifest.sampling,
+            sampling: self.manifest.sampling,
         }
     }
 }
@@ -200,7 +200,7 @@ fn evaluated_again(
         return Ok(again);
     }
     let Manifest { policy, checkpoint_hash, sampling, .. } = run.manifest.clone();
-    let author = Author { policy, checkpoint: checkpoint_hash, seed: 0, samples: sampling };
+    let author = Author { policy, checkpoint: checkpoint_hash, seed: 0, sampling };
     let Some(source) = find(&author)? else { return Ok(again) };
     let plan = EvaluationPlan {
         tasks: run.tasks.clone().into(),
@@ -223,7 +223,7 @@ fn evaluated_again(
 
 /// Whether a person explored it: its first step says who chose.
 fn is_explored(episode: &Episode) -> bool {
-    episode.trace.first().is_some_and(|step| step.by.is_some())
+    episode.trace.first().is_some_and(|step| step.author.is_some())
 }
 
 impl Verdict {
@@ -237,7 +237,7 @@ impl Verdict {
             return texts("instruction", &recorded.instruction, &found.instruction);
         }
         for (number, step) in (1..).zip(&recorded.trace) {
-            let is_choice = number > recorded.prefix;
+            let is_choice = number > recorded.prefix_steps;
             let Some(again) = found.trace.get(number as usize - 1) else {
                 let why = found.error.clone().unwrap_or_else(|| "the episode is over".into());
                 return Some((number, "choice", format!("{:?}", step.action()), why));
@@ -264,7 +264,7 @@ fn counts(episode: &Episode) -> String {
 
 /// What an episode's own steps come to.
 fn result_of(episode: &Episode) -> String {
-    let own = episode.trace.get(episode.prefix as usize..).unwrap_or_default();
+    let own = episode.trace.get(episode.prefix_steps as usize..).unwrap_or_default();
     let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
     let success = episode.error.is_none() && episode.of > 0 && completed == episode.of;
     counts(&Episode { completed, steps: own.len() as u32, success, ..Episode::default() })
@@ -334,28 +334,28 @@ impl Again<'_> {
         let mut rollout = Rollout::in_house(house, episode.instruction.clone(), grader, None);
         let mut policy: Option<Box<dyn Policy>> = None;
         let mut summoned: Option<Author> = None;
-        let named = episode.trace.iter().filter_map(|step| step.by.as_ref()).find(|by| !by.is_hand());
-        let first = match episode.trace.first().and_then(|step| step.by.as_ref()) {
+        let named = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
+        let first = match episode.trace.first().and_then(|step| step.author.as_ref()) {
             None => Some(author.clone()),
             Some(_) => named.cloned(),
         };
         let mut past: VecDeque<Moment> = VecDeque::new();
         for (number, recorded) in (1..).zip(&episode.trace) {
-            if number <= episode.prefix {
+            if number <= episode.prefix_steps {
                 // The expert led here, unseen by the run's policy.
                 if let Some(found) = self.act(&mut rollout, number, recorded)? {
                     return Ok(Some(found));
                 }
                 continue;
             }
-            if let Some(told) = &recorded.told {
+            if let Some(told) = &recorded.instruction {
                 let own = instruction::normalise(&task.instruction) == instruction::normalise(told);
                 rollout.instruction.clone_from(told);
                 if !own {
                     rollout.env.grader = None;
                 }
             }
-            if let Some(by) = &recorded.by {
+            if let Some(by) = &recorded.author {
                 author = by.clone();
             }
             // While a person acts, the policy before (or the first one to come) looks on.
@@ -430,7 +430,7 @@ mod tests {
             Rollout::in_house(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
         let mut policy = RandomPolicy::new();
         policy.reset(0, 9);
-        let random = Author { policy: "random".into(), checkpoint: None, seed: 9, samples: false };
+        let random = Author { policy: "random".into(), checkpoint: None, seed: 9, sampling: false };
         let mut tree = Tree::new(Moment::of(&rollout, &random, policy.state(0)));
         for step in 0..8 {
             if step == 5 {

@@ -207,9 +207,9 @@ fn start(executor: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyho
     let house = House::new(setting.scene, setting.world);
     let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));
     let mut rollout = Rollout::new(env, episode.instruction.clone(), Some(task.horizon));
-    if spec.from > 0 {
-        lead(&mut rollout, spec.from, episode)?;
-        rollout.horizon = Some(episode.prefix + task.horizon);
+    if spec.start_subtask > 0 {
+        lead(&mut rollout, spec.start_subtask, episode)?;
+        rollout.horizon = Some(episode.prefix_steps + task.horizon);
     }
     Ok(rollout)
 }
@@ -221,7 +221,7 @@ fn lead(rollout: &mut AnyRollout, from: u32, episode: &mut Episode) -> anyhow::R
     let reached = |rollout: &AnyRollout| rollout.env.grading().is_none_or(|(completed, _)| completed >= from as usize);
     let mut record = AfterEach(|rollout: &mut AnyRollout, tick: &_| {
         episode.trace.push(Step::of(tick, rollout));
-        episode.prefix += 1;
+        episode.prefix_steps += 1;
         Ok(if reached(rollout) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     });
     rollout.run(&mut expert, &mut record).with_context(|| format!("the expert could not lead to subtask {from}"))?;

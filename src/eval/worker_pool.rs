@@ -244,13 +244,13 @@ mod tests {
         for panics in [false, true] {
             let ran = played(Options { jobs: 2, ..options() }, move || walkers(4, trouble, panics));
             for (line, before) in ran.lines.lines().zip(sound.lines.lines()) {
-                match before.contains(&format!("Take the {trouble}.")) && before.matches("\"do\"").count() > 3 {
+                match before.contains(&format!("Take the {trouble}.")) && before.matches("\"action\"").count() > 3 {
                     true => assert!(line.contains("the policy broke"), "{line}"),
                     false => assert_eq!(line, before),
                 }
             }
             assert!(ran.summary.errors > 0 && ran.summary.errors < 12);
-            assert_eq!(ran.summary.errored.len(), ran.summary.errors);
+            assert_eq!(ran.summary.errored_episodes.len(), ran.summary.errors);
         }
     }
 
@@ -364,7 +364,7 @@ mod tests {
             match before.contains(&format!("Take the {trouble}.")) {
                 true => {
                     assert!(line.contains("\"error\":\"timed out: a step went on after the 1.5 s"), "{line}");
-                    assert_eq!(line.matches("\"do\"").count(), 3, "what it did before is recorded");
+                    assert_eq!(line.matches("\"action\"").count(), 3, "what it did before is recorded");
                 }
                 false => assert_eq!(line, before),
             }

@@ -55,7 +55,7 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     scenes_digest.update(serde_json::to_vec(&*explored.scene)?);
     let manifest = Manifest {
         format_version: Manifest::FORMAT,
-        sprint: env!("CARGO_PKG_VERSION").into(),
+        sprint_version: env!("CARGO_PKG_VERSION").into(),
         task_set: set.name.clone(),
         task_set_hash: json::hex(&Sha256::digest(&bytes)),
         scenes_hash: json::hex(&scenes_digest.finalize()),
@@ -66,8 +66,8 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
         grader: Grading::Class,
         step_by_step: false,
         sampling: false,
-        language: false,
-        every_start: false,
+        instruction_variants: false,
+        all_start_subtasks: false,
         shard: None,
     };
     let mut folder = RunFolder::open(path, &manifest)?;

@@ -1,4 +1,4 @@
-//! The parts of a summary that split a run's episodes: by scene, by wording, by where they start, by why they fell short.
+//! The parts of a summary that split a run's episodes: by scene, by instruction variant, by start subtask, by failure.
 
 use std::collections::BTreeMap;
 
@@ -43,8 +43,8 @@ pub struct FailureClass {
     pub episodes: usize,
     /// As a share of all episodes.
     pub share: f64,
-    /// The task of the first.
-    pub example: String,
+    /// The task of the first such episode.
+    pub example_task: String,
     /// Its seed.
     pub example_seed: u64,
 }
@@ -57,11 +57,11 @@ pub struct Errored {
     pub task: String,
     /// The seed.
     pub seed: u64,
-    /// Whose words.
-    #[serde(default, skip_serializing_if = "InstructionVariant::is_own")]
-    pub wording: InstructionVariant,
-    /// From which subtask.
-    pub from: u32,
+    /// How the instruction was derived from the task's own.
+    #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
+    pub variant: InstructionVariant,
+    /// The subtask from which the agent acted.
+    pub start_subtask: u32,
     /// How often it was begun.
     pub attempts: u32,
     /// What was reported.
@@ -73,9 +73,9 @@ pub struct Errored {
 #[serde(deny_unknown_fields)]
 pub struct Start {
     /// The agent's very first subtask.
-    pub first: SkillRate,
+    pub first_subtask: SkillRate,
     /// All that was left.
-    pub rest: Group,
+    pub remaining: Group,
 }
 
 impl<'a> Grouped<'a> {
@@ -88,7 +88,7 @@ impl<'a> Grouped<'a> {
         let mut groups: Vec<(&Task, Vec<&Episode>)> =
             tasks.iter().filter_map(|task| Some((task, of_task.remove(task.id.as_str())?))).collect();
         for (_, group) in &mut groups {
-            group.sort_by_key(|episode| (episode.seed, episode.wording, episode.from));
+            group.sort_by_key(|episode| (episode.seed, episode.variant, episode.start_subtask));
         }
         Grouped { groups }
     }
@@ -158,7 +158,8 @@ pub fn failures(grouped: &Grouped<'_>) -> BTreeMap<Failure, FailureClass> {
     let mut classes: BTreeMap<Failure, FailureClass> = BTreeMap::new();
     for (task, episode) in &all {
         let Some(failure) = episode.failure else { continue };
-        let new = || FailureClass { episodes: 0, share: 0.0, example: task.id.clone(), example_seed: episode.seed };
+        let new =
+            || FailureClass { episodes: 0, share: 0.0, example_task: task.id.clone(), example_seed: episode.seed };
         let class = classes.entry(failure).or_insert_with(new);
         class.episodes += 1;
         class.share = class.episodes as f64 / all.len() as f64;
@@ -172,33 +173,34 @@ pub fn errored(grouped: &Grouped<'_>) -> Vec<Errored> {
     let listed = errors.map(|(episode, error)| Errored {
         task: episode.task.clone(),
         seed: episode.seed,
-        wording: episode.wording,
-        from: episode.from,
+        variant: episode.variant,
+        start_subtask: episode.start_subtask,
         attempts: episode.attempts,
         error,
     });
     listed.collect()
 }
 
-/// Figures by wording.
-pub fn language(grouped: &Grouped<'_>) -> BTreeMap<InstructionVariant, Group> {
-    let of =
-        |wording: InstructionVariant| grouped.only(|episode| episode.wording == wording && episode.from == 0).group();
+/// Figures by instruction variant.
+pub fn instruction_variants(grouped: &Grouped<'_>) -> BTreeMap<InstructionVariant, Group> {
+    let of = |variant: InstructionVariant| {
+        grouped.only(|episode| episode.variant == variant && episode.start_subtask == 0).group()
+    };
     InstructionVariant::ALL
         .into_iter()
-        .map(|wording| (wording, of(wording)))
+        .map(|variant| (variant, of(variant)))
         .filter(|(_, group)| group.episodes > 0)
         .collect()
 }
 
 /// Figures by the subtask from which the agent acted.
-pub fn starts(grouped: &Grouped<'_>) -> BTreeMap<u32, Start> {
-    let own = grouped.only(|episode| episode.wording.is_own());
-    let last = own.pairs().iter().map(|(_, episode)| episode.from).max();
+pub fn start_subtasks(grouped: &Grouped<'_>) -> BTreeMap<u32, Start> {
+    let own = grouped.only(|episode| episode.variant.is_original());
+    let last = own.pairs().iter().map(|(_, episode)| episode.start_subtask).max();
     let of = |from: u32| {
-        let there = own.only(|episode| episode.from == from);
+        let there = own.only(|episode| episode.start_subtask == from);
         let first = SkillRate::of(&there.values(|episode| f64::from(u8::from(episode.completed > 0))));
-        Start { first, rest: there.group() }
+        Start { first_subtask: first, remaining: there.group() }
     };
     last.map(|last| (0..=last).map(|from| (from, of(from))).collect()).unwrap_or_default()
 }
@@ -213,10 +215,10 @@ pub fn skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
 }
 
 /// How often the agent completed its very first subtask, by the subtask's kind.
-pub fn first_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
-    let own = grouped.only(|episode| episode.wording.is_own());
+pub fn first_subtask_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    let own = grouped.only(|episode| episode.variant.is_original());
     rates(&own, |task, episode| {
-        let first = task.subtasks.get(episode.from as usize);
+        let first = task.subtasks.get(episode.start_subtask as usize);
         first.map(|subtask| (subtask.skill, episode.completed > 0)).into_iter().collect()
     })
 }

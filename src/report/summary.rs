@@ -114,16 +114,16 @@ pub struct Summary {
     /// Why episodes fell short, by class.
     pub failures: BTreeMap<Failure, FailureClass>,
     /// Every episode that ended with an error.
-    pub errored: Vec<Errored>,
-    /// By wording, where a run asked for them.
+    pub errored_episodes: Vec<Errored>,
+    /// By instruction variant, where a run asked for them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub language: BTreeMap<InstructionVariant, Group>,
+    pub instruction_variants: BTreeMap<InstructionVariant, Group>,
     /// By the subtask from which the agent acted, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub starts: BTreeMap<u32, Start>,
+    pub start_subtasks: BTreeMap<u32, Start>,
     /// By the kind of the first subtask that was the agent's own, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub first_skills: BTreeMap<SkillKind, SkillRate>,
+    pub first_subtask_skills: BTreeMap<SkillKind, SkillRate>,
     /// SHA-256 of the episodes' lines in the run's order.
     pub episodes_hash: String,
     /// How the intervals were made.
@@ -144,7 +144,7 @@ impl Summary {
     }
 
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub const FORMAT: u32 = 2;
 
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
     pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
@@ -181,10 +181,18 @@ impl Summary {
             expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
             steps_over_expert: main.steps_over_expert(),
             failures: groups::failures(&main),
-            errored: groups::errored(&every),
-            language: if manifest.language { groups::language(&every) } else { BTreeMap::new() },
-            starts: if manifest.every_start { groups::starts(&every) } else { BTreeMap::new() },
-            first_skills: if manifest.every_start { groups::first_skills(&every) } else { BTreeMap::new() },
+            errored_episodes: groups::errored(&every),
+            instruction_variants: if manifest.instruction_variants {
+                groups::instruction_variants(&every)
+            } else {
+                BTreeMap::new()
+            },
+            start_subtasks: if manifest.all_start_subtasks { groups::start_subtasks(&every) } else { BTreeMap::new() },
+            first_subtask_skills: if manifest.all_start_subtasks {
+                groups::first_subtask_skills(&every)
+            } else {
+                BTreeMap::new()
+            },
             episodes_hash: String::new(),
             interval_methods: IntervalMethods {
                 rates: match all.len() > main.tasks() {
@@ -237,7 +245,7 @@ pub(crate) mod tests {
         let (tasks, episodes) = sample();
         let summary = Summary::of(&manifest(), &tasks, &episodes, false);
         assert_eq!((summary.tasks, summary.episodes, summary.errors), (2, 4, 1));
-        assert_eq!(summary.errored.len(), 1);
+        assert_eq!(summary.errored_episodes.len(), 1);
         assert_eq!(summary.steps_over_expert.unwrap().mean, 1.5);
         assert_eq!(summary.scenes["FloorPlan7"].episodes, 2);
         assert_eq!(summary.success, 0.5);

@@ -20,34 +20,34 @@ impl Summary {
         ];
         if !self.failures.is_empty() {
             let rows = self.failures.iter().map(|(failure, class)| {
-                let example = format!("{} (seed {})", class.example, class.example_seed);
+                let example = format!("{} (seed {})", class.example_task, class.example_seed);
                 [failure.words().into(), class.episodes.to_string(), percent(class.share), example]
             });
             parts.push(table(["why it fell short", "episodes", "share", "for example"], rows));
         }
-        if !self.language.is_empty() {
-            let rows = self.language.iter().map(|(wording, group)| group_row(wording.name().into(), group));
+        if !self.instruction_variants.is_empty() {
+            let rows = self.instruction_variants.iter().map(|(variant, group)| group_row(variant.name().into(), group));
             parts.push(table(
-                ["told in words", "episodes", "success", "95 % interval", "progress", "95 % interval"],
+                ["instruction variant", "episodes", "success", "95 % interval", "progress", "95 % interval"],
                 rows,
             ));
         }
-        if !self.starts.is_empty() {
-            let rows = self.starts.iter().map(|(from, start)| {
-                let (first, rest) = (start.first, &start.rest);
+        if !self.start_subtasks.is_empty() {
+            let rows = self.start_subtasks.iter().map(|(from, start)| {
+                let (first, rest) = (start.first_subtask, &start.remaining);
                 let shares = [percent(first.rate), between(first.interval), percent(rest.success)];
                 let [rate, interval, all] = shares;
                 [from.to_string(), first.reached.to_string(), rate, interval, all]
             });
-            let head = ["from subtask", "episodes", "that one done", "95 % interval", "all the rest done"];
+            let head = ["start subtask", "episodes", "that one done", "95 % interval", "all the rest done"];
             parts.push(table(head, rows));
             let head = ["first skill", "reached", "completed", "rate", "95 % interval"];
-            parts.push(table(head, skill_rows(&self.first_skills)));
+            parts.push(table(head, skill_rows(&self.first_subtask_skills)));
         }
         let rows = self.scenes.iter().map(|(scene, group)| group_row(scene.clone(), group));
         parts.push(table(["scene", "episodes", "success", "95 % interval", "progress", "95 % interval"], rows));
-        if !self.errored.is_empty() {
-            let rows = self.errored.iter().map(|episode| {
+        if !self.errored_episodes.is_empty() {
+            let rows = self.errored_episodes.iter().map(|episode| {
                 let error = episode.error.replace('|', "/").replace('\n', " ");
                 [episode.task.clone(), episode.seed.to_string(), episode.attempts.to_string(), error]
             });
@@ -129,8 +129,10 @@ impl Summary {
             row(&format!("{kind:?}"), "completed", skill.reached, skill.rate, Some(skill.interval))?;
         }
         let scenes = self.scenes.iter().map(|(name, group)| (format!("scene {name}"), group));
-        let words = self.language.iter().map(|(wording, group)| (format!("words {}", wording.name()), group));
-        let starts = self.starts.iter().map(|(from, start)| (format!("from {from}"), &start.rest));
+        let words =
+            self.instruction_variants.iter().map(|(variant, group)| (format!("variant {}", variant.name()), group));
+        let starts =
+            self.start_subtasks.iter().map(|(from, start)| (format!("start_subtask {from}"), &start.remaining));
         for (name, group) in scenes.chain(words).chain(starts) {
             row(&name, "success", group.episodes, group.success, Some(group.success_interval))?;
             row(&name, "progress", group.episodes, group.progress.mean, Some(group.progress.interval))?;

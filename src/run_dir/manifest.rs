@@ -12,7 +12,7 @@ pub struct Manifest {
     /// Version of this format, for the whole folder.
     pub format_version: u32,
     /// The version of the program.
-    pub sprint: String,
+    pub sprint_version: String,
     /// The task set's name.
     pub task_set: String,
     /// SHA-256 of the task file.
@@ -34,12 +34,12 @@ pub struct Manifest {
     /// The agent draws its actions by chance instead of taking the likeliest.
     #[serde(default)]
     pub sampling: bool,
-    /// Each task is also played in every other wording.
+    /// Each task is also played with every other variant of its instruction.
     #[serde(default)]
-    pub language: bool,
+    pub instruction_variants: bool,
     /// Each task is also played from each of its subtasks on.
     #[serde(default)]
-    pub every_start: bool,
+    pub all_start_subtasks: bool,
     /// Which share of the run this is; nothing for a whole one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
@@ -47,7 +47,7 @@ pub struct Manifest {
 
 impl Manifest {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub const FORMAT: u32 = 2;
     /// The most episodes, other words and starts apart, that a run may have: they are booked in memory.
     const MOST: u64 = 10_000_000;
 
@@ -88,8 +88,8 @@ pub(crate) mod tests {
 
     pub(crate) fn manifest() -> Manifest {
         Manifest {
-            format_version: 1,
-            sprint: "0".into(),
+            format_version: Manifest::FORMAT,
+            sprint_version: "0".into(),
             task_set: "set".into(),
             task_set_hash: "aa".into(),
             scenes_hash: "bb".into(),
@@ -100,8 +100,8 @@ pub(crate) mod tests {
             grader: Grading::Class,
             step_by_step: false,
             sampling: false,
-            language: false,
-            every_start: false,
+            instruction_variants: false,
+            all_start_subtasks: false,
             shard: None,
         }
     }

@@ -55,7 +55,7 @@ pub const FRAMES: usize = 5;
 /// (`before`, the newest first), `now` steps into the episode.
 pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout, before: &[Moment], now: u32) {
     policy.reset(0, author.seed);
-    policy.set_sampling(author.samples);
+    policy.set_sampling(author.sampling);
     if before.is_empty() {
         return;
     }

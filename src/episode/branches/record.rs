@@ -27,8 +27,8 @@ impl Tree {
         let mut trace = Vec::new();
         for taken in story.iter().filter_map(|(_, taken)| *taken) {
             let mut step = taken.step.clone();
-            step.told = (*taken.instruction != *told).then(|| taken.instruction.to_string());
-            step.by = (by != Some(&taken.author)).then(|| taken.author.clone());
+            step.instruction = (*taken.instruction != *told).then(|| taken.instruction.to_string());
+            step.author = (by != Some(&taken.author)).then(|| taken.author.clone());
             (told, by) = (&taken.instruction, Some(&taken.author));
             trace.push(step);
         }

@@ -258,8 +258,15 @@ mod tests {
     }
 
     fn taken(kind: ActionType, told: &str) -> Taken {
-        let step =
-            Step { kind, target: None, class: None, outcome: Outcome::Done, subtask: None, told: None, by: None };
+        let step = Step {
+            kind,
+            target: None,
+            class: None,
+            outcome: Outcome::Done,
+            subtask: None,
+            instruction: None,
+            author: None,
+        };
         Taken {
             decision: Decision::of(Action::navigate(kind)),
             step,

@@ -60,7 +60,7 @@ impl Session {
     ) -> anyhow::Result<Session> {
         let opening = openings.open()?;
         let rollout = rollout_of(&opening);
-        let author = Author { policy: kind.name().into(), checkpoint: None, seed: openings.seed(), samples: false };
+        let author = Author { policy: kind.name().into(), checkpoint: None, seed: openings.seed(), sampling: false };
         let mut engine = Session {
             checkpoints: Arc::new(policies.agents()),
             policies,

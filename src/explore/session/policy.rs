@@ -59,7 +59,7 @@ impl Session {
     /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
     pub fn reseed(&mut self, seed: u64, samples: bool) {
         self.author.seed = seed;
-        self.author.samples = samples;
+        self.author.sampling = samples;
         self.look_back();
         self.plant();
     }

@@ -127,7 +127,7 @@ impl Session {
 
 /// Who chose, in a few words.
 fn who(author: &Author) -> String {
-    match (author.is_hand(), author.samples) {
+    match (author.is_hand(), author.sampling) {
         (true, _) => "you".into(),
         (false, true) => format!("{}, drawn with seed {}", author.policy, author.seed),
         (false, false) => author.policy.clone(),

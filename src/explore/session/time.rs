@@ -124,20 +124,20 @@ impl Session {
     pub fn retrace(&mut self, episode: &Episode, author: &Author, thinks: bool) -> anyhow::Result<Option<u32>> {
         // The task is graded whatever the agent is told of it, until that changes on the way.
         self.rollout.instruction.clone_from(&episode.instruction);
-        self.rollout.horizon = self.rollout.horizon.map(|horizon| horizon + episode.prefix);
+        self.rollout.horizon = self.rollout.horizon.map(|horizon| horizon + episode.prefix_steps);
         self.decision = None;
         self.plant();
         let mut author = author.clone();
         let mut parted = None;
         for (number, recorded) in (1..).zip(&episode.trace) {
-            if let Some(told) = &recorded.told {
+            if let Some(told) = &recorded.instruction {
                 self.instruct(told)?;
             }
-            if let Some(by) = &recorded.by {
+            if let Some(by) = &recorded.author {
                 author = by.clone();
             }
             let action = recorded.action();
-            if thinks && number > episode.prefix {
+            if thinks && number > episode.prefix_steps {
                 let would = self.think().map(|(decision, _)| decision.action);
                 if !author.is_hand() && author == self.author && would.ok() != Some(action) {
                     parted = parted.or(Some(number));

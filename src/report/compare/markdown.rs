@@ -44,7 +44,7 @@ impl Comparison {
     fn standings(&self) -> String {
         let row = |run: &Standing| {
             let [low, high] = run.completed_subtasks.interval;
-            let each: Vec<String> = run.completed_by_folder.iter().map(|mean| format!("{mean:.2}")).collect();
+            let each: Vec<String> = run.completed_subtasks_by_folder.iter().map(|mean| format!("{mean:.2}")).collect();
             [
                 label(&run.run),
                 run.policy.clone(),
@@ -61,7 +61,7 @@ impl Comparison {
             ["run", "policy", "episodes", "errors", "success", "95 % interval", "completed", "95 % interval", "each"];
         let mut rows: Vec<Vec<String>> = self.runs.iter().map(|run| row(run).into()).collect();
         // One folder a run is the rule: only where there are more, the last column has something to say.
-        let columns = head.len() - usize::from(self.runs.iter().all(|run| run.completed_by_folder.is_empty()));
+        let columns = head.len() - usize::from(self.runs.iter().all(|run| run.completed_subtasks_by_folder.is_empty()));
         rows.iter_mut().for_each(|row| row.truncate(columns));
         lined_up(&head[..columns].iter().map(ToString::to_string).collect::<Vec<_>>(), &rows)
     }
@@ -101,7 +101,7 @@ impl Paired {
             row("completed subtasks", self.completed_subtasks, number, signed),
             row("progress", self.progress, percent, points),
         ];
-        let lost = match (self.unpaired, self.other_starts) {
+        let lost = match (self.unpaired, self.start_mismatches) {
             (0, _) => String::new(),
             (n, 0) => format!(" {n} episodes have no counterpart and are left out."),
             (n, m) => format!(" {n} episodes have no counterpart and are left out, {m} of them for another start."),
@@ -116,8 +116,8 @@ impl Paired {
         text += &format!(
             "McNemar: p {} (tasks solved more often in the first: {}, in the second: {}).\n",
             p(self.mcnemar_p),
-            self.leaning[0],
-            self.leaning[1]
+            self.discordant_tasks[0],
+            self.discordant_tasks[1]
         );
         for (title, changes) in [("Regressions", &self.regressions), ("Fixes", &self.fixes)] {
             if !changes.is_empty() {

@@ -48,7 +48,7 @@ pub struct Standing {
     pub completed_subtasks: Mean,
     /// The same by folder, where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub completed_by_folder: Vec<f64>,
+    pub completed_subtasks_by_folder: Vec<f64>,
     /// Mean progress.
     pub progress: f64,
     /// By the number of subtasks: mean progress.
@@ -57,7 +57,7 @@ pub struct Standing {
 
 impl Comparison {
     /// The format version this program writes.
-    pub const FORMAT: u32 = 3;
+    pub const FORMAT: u32 = 4;
 
     /// Compares every further run with the first; with it comes each run's summary.
     ///
@@ -80,7 +80,7 @@ impl Comparison {
             success: summary.success,
             success_interval: summary.success_interval,
             completed_subtasks: summary.completed_subtasks,
-            completed_by_folder: completed_by_folder(run),
+            completed_subtasks_by_folder: completed_by_folder(run),
             progress: summary.progress.mean,
             progress_by_length: summary.progress_by_length.clone(),
         };
@@ -136,8 +136,8 @@ mod tests {
         let other = FinishedRun::joined(vec![run("b1", &[false, false]), run("b2", &[true, false])]).unwrap();
         let (comparison, _) = Comparison::of(&[twice, other]).unwrap();
         let [first, second] = &comparison.runs[..] else { panic!("two rows") };
-        assert_eq!((first.episodes, &first.completed_by_folder), (4, &vec![2.0, 1.5]));
-        assert_eq!((second.completed_subtasks.mean, &second.completed_by_folder), (1.25, &vec![1.0, 1.5]));
+        assert_eq!((first.episodes, &first.completed_subtasks_by_folder), (4, &vec![2.0, 1.5]));
+        assert_eq!((second.completed_subtasks.mean, &second.completed_subtasks_by_folder), (1.25, &vec![1.0, 1.5]));
         assert_eq!((comparison.pairs[0].pairs, comparison.regressions()), (4, 2));
         let page = comparison.markdown();
         for part in ["| a1 and 1 more |", "| 2.00 1.50 |", "## b1 and 1 more against a1 and 1 more", "sprint open b1#2"]

@@ -56,7 +56,7 @@ pub struct Paired {
     /// Episodes of either run without a counterpart.
     pub unpaired: usize,
     /// Of those, episodes whose counterpart began in another state.
-    pub other_starts: usize,
+    pub start_mismatches: usize,
     /// Success.
     pub success: Difference,
     /// Completed subtasks.
@@ -64,7 +64,7 @@ pub struct Paired {
     /// Completed subtasks as a share of those that were asked.
     pub progress: Difference,
     /// Tasks that the first run solved more often, and those that the second did.
-    pub leaning: [usize; 2],
+    pub discordant_tasks: [usize; 2],
     /// Two-sided exact McNemar test of equal success, a task a pair: several seeds of a task are alike.
     pub mcnemar_p: f64,
     /// Only the first run succeeded.
@@ -90,7 +90,7 @@ impl Paired {
         // By task, in the first run's order.
         let mut groups: Vec<Vec<(&Episode, &Episode)>> = Vec::new();
         let mut places: BTreeMap<&str, usize> = BTreeMap::new();
-        let (mut unpaired, mut other_starts) = (0, 0);
+        let (mut unpaired, mut start_mismatches) = (0, 0);
         for episode in first.episodes.iter().filter(|episode| episode.is_plain()) {
             match others.remove(&episode.key()) {
                 // An episode that failed before it had a start is no success from any start.
@@ -101,7 +101,7 @@ impl Paired {
                     }
                     groups[place].push((episode, other));
                 }
-                Some(_) => (unpaired, other_starts) = (unpaired + 2, other_starts + 2),
+                Some(_) => (unpaired, start_mismatches) = (unpaired + 2, start_mismatches + 2),
                 None => unpaired += 1,
             }
         }
@@ -128,22 +128,22 @@ impl Paired {
         };
         let (regressions, fixes) = (only(true)?, only(false)?);
         let solved = |of: fn(&(&Episode, &Episode)) -> bool, group: &[_]| group.iter().filter(|pair| of(pair)).count();
-        let leaning = |toward: Ordering| {
+        let discordant_tasks = |toward: Ordering| {
             let lean = |group: &[_]| solved(|(a, _)| a.success, group).cmp(&solved(|(_, b)| b.success, group));
             groups.iter().filter(|group| lean(group) == toward).count()
         };
-        let leaning = [leaning(Ordering::Greater), leaning(Ordering::Less)];
+        let discordant_tasks = [discordant_tasks(Ordering::Greater), discordant_tasks(Ordering::Less)];
         Ok(Paired {
             first: first.path.display().to_string(),
             second: second.path.display().to_string(),
             pairs: all.len(),
             unpaired,
-            other_starts,
+            start_mismatches,
             success: difference(&groups, Episode::succeeded),
             completed_subtasks: difference(&groups, |episode| f64::from(episode.completed)),
             progress: difference(&groups, Episode::progress),
-            leaning,
-            mcnemar_p: stats::mcnemar(leaning[0], leaning[1]),
+            discordant_tasks,
+            mcnemar_p: stats::mcnemar(discordant_tasks[0], discordant_tasks[1]),
             regressions,
             fixes,
             methods: format!(
@@ -210,7 +210,7 @@ pub(crate) mod tests {
     fn other_words_and_other_starts_are_not_compared() {
         let [a, b] = [("a", [true, true, true]), ("b", [true, false, false])].map(|(name, outcomes)| {
             let mut run = run(name, &outcomes);
-            (run.episodes[1].wording, run.episodes[2].from) = (InstructionVariant::Swapped, 1);
+            (run.episodes[1].variant, run.episodes[2].start_subtask) = (InstructionVariant::Swapped, 1);
             run
         });
         let paired = Paired::of(&a, &b).unwrap();
@@ -220,7 +220,7 @@ pub(crate) mod tests {
     #[test]
     fn seeds_of_one_task_do_not_make_a_difference_certain() {
         let paired = Paired::of(&run("a", &[false; 12]), &run("b", &[true; 12])).unwrap();
-        assert_eq!((paired.fixes.len(), paired.leaning, paired.mcnemar_p), (12, [0, 1], 1.0));
+        assert_eq!((paired.fixes.len(), paired.discordant_tasks, paired.mcnemar_p), (12, [0, 1], 1.0));
     }
 
     #[test]
@@ -228,7 +228,7 @@ pub(crate) mod tests {
         let (a, mut b) = (run("a", &[true, true]), run("b", &[false, false]));
         b.episodes[0].start_hash = "77".into();
         let paired = Paired::of(&a, &b).unwrap();
-        assert_eq!((paired.pairs, paired.unpaired, paired.other_starts), (1, 2, 2));
+        assert_eq!((paired.pairs, paired.unpaired, paired.start_mismatches), (1, 2, 2));
         b.episodes[1].seed = 9;
         assert!(Paired::of(&a, &b).unwrap_err().to_string().contains("no episode in common"));
     }
