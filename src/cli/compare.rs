@@ -10,7 +10,7 @@ use super::{Ending, streams};
 use crate::data::json;
 use crate::report::compare::Comparison;
 use crate::report::threshold::Threshold;
-use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::reader::RecordedRun;
 
 /// Compares runs, episode by episode.
 #[derive(Args)]
@@ -38,7 +38,7 @@ impl Compare {
     /// # Errors
     /// When a folder holds no run, or two have no episode in common.
     pub fn run(self) -> anyhow::Result<Ending> {
-        let runs: Vec<FinishedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
+        let runs: Vec<RecordedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
         let (comparison, summaries) = Comparison::of(&runs)?;
         if let Some(path) = &self.out {
             json::write_pretty(path, &comparison)?;
@@ -67,13 +67,13 @@ impl Compare {
 }
 
 /// A run, or several with commas between as one.
-fn open(paths: &Path) -> anyhow::Result<FinishedRun> {
+fn open(paths: &Path) -> anyhow::Result<RecordedRun> {
     match paths.to_str() {
         // A folder may have a comma in its own name.
         Some(text) if text.contains(',') && !paths.exists() => {
-            let parts = text.split(',').map(|path| FinishedRun::open(Path::new(path)));
-            FinishedRun::joined(parts.collect::<anyhow::Result<_>>()?)
+            let parts = text.split(',').map(|path| RecordedRun::open_evaluated(Path::new(path)));
+            RecordedRun::joined(parts.collect::<anyhow::Result<_>>()?)
         }
-        _ => FinishedRun::open(paths),
+        _ => RecordedRun::open_evaluated(paths),
     }
 }

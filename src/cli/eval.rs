@@ -19,9 +19,9 @@ use crate::eval::tasks::sample;
 use crate::house::grading::Grading;
 use crate::report::summary::Summary;
 use crate::report::threshold::Threshold;
+use crate::run_dir::default_path;
 use crate::run_dir::shard::Shard;
-use crate::run_dir::writer;
-use crate::run_dir::writer::RunFolder;
+use crate::run_dir::writer::RunWriter;
 
 /// Plays a task set and writes a run folder.
 #[derive(Args)]
@@ -95,7 +95,7 @@ impl Eval {
             Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
                 .with_context(|| format!("{}", self.tasks.display()))?;
         let path = self.folder(&set.value.name, &chosen.name);
-        let mut run = RunFolder::open(&path, evaluation.manifest())?;
+        let mut run = RunWriter::open(&path, evaluation.manifest())?;
         run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
         let stop = super::stop::on_signals()?;
         let mut meter = Meter::new(self.json);
@@ -129,7 +129,7 @@ impl Eval {
     fn folder(&self, set: &str, policy: &str) -> PathBuf {
         let run = self.out.clone().unwrap_or_else(|| {
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-            writer::default_path(&format!("{set}-{policy}"), now.as_secs(), &|path| path.exists())
+            default_path::default_path(&format!("{set}-{policy}"), now.as_secs(), &|path| path.exists())
         });
         self.shard.map_or_else(|| run.clone(), |shard| run.join(shard.folder()))
     }

@@ -9,9 +9,9 @@ use super::{Ending, explore::Display};
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
-use crate::eval::verify::Recorded;
 use crate::explore::episode_source::{EpisodeSource, Start};
 use crate::explore::session::Session;
+use crate::run_dir::reader::RecordedRun;
 
 /// Which episode, and how to show it.
 #[derive(Args)]
@@ -42,10 +42,10 @@ impl Reference {
     ///
     /// # Errors
     /// When there is no such episode or step.
-    pub fn find(text: &str, tasks: Option<&Path>) -> anyhow::Result<(Reference, Recorded)> {
+    pub fn find(text: &str, tasks: Option<&Path>) -> anyhow::Result<(Reference, RecordedRun)> {
         let (run, rest) = text.rsplit_once('#').unwrap_or((text, "1"));
         let run = PathBuf::from(run);
-        let recorded = Recorded::open(&run, tasks)?;
+        let recorded = RecordedRun::open(&run, tasks)?;
         let place = |name: &str| {
             let numbered = name.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
             let by_id = || recorded.episodes.iter().position(|episode| episode.task == name);

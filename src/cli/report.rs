@@ -11,8 +11,8 @@ use crate::data::{atomic_file, json};
 use crate::report::charts::progress_by_length;
 use crate::report::html;
 use crate::report::summary::Summary;
-use crate::run_dir::reader::FinishedRun;
-use crate::run_dir::writer::RunFolder;
+use crate::run_dir::layout::{MANIFEST, SUMMARY};
+use crate::run_dir::reader::RecordedRun;
 
 /// Draws a run: its plots and its page.
 #[derive(Args)]
@@ -34,9 +34,9 @@ impl Report {
     /// When the folder holds none, or cannot be written to.
     pub fn run(self) -> anyhow::Result<Ending> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
-        if self.folder.join(RunFolder::MANIFEST).exists() {
-            let run = FinishedRun::open(&self.folder)?;
-            let path = self.folder.join(RunFolder::SUMMARY);
+        if self.folder.join(MANIFEST).exists() {
+            let run = RecordedRun::open_evaluated(&self.folder)?;
+            let path = self.folder.join(SUMMARY);
             let summary = json::read::<Summary>(&path, Summary::FORMAT)
                 .context("the same eval command writes the summary")?
                 .value;

@@ -9,7 +9,7 @@ use super::{Ending, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
 use crate::eval::verify;
-use crate::eval::verify::Recorded;
+use crate::run_dir::reader::RecordedRun;
 
 /// Which run.
 #[derive(Args)]
@@ -36,7 +36,7 @@ impl Verify {
     /// # Errors
     /// When the run or its tasks cannot be read.
     pub fn run(self) -> anyhow::Result<Ending> {
-        let run = Recorded::open(&self.run, self.tasks.as_deref())?;
+        let run = RecordedRun::open(&self.run, self.tasks.as_deref())?;
         let mut find = |author: &Author| {
             policy_source::find(
                 author.policy.as_str(),

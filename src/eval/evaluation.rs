@@ -17,7 +17,7 @@ use crate::house::grading::Grading;
 use crate::report::summary::Summary;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
 use crate::run_dir::manifest::Manifest;
-use crate::run_dir::writer::RunFolder;
+use crate::run_dir::writer::RunWriter;
 
 /// An evaluation that can start: its tasks fit their scenes. Copies share tasks and scenes.
 #[derive(Clone)]
@@ -162,7 +162,7 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
 pub fn evaluate(
     evaluation: &Evaluation,
     make_policy: &Arc<MakePolicy>,
-    folder: &mut RunFolder,
+    folder: &mut RunWriter,
     stop: &Arc<AtomicBool>,
     progress: &mut dyn FnMut(Progress),
 ) -> anyhow::Result<Summary> {
@@ -207,7 +207,7 @@ pub fn finish(
     manifest: &Manifest,
     tasks: &[Task],
     all: &[EpisodeSpec],
-    folder: &mut RunFolder,
+    folder: &mut RunWriter,
 ) -> anyhow::Result<Summary> {
     let order: Vec<Key> = all.iter().map(|spec| spec.key(tasks)).collect();
     let (episodes, hash) = folder.result(&order)?;
@@ -336,7 +336,7 @@ pub(crate) mod tests {
         let (folder, set) = tasks();
         let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
         let evaluation = Evaluation::prepare(&set, scenes, options, "walker", None)?;
-        let mut folder = RunFolder::open(into, evaluation.manifest())?;
+        let mut folder = RunWriter::open(into, evaluation.manifest())?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopping = stop.clone();
         let mut progress = move |progress: Progress| {

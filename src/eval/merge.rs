@@ -10,10 +10,11 @@ use super::tasks::sample;
 use crate::episode::record::Key;
 use crate::report::summary::Summary;
 use crate::run_dir::episode_spec::episode_specs;
+use crate::run_dir::layout::TASKS;
 use crate::run_dir::manifest::Manifest;
-use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::reader::RecordedRun;
 use crate::run_dir::shard::Shard;
-use crate::run_dir::writer::RunFolder;
+use crate::run_dir::writer::RunWriter;
 
 /// The shares that lie in a run's folder, by number.
 ///
@@ -36,7 +37,7 @@ pub fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
 pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
     let mut runs = BTreeMap::new();
     for path in shares {
-        let run = FinishedRun::open(path)?;
+        let run = RecordedRun::open_evaluated(path)?;
         let shard = run.manifest.shard.with_context(|| format!("{} is no share but a whole run", path.display()))?;
         if let Some(other) = runs.insert(shard.index, run) {
             bail!("{} and {} are the same share {shard}", other.path.display(), path.display());
@@ -67,7 +68,7 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
     let missing: Vec<String> =
         (1..=of).filter(|index| !runs.contains_key(index)).map(|i| format!("{i}/{of}")).collect();
     ensure!(missing.is_empty(), "missing shares: {}; play them with eval --shard", missing.join(", "));
-    let file = first.path.join(RunFolder::TASKS);
+    let file = first.path.join(TASKS);
     let (set, episodes) = (first.set.clone(), runs.values().map(|run| run.episodes.len()).sum::<usize>());
     let all = episode_specs(&manifest, &set.tasks);
     for run in runs.values() {
@@ -79,7 +80,7 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
         );
     }
     ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
-    let mut folder = RunFolder::open(into, &manifest)?;
+    let mut folder = RunWriter::open(into, &manifest)?;
     folder.write_tasks(&sample::as_seen_from(&set, &set.tasks, &file, into)?)?;
     let there: std::collections::BTreeSet<Key> =
         folder.earlier.iter().map(crate::episode::record::Episode::key).collect();

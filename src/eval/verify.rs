@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use serde::Serialize;
 
 use super::options::Options;
@@ -14,18 +14,19 @@ use super::worker_pool;
 use crate::agent::policy_source::PolicySource;
 use crate::agent::{Decision, Policy, PolicyState};
 use crate::data::json;
-use crate::domain::{Task, TaskSet};
+use crate::domain::Task;
 use crate::episode::branches::{FRAMES, Moment, look_back};
 use crate::episode::record::{Author, Episode, Key, Step};
 use crate::episode::rollout::Rollout;
-use crate::episode::scenes::{Scenes, Setting};
+use crate::episode::scenes::Setting;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
 use crate::report::summary::Summary;
-use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs, policy_seed};
+use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
+use crate::run_dir::layout::SUMMARY;
 use crate::run_dir::manifest::Manifest;
-use crate::run_dir::writer::{RunFolder, read_episodes};
+use crate::run_dir::reader::RecordedRun;
 
 /// What came of verifying.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -70,79 +71,11 @@ pub struct Difference {
     pub found: String,
 }
 
-/// A run with its tasks.
-pub struct Recorded {
-    /// What it was made from.
-    pub manifest: Manifest,
-    /// Its tasks.
-    pub tasks: Vec<Task>,
-    /// Where they play.
-    pub scenes: Scenes,
-    /// Its episodes.
-    pub episodes: Vec<Episode>,
-    /// How many episodes its summary tells of, where there is one.
-    pub summarised: Option<usize>,
-}
-
-impl Recorded {
-    /// Reads a run folder. Its tasks are in it, or in `tasks`, the file that the run was made from.
-    ///
-    /// # Errors
-    /// When it is no run, its summary is malformed, its tasks are not at hand, or `tasks` is another file.
-    pub fn open(run: &Path, tasks: Option<&Path>) -> anyhow::Result<Recorded> {
-        let summary = run.join(RunFolder::SUMMARY);
-        let summarised = summary.exists().then(|| json::read::<Summary>(&summary, Summary::FORMAT)).transpose()?;
-        let summarised = summarised.map(|summary| summary.value.episodes);
-        let manifest = json::read::<Manifest>(&run.join(RunFolder::MANIFEST), Manifest::FORMAT)?.value;
-        let (tasks, scenes) = tasks_of(run, &manifest, tasks)?;
-        let (episodes, _) = read_episodes(&run.join(RunFolder::EPISODES))?;
-        Ok(Recorded { manifest, tasks, scenes, episodes, summarised })
-    }
-
-    /// The task of an episode, with its place in the set, and where it starts.
-    ///
-    /// # Errors
-    /// When the set has no such task, or it fits its scene no longer.
-    pub fn setting(&self, episode: &Episode) -> anyhow::Result<(usize, &Task, Setting)> {
-        let found = self.tasks.iter().enumerate().find(|(_, task)| task.id == episode.task);
-        let (at, task) = found.with_context(|| format!("the tasks hold no {:?}", episode.task))?;
-        Ok((at, task, self.scenes.setting(task)?))
-    }
-
-    /// Who acted in an episode that does not say so.
-    pub fn author(&self, task: usize, episode: &Episode) -> Author {
-        Author {
-            policy: self.manifest.policy.clone(),
-            checkpoint: self.manifest.checkpoint_hash.clone(),
-            seed: policy_seed(task, episode.seed),
-            sampling: self.manifest.sampling,
-        }
-    }
-}
-
-/// The tasks of a run: those in its folder, which are what it played of the file that it was made from, or of that file.
-fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(Vec<Task>, Scenes)> {
-    let own = run.join(RunFolder::TASKS);
-    ensure!(
-        file.is_some() || own.exists(),
-        "{} does not hold its tasks; name the file that it was made from with --tasks (the set {:?})",
-        run.display(),
-        manifest.task_set
-    );
-    let path = file.unwrap_or(&own);
-    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
-    ensure!(
-        file.is_none() || document.digest == manifest.task_set_hash,
-        "{} is not what {} was made from: its SHA-256 is {:.12}, the run's {:.12}",
-        path.display(),
-        run.display(),
-        document.digest,
-        manifest.task_set_hash
-    );
-    let scenes = Scenes::of(path, &document.value);
-    let mut tasks = document.value.tasks;
-    tasks.truncate(manifest.tasks);
-    Ok((tasks, scenes))
+/// How many episodes the summary of a run tells of, where there is one.
+fn summarised(run: &Path) -> anyhow::Result<Option<usize>> {
+    let path = run.join(SUMMARY);
+    let summary = path.exists().then(|| json::read::<Summary>(&path, Summary::FORMAT)).transpose()?;
+    Ok(summary.map(|summary| summary.value.episodes))
 }
 
 /// Finds the policy of an author; `None` where it is not at hand.
@@ -152,14 +85,14 @@ pub type FindPolicy<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<PolicySour
 /// decides bit for bit as it did; what a person explored step by step. `progress` hears how many are done.
 ///
 /// # Errors
-/// When a task does not fit its scene, or a policy cannot be made. What differs is in the verdict.
+/// When a task does not fit its scene, the summary is malformed, or a policy cannot be made. What differs is in the verdict.
 pub fn verify(
-    run: &Recorded,
+    run: &RecordedRun,
     find: &mut FindPolicy<'_>,
     jobs: usize,
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<Verdict> {
-    let mut verdict = Verdict { summarised: run.summarised, ..Verdict::default() };
+    let mut verdict = Verdict { summarised: summarised(&run.path)?, ..Verdict::default() };
     let again = evaluated_again(run, find, jobs, progress)?;
     let mut sources = Sources { find, known: Vec::new() };
     for (number, episode) in (1..).zip(&run.episodes) {
@@ -186,15 +119,16 @@ pub fn verify(
 /// The episodes that an evaluation played, played again by the same policy in the same slots; none where the policy is not at
 /// hand.
 fn evaluated_again(
-    run: &Recorded,
+    run: &RecordedRun,
     find: &mut FindPolicy<'_>,
     jobs: usize,
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<BTreeMap<Key, Episode>> {
-    let specs = episode_specs(&run.manifest, &run.tasks);
+    let specs = episode_specs(&run.manifest, &run.set.tasks);
     let recorded: BTreeSet<Key> =
         run.episodes.iter().filter(|episode| !is_explored(episode)).map(Episode::key).collect();
-    let wanted: Vec<EpisodeSpec> = specs.into_iter().filter(|spec| recorded.contains(&spec.key(&run.tasks))).collect();
+    let wanted: Vec<EpisodeSpec> =
+        specs.into_iter().filter(|spec| recorded.contains(&spec.key(&run.set.tasks))).collect();
     let mut again = BTreeMap::new();
     if wanted.is_empty() {
         return Ok(again);
@@ -203,7 +137,7 @@ fn evaluated_again(
     let author = Author { policy, checkpoint: checkpoint_hash, seed: 0, sampling };
     let Some(source) = find(&author)? else { return Ok(again) };
     let plan = EvaluationPlan {
-        tasks: run.tasks.clone().into(),
+        tasks: run.set.tasks.clone().into(),
         scenes: Arc::new(run.scenes.clone()),
         options: Options {
             jobs,
@@ -464,7 +398,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         session_export::write(explored, &path).unwrap();
-        let run = Recorded::open(&path, None).unwrap();
+        let run = RecordedRun::open(&path, None).unwrap();
         assert_eq!(run.episodes, explored.episodes);
         verify(&run, &mut random, 2, &mut |_| ()).unwrap()
     }
@@ -503,7 +437,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         session_export::write(&explored, &path).unwrap();
-        let run = Recorded::open(&path, None).unwrap();
+        let run = RecordedRun::open(&path, None).unwrap();
         let verdict = verify(&run, &mut |_| Ok(None), 1, &mut |_| ()).unwrap();
         assert_eq!((verdict.steps, verdict.choices, verdict.missing), (8, 0, vec!["random".to_string()]));
     }

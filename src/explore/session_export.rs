@@ -17,8 +17,9 @@ use crate::episode::scenes::Scenes;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::report::summary::Summary;
+use crate::run_dir::layout::{MANIFEST, TASKS};
 use crate::run_dir::manifest::Manifest;
-use crate::run_dir::writer::RunFolder;
+use crate::run_dir::writer::RunWriter;
 
 /// The tasks and episodes of an exploration, a branch each.
 #[derive(Clone, Debug)]
@@ -41,7 +42,7 @@ const MOST: u32 = 1000;
 /// # Errors
 /// When the folder holds something else, or cannot be written to.
 pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
-    ensure!(!path.join(RunFolder::MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
+    ensure!(!path.join(MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let set = TaskSet {
         format_version: TaskSet::FORMAT,
@@ -70,8 +71,8 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
         all_start_subtasks: false,
         shard: None,
     };
-    let mut folder = RunFolder::open(path, &manifest)?;
-    atomic_file::write(&path.join(RunFolder::TASKS), &bytes)?;
+    let mut folder = RunWriter::open(path, &manifest)?;
+    atomic_file::write(&path.join(TASKS), &bytes)?;
     if named {
         json::write(&path.join(SCENES).join(format!("{}.json", explored.scene.name)), &*explored.scene)?;
     }

@@ -18,7 +18,7 @@ use crate::episode::record::{Episode, Step};
 use crate::episode::rollout::{AfterEach, Rollout, Tick};
 use crate::house::House;
 use crate::house::grading::describe;
-use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::reader::RecordedRun;
 
 /// The side of a frame on the page, in pixels.
 const SIDE: u32 = 112;
@@ -29,7 +29,7 @@ const PAGE: &str = include_str!("../../assets/report.html");
 ///
 /// # Errors
 /// When a scene is missing, or a frame cannot be encoded.
-pub fn page(run: &FinishedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
+pub fn page(run: &RecordedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
     let row = |(number, episode): (usize, &Episode)| -> anyhow::Result<serde_json::Value> {
         let task = run.set.tasks.iter().find(|task| task.id == episode.task).context("an episode of no task")?;
         let outcome = match (&episode.error, episode.failure) {
@@ -75,7 +75,7 @@ pub fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
 }
 
 /// Frames of an episode: the start, what each completed subtask left, the end; each with the step it follows, as a PNG.
-fn strip(run: &FinishedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
+fn strip(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
     if most == 0 || episode.start_hash.is_empty() {
         return Ok(Vec::new());
     }

@@ -16,8 +16,8 @@ use crate::episode::failure::Failure;
 use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 use crate::house::grading::Grading;
+use crate::run_dir::layout::SUMMARY;
 use crate::run_dir::manifest::Manifest;
-use crate::run_dir::writer::RunFolder;
 
 /// Drives the resampling of the bootstrap.
 pub const BOOTSTRAP_SEED: u64 = 0;
@@ -140,7 +140,7 @@ impl Summary {
         atomic_file::write(&folder.join("summary.csv"), &self.csv()?)?;
         let plot = progress_by_length::progress_by_length(&[self]);
         progress_by_length::write(folder, progress_by_length::PROGRESS, &plot)?;
-        json::write_pretty(&folder.join(RunFolder::SUMMARY), self)
+        json::write_pretty(&folder.join(SUMMARY), self)
     }
 
     /// The format version this program reads and writes.
@@ -223,8 +223,8 @@ impl SkillRate {
 pub(crate) mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
+    use crate::run_dir::episodes::tests::episode;
     use crate::run_dir::manifest::tests::manifest;
-    use crate::run_dir::writer::tests::episode;
 
     pub(crate) fn sample() -> (Vec<Task>, Vec<Episode>) {
         let tasks = sample_set().tasks;

@@ -1,8 +1,11 @@
 //! What a run was made from: its `manifest.json`.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use super::shard::Shard;
+use crate::data::json;
 use crate::house::grading::Grading;
 
 /// What a run was made from; two runs with equal manifests measure the same thing.
@@ -48,10 +51,18 @@ pub struct Manifest {
 impl Manifest {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 2;
-    /// The most episodes, other words and starts apart, that a run may have: they are booked in memory.
+    /// The most episodes, other words and starts apart, that a run may have: its episodes are listed in memory.
     const MOST: u64 = 10_000_000;
 
-    /// Checks that a run of this size can be booked.
+    /// Reads a run's manifest.
+    ///
+    /// # Errors
+    /// When it cannot be read, or an older or newer program wrote it; names the file and the field.
+    pub fn read(path: &Path) -> anyhow::Result<Manifest> {
+        Ok(json::read(path, Manifest::FORMAT)?.value)
+    }
+
+    /// Checks that a run of this size fits into memory.
     ///
     /// # Errors
     /// When it has more episodes than that.
@@ -104,5 +115,15 @@ pub(crate) mod tests {
             all_start_subtasks: false,
             shard: None,
         }
+    }
+
+    #[test]
+    fn a_run_of_an_older_program_is_refused_in_one_sentence() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("manifest.json");
+        std::fs::write(&path, r#"{"format_version":1,"sprint":"0.1.0","language":false}"#).unwrap();
+        let error = format!("{:#}", Manifest::read(&path).unwrap_err());
+        let told = "format_version: 1, but this program reads 2; use the version of sprint that wrote it";
+        assert_eq!(error, format!("{}: {told}", path.display()));
     }
 }

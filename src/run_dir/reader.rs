@@ -1,20 +1,23 @@
-//! A run folder as it is read afterwards: to compare it, to merge it, to draw it.
+//! A run folder read back: to compare it, to merge it, to draw it, to verify it, to open its episodes.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use super::episode_spec::{EpisodeSpec, episode_specs};
+use super::episode_spec::{EpisodeSpec, episode_specs, policy_seed};
+use super::episodes::read_episodes;
+use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::Manifest;
-use super::writer::{RunFolder, read_episodes};
+use crate::data::json::Document;
 use crate::data::{json, taskset};
-use crate::domain::TaskSet;
-use crate::episode::record::{Episode, Key};
-use crate::episode::scenes::Scenes;
+use crate::domain::{Task, TaskSet};
+use crate::episode::record::{Author, Episode, Key};
+use crate::episode::scenes::{Scenes, Setting};
 
 /// A run as it lies on the disk.
-pub struct FinishedRun {
-    /// Its folder; of [joined](FinishedRun::joined) runs their folders with commas between.
+pub struct RecordedRun {
+    /// Its folder; of [joined](RecordedRun::joined) runs their folders with commas between.
     pub path: PathBuf,
     /// The folders that its episodes lie in, with the number of them in each, in the order of the episodes.
     pub sources: Vec<(PathBuf, usize)>,
@@ -28,35 +31,37 @@ pub struct FinishedRun {
     pub episodes: Vec<Episode>,
 }
 
-impl FinishedRun {
-    /// Reads a run folder.
+impl RecordedRun {
+    /// Reads a run folder, a person's exploration or an evaluation. Its tasks are in it, or in `tasks`, the file that the run
+    /// was made from.
     ///
     /// # Errors
-    /// When it is none, or one of its files is broken; names the file.
-    pub fn open(path: &Path) -> anyhow::Result<FinishedRun> {
+    /// When it is none, one of its files is broken, its tasks are not at hand, or `tasks` is another file; names the file.
+    pub fn open(path: &Path, tasks: Option<&Path>) -> anyhow::Result<RecordedRun> {
         let name = path.display();
         ensure!(path.is_dir(), "{name} is not a folder");
-        let manifest_path = path.join(RunFolder::MANIFEST);
-        ensure!(manifest_path.exists(), "{name} holds no run: there is no {}", RunFolder::MANIFEST);
-        let manifest = json::read::<Manifest>(&manifest_path, Manifest::FORMAT)?.value;
+        let manifest_path = path.join(MANIFEST);
+        ensure!(manifest_path.exists(), "{name} holds no run: there is no {MANIFEST}");
+        let manifest = Manifest::read(&manifest_path)?;
         manifest.check().with_context(|| manifest_path.display().to_string())?;
-        let tasks = path.join(RunFolder::TASKS);
-        let set = taskset::read(&tasks)?.value;
-        ensure!(
-            set.tasks.len() == manifest.tasks,
-            "{}: {} tasks, but the run's manifest says {}",
-            tasks.display(),
-            set.tasks.len(),
-            manifest.tasks
-        );
-        let (episodes, _) = read_episodes(&path.join(RunFolder::EPISODES))?;
-        let known: std::collections::BTreeSet<&str> = set.tasks.iter().map(|task| task.id.as_str()).collect();
+        let (set, scenes) = tasks_of(path, &manifest, tasks)?;
+        let (episodes, _) = read_episodes(&path.join(EPISODES))?;
+        let known: BTreeSet<&str> = set.tasks.iter().map(|task| task.id.as_str()).collect();
         if let Some(stranger) = episodes.iter().find(|episode| !known.contains(episode.task.as_str())) {
-            anyhow::bail!("{}: the run has no task {:?}", path.join(RunFolder::EPISODES).display(), stranger.task);
+            anyhow::bail!("{}: the run has no task {:?}", path.join(EPISODES).display(), stranger.task);
         }
-        let scenes = Scenes::of(&tasks, &set);
         let sources = vec![(path.to_owned(), episodes.len())];
-        Ok(FinishedRun { path: path.to_owned(), sources, manifest, set, scenes, episodes })
+        Ok(RecordedRun { path: path.to_owned(), sources, manifest, set, scenes, episodes })
+    }
+
+    /// Reads the run folder of an evaluation: its tasks are in it, and each can be graded.
+    ///
+    /// # Errors
+    /// As [`open`](RecordedRun::open), and when a task is not complete.
+    pub fn open_evaluated(path: &Path) -> anyhow::Result<RecordedRun> {
+        let run = RecordedRun::open(path, None)?;
+        taskset::check(&run.set).with_context(|| path.join(TASKS).display().to_string())?;
+        Ok(run)
     }
 
     /// Takes runs of the same tasks by agents that differ in their training's seed for one: the episodes' seeds of each go on
@@ -64,7 +69,7 @@ impl FinishedRun {
     ///
     /// # Errors
     /// When there is none, or they differ in more than the checkpoint and its name; says in what.
-    pub fn joined(runs: Vec<FinishedRun>) -> anyhow::Result<FinishedRun> {
+    pub fn joined(runs: Vec<RecordedRun>) -> anyhow::Result<RecordedRun> {
         let mut runs = runs.into_iter();
         let mut all = runs.next().context("name the runs to join")?;
         let (seeds, own) = (all.manifest.seeds, all.manifest.clone());
@@ -92,6 +97,26 @@ impl FinishedRun {
     pub fn name(&self) -> String {
         let last = self.path.file_name().or_else(|| self.path.parent().and_then(Path::file_name));
         last.map_or_else(|| self.path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    }
+
+    /// The task of an episode, with its position in the set, and where it starts.
+    ///
+    /// # Errors
+    /// When the set has no such task, or it fits its scene no longer.
+    pub fn setting(&self, episode: &Episode) -> anyhow::Result<(usize, &Task, Setting)> {
+        let found = self.set.tasks.iter().enumerate().find(|(_, task)| task.id == episode.task);
+        let (index, task) = found.with_context(|| format!("the tasks hold no {:?}", episode.task))?;
+        Ok((index, task, self.scenes.setting(task)?))
+    }
+
+    /// Who acted in an episode that does not say so.
+    pub fn author(&self, task: usize, episode: &Episode) -> Author {
+        Author {
+            policy: self.manifest.policy.clone(),
+            checkpoint: self.manifest.checkpoint_hash.clone(),
+            seed: policy_seed(task, episode.seed),
+            sampling: self.manifest.sampling,
+        }
     }
 
     /// Every episode that the run, or its share, comes to.
@@ -123,6 +148,38 @@ impl FinishedRun {
     }
 }
 
+/// The tasks of a run: those in its folder, which are what it played of the file that it was made from, or of that file.
+fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(TaskSet, Scenes)> {
+    let own = run.join(TASKS);
+    ensure!(
+        file.is_some() || own.exists(),
+        "{} does not hold its tasks; name the file that it was made from with --tasks (the set {:?})",
+        run.display(),
+        manifest.task_set
+    );
+    let path = file.unwrap_or(&own);
+    let Document { value: mut set, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    if file.is_some() {
+        ensure!(
+            digest == manifest.task_set_hash,
+            "{} is not what {} was made from: its SHA-256 is {digest:.12}, the run's {:.12}",
+            path.display(),
+            run.display(),
+            manifest.task_set_hash
+        );
+        set.tasks.truncate(manifest.tasks);
+    }
+    ensure!(
+        set.tasks.len() == manifest.tasks,
+        "{}: {} tasks, but the run's manifest says {}",
+        path.display(),
+        set.tasks.len(),
+        manifest.tasks
+    );
+    let scenes = Scenes::of(path, &set);
+    Ok((set, scenes))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,7 +189,7 @@ mod tests {
     fn joined_runs_are_one_with_more_seeds_and_each_episode_keeps_its_folder() {
         let [mut a, mut b] = [run("a", &[true, false]), run("b", &[false, true])];
         (a.manifest.checkpoint_hash, b.manifest.checkpoint_hash) = (Some("aa".into()), Some("bb".into()));
-        let joined = FinishedRun::joined(vec![a, b]).unwrap();
+        let joined = RecordedRun::joined(vec![a, b]).unwrap();
         assert_eq!((joined.manifest.seeds, &joined.manifest.checkpoint_hash), (4, &None));
         assert_eq!(joined.path, Path::new("a,b"));
         assert_eq!(joined.episodes.iter().map(|episode| episode.seed).collect::<Vec<_>>(), [0, 1, 2, 3]);
@@ -145,7 +202,7 @@ mod tests {
     fn runs_that_measured_something_else_are_not_joined() {
         let mut other = run("b", &[true]);
         other.manifest.step_by_step = true;
-        let error = FinishedRun::joined(vec![run("a", &[true]), other]).err().unwrap().to_string();
+        let error = RecordedRun::joined(vec![run("a", &[true]), other]).err().unwrap().to_string();
         assert!(error.contains("a and b") && error.contains("step_by_step: false, not true"), "{error}");
     }
 }

@@ -21,7 +21,7 @@ use sprint_explorer::eval::options::Options;
 use sprint_explorer::eval::tasks::check;
 use sprint_explorer::eval::tasks::sample;
 use sprint_explorer::eval::tasks::sample::Wish;
-use sprint_explorer::eval::verify::{Recorded, verify};
+use sprint_explorer::eval::verify::verify;
 use sprint_explorer::house::expert::TurnTiming;
 use sprint_explorer::house::grading::Grading;
 use sprint_explorer::house::{House, validate};
@@ -29,8 +29,8 @@ use sprint_explorer::nets::embedding_cache::EmbeddingCache;
 use sprint_explorer::nets::weights;
 use sprint_explorer::report::charts::training_curves;
 use sprint_explorer::report::compare::Comparison;
-use sprint_explorer::run_dir::reader::FinishedRun;
-use sprint_explorer::run_dir::writer::RunFolder;
+use sprint_explorer::run_dir::reader::RecordedRun;
+use sprint_explorer::run_dir::writer::RunWriter;
 use sprint_explorer::train::collect::{Collection, Demonstrator, Manner, Source};
 use sprint_explorer::train::metrics::{Report, Scalars};
 use sprint_explorer::train::preset::Preset;
@@ -152,7 +152,7 @@ fn run(at: &Path, file: &str) -> Vec<Vec<u8>> {
     let set = taskset::read(&path).unwrap();
     let options = Options { seeds: 2, ..Options::plain(Grading::Class) };
     let evaluation = Evaluation::prepare(&set, Scenes::of(&path, &set.value), options, "random", None).unwrap();
-    let mut folder = RunFolder::open(&at.join("run"), evaluation.manifest()).unwrap();
+    let mut folder = RunWriter::open(&at.join("run"), evaluation.manifest()).unwrap();
     folder.write_tasks(&set.value).unwrap();
     evaluate(&evaluation, &PolicySource::random().make, &mut folder, &Arc::new(AtomicBool::new(false)), &mut |_| ())
         .unwrap();
@@ -170,12 +170,12 @@ fn manifests(at: &Path) -> Vec<Vec<u8>> {
 /// Everything that looks at a run afterwards.
 fn finished(at: &Path) -> anyhow::Result<()> {
     let path = at.join("run");
-    let run = FinishedRun::open(&path)?;
+    let run = RecordedRun::open_evaluated(&path)?;
     run.episode_specs();
-    Comparison::of(&[FinishedRun::open(&path)?, run])?.0.markdown();
-    let recorded = Recorded::open(&path, None)?;
+    Comparison::of(&[RecordedRun::open_evaluated(&path)?, run])?.0.markdown();
+    let recorded = RecordedRun::open(&path, None)?;
     verify(&recorded, &mut |_| Ok(None), 1, &mut |_| ())?;
-    RunFolder::open(&path, &recorded.manifest).map(drop)
+    RunWriter::open(&path, &recorded.manifest).map(drop)
 }
 
 struct Silent;

@@ -12,7 +12,7 @@ use crate::episode::scenes::Setting;
 use crate::explore::session_export;
 use crate::explore::session_export::SessionExport;
 use crate::report::export;
-use crate::run_dir::writer;
+use crate::run_dir::default_path;
 
 impl Session {
     /// Everything that was tried as a run's tasks and episodes, a branch each.
@@ -65,7 +65,7 @@ impl Session {
     pub fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
         let path = path.unwrap_or_else(|| {
             let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-            writer::default_path("explored", since, &|path| path.exists())
+            default_path::default_path("explored", since, &|path| path.exists())
         });
         let explored = self.explored();
         session_export::write(&explored, &path)?;
@@ -102,8 +102,9 @@ mod tests {
     use crate::data::taskset;
     use crate::domain::{Action, ActionType};
     use crate::episode::record::Author;
-    use crate::eval::verify::{Recorded, verify};
+    use crate::eval::verify::verify;
     use crate::explore::testing;
+    use crate::run_dir::reader::RecordedRun;
 
     #[test]
     fn an_exploration_with_forks_is_kept_and_verified_and_its_state_becomes_a_task() {
@@ -122,7 +123,7 @@ mod tests {
         let path = folder.path().join("run");
         assert!(engine.keep(Some(path.clone())).unwrap().contains("2 branches"));
         assert!(engine.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));
-        let run = Recorded::open(&path, None).unwrap();
+        let run = RecordedRun::open(&path, None).unwrap();
         let mut find = |_: &Author| Ok(Some(PolicySource::random()));
         let verdict = verify(&run, &mut find, 1, &mut |_| ()).unwrap();
         assert!(verdict.differences.is_empty(), "{verdict:?}");

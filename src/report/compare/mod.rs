@@ -12,7 +12,7 @@ use super::stats;
 use super::stats::Interval;
 use super::summary::{Mean, Summary};
 use crate::episode::record::Episode;
-use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::reader::RecordedRun;
 
 /// What a comparison found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,15 +63,15 @@ impl Comparison {
     ///
     /// # Errors
     /// When there are fewer than two, or two have no episode in common.
-    pub fn of(runs: &[FinishedRun]) -> anyhow::Result<(Comparison, Vec<Summary>)> {
+    pub fn of(runs: &[RecordedRun]) -> anyhow::Result<(Comparison, Vec<Summary>)> {
         let [first, others @ ..] = runs else { anyhow::bail!("name the runs to compare") };
         anyhow::ensure!(!others.is_empty(), "name a second run to compare with {}", first.path.display());
-        let summary = |run: &FinishedRun| {
+        let summary = |run: &RecordedRun| {
             let partial = run.episodes.len() < run.episode_specs().len();
             Summary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
         };
         let summaries: Vec<Summary> = runs.iter().map(summary).collect();
-        let standing = |(run, summary): (&FinishedRun, &Summary)| Standing {
+        let standing = |(run, summary): (&RecordedRun, &Summary)| Standing {
             run: run.path.display().to_string(),
             task_set: summary.task_set.clone(),
             policy: summary.policy.clone(),
@@ -99,7 +99,7 @@ impl Comparison {
 }
 
 /// Completed subtasks in the tasks' own words from their starts, folder by folder where there are several.
-fn completed_by_folder(run: &FinishedRun) -> Vec<f64> {
+fn completed_by_folder(run: &RecordedRun) -> Vec<f64> {
     if run.sources.len() < 2 {
         return Vec::new();
     }
@@ -132,8 +132,8 @@ mod tests {
 
     #[test]
     fn a_method_trained_twice_is_one_row_that_tells_both_trainings() {
-        let twice = FinishedRun::joined(vec![run("a1", &[true, true]), run("a2", &[true, false])]).unwrap();
-        let other = FinishedRun::joined(vec![run("b1", &[false, false]), run("b2", &[true, false])]).unwrap();
+        let twice = RecordedRun::joined(vec![run("a1", &[true, true]), run("a2", &[true, false])]).unwrap();
+        let other = RecordedRun::joined(vec![run("b1", &[false, false]), run("b2", &[true, false])]).unwrap();
         let (comparison, _) = Comparison::of(&[twice, other]).unwrap();
         let [first, second] = &comparison.runs[..] else { panic!("two rows") };
         assert_eq!((first.episodes, &first.completed_subtasks_by_folder), (4, &vec![2.0, 1.5]));

@@ -9,7 +9,7 @@ use crate::episode::record::{Episode, Key};
 use crate::report::stats;
 use crate::report::stats::Interval;
 use crate::report::summary::BOOTSTRAP_SEED;
-use crate::run_dir::reader::FinishedRun;
+use crate::run_dir::reader::RecordedRun;
 
 /// A difference of two means, second less first, and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +80,7 @@ impl Paired {
     ///
     /// # Errors
     /// When they have no episode in common.
-    pub fn of(first: &FinishedRun, second: &FinishedRun) -> anyhow::Result<Paired> {
+    pub fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<Paired> {
         let mut others: BTreeMap<Key, &Episode> = second
             .episodes
             .iter()
@@ -170,12 +170,12 @@ pub(crate) mod tests {
     use crate::data::taskset::tests::sample_set;
     use crate::episode::instruction_variant::InstructionVariant;
     use crate::episode::scenes::Scenes;
+    use crate::run_dir::episodes::tests::episode;
     use crate::run_dir::manifest::Manifest;
     use crate::run_dir::manifest::tests::manifest;
-    use crate::run_dir::writer::tests::episode;
 
     /// A run of the sample set in which these seeds of the first task succeeded.
-    pub(crate) fn run(name: &str, outcomes: &[bool]) -> FinishedRun {
+    pub(crate) fn run(name: &str, outcomes: &[bool]) -> RecordedRun {
         let outcome = |(seed, &success): (u64, &bool)| Episode {
             seed,
             success,
@@ -183,7 +183,7 @@ pub(crate) mod tests {
             ..episode("first")
         };
         let set = sample_set();
-        FinishedRun {
+        RecordedRun {
             path: name.into(),
             sources: vec![(name.into(), outcomes.len())],
             manifest: Manifest { seeds: outcomes.len() as u64, ..manifest() },
