@@ -41,12 +41,8 @@ impl Report {
                 .context("the same eval command writes the summary")?
                 .value;
             let page = out.join("report.html");
-            atomic_file::write(&page, html::page(&run, &summary, self.frames)?.as_bytes())?;
-            progress_by_length::write(
-                out,
-                progress_by_length::PROGRESS,
-                &progress_by_length::progress_by_length(&[&summary]),
-            )?;
+            atomic_file::write(&page, html::run_page(&run, &summary, self.frames)?.as_bytes())?;
+            progress_by_length::draw(&[&summary]).write(out, progress_by_length::FILE_STEM)?;
             say(&format!("wrote {}", page.display()));
         } else {
             bail!(

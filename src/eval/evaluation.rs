@@ -15,6 +15,7 @@ use crate::episode::record::{Episode, Key};
 use crate::episode::scenes::Scenes;
 use crate::house::grading::Grading;
 use crate::report::summary::Summary;
+use crate::report::summary_files;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
 use crate::run_dir::manifest::Manifest;
 use crate::run_dir::writer::RunWriter;
@@ -213,7 +214,7 @@ pub fn finish(
     let (episodes, hash) = folder.result(&order)?;
     let mut summary = Summary::of(manifest, tasks, &episodes, episodes.len() < all.len());
     summary.episodes_hash = hash;
-    summary.write(folder.path())?;
+    summary_files::write(&summary, folder.path())?;
     Ok(summary)
 }
 

@@ -17,6 +17,7 @@ use crate::episode::scenes::Scenes;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::report::summary::Summary;
+use crate::report::summary_files;
 use crate::run_dir::layout::{MANIFEST, TASKS};
 use crate::run_dir::manifest::Manifest;
 use crate::run_dir::writer::RunWriter;
@@ -79,7 +80,7 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     for episode in &explored.episodes {
         folder.append(episode)?;
     }
-    Summary::of(&manifest, &set.tasks, &explored.episodes, false).write(folder.path())
+    summary_files::write(&Summary::of(&manifest, &set.tasks, &explored.episodes, false), folder.path())
 }
 
 /// A task without subtasks: nobody grades what a person made up.

@@ -4,25 +4,26 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::estimates::{Mean, SkillRate};
 use super::stats;
 use super::stats::Interval;
-use super::summary::{Mean, SkillRate};
 use crate::domain::task::SceneRef;
 use crate::domain::{SkillKind, Task};
 use crate::episode::failure::Failure;
 use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 
-/// Episodes by task in the set's order, by seed within: sums of floats then do not depend on the order of the episodes.
+/// Episodes episodes by task, in the set's order and by seed within: sums of floats then do not depend on the order in which
+/// the episodes ended.
 #[derive(Clone)]
-pub struct Grouped<'a> {
+pub struct EpisodesByTask<'a> {
     groups: Vec<(&'a Task, Vec<&'a Episode>)>,
 }
 
 /// Figures of some of a run's episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Group {
+pub struct GroupFigures {
     /// Episodes.
     pub episodes: usize,
     /// Of those, successes.
@@ -38,7 +39,7 @@ pub struct Group {
 /// Episodes that fell short for one reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FailureClass {
+pub struct FailureCount {
     /// How many.
     pub episodes: usize,
     /// As a share of all episodes.
@@ -52,7 +53,7 @@ pub struct FailureClass {
 /// An episode that ended with an error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Errored {
+pub struct ErroredEpisode {
     /// The task.
     pub task: String,
     /// The seed.
@@ -71,16 +72,16 @@ pub struct Errored {
 /// Episodes that the expert led to the same subtask.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Start {
+pub struct StartSubtaskFigures {
     /// The agent's very first subtask.
     pub first_subtask: SkillRate,
     /// All that was left.
-    pub remaining: Group,
+    pub remaining: GroupFigures,
 }
 
-impl<'a> Grouped<'a> {
+impl<'a> EpisodesByTask<'a> {
     /// Groups episodes by their tasks.
-    pub fn of(tasks: &'a [Task], episodes: &'a [Episode]) -> Grouped<'a> {
+    pub fn new(tasks: &'a [Task], episodes: &'a [Episode]) -> EpisodesByTask<'a> {
         let mut of_task: BTreeMap<&str, Vec<&Episode>> = BTreeMap::new();
         for episode in episodes {
             of_task.entry(&episode.task).or_default().push(episode);
@@ -90,14 +91,14 @@ impl<'a> Grouped<'a> {
         for (_, group) in &mut groups {
             group.sort_by_key(|episode| (episode.seed, episode.variant, episode.start_subtask));
         }
-        Grouped { groups }
+        EpisodesByTask { groups }
     }
 
-    /// Those of its episodes that `keep` says.
-    pub fn only(&self, keep: impl Fn(&Episode) -> bool) -> Grouped<'a> {
+    /// The episodes that `keep` accepts.
+    pub fn filter(&self, keep: impl Fn(&Episode) -> bool) -> EpisodesByTask<'a> {
         let kept = |group: &[&'a Episode]| group.iter().copied().filter(|episode| keep(episode)).collect::<Vec<_>>();
         let groups = self.groups.iter().map(|(task, group)| (*task, kept(group)));
-        Grouped { groups: groups.filter(|(_, group)| !group.is_empty()).collect() }
+        EpisodesByTask { groups: groups.filter(|(_, group)| !group.is_empty()).collect() }
     }
 
     /// How many tasks there are.
@@ -106,7 +107,7 @@ impl<'a> Grouped<'a> {
     }
 
     /// Every episode with its task.
-    pub fn pairs(&self) -> Vec<(&'a Task, &'a Episode)> {
+    pub fn iter(&self) -> Vec<(&'a Task, &'a Episode)> {
         self.groups.iter().flat_map(|(task, group)| group.iter().map(|&episode| (*task, episode))).collect()
     }
 
@@ -115,11 +116,11 @@ impl<'a> Grouped<'a> {
         self.groups.iter().map(|(_, group)| group.iter().map(|episode| value(episode)).collect()).collect()
     }
 
-    /// Its figures.
-    pub fn group(&self) -> Group {
-        let all = self.pairs();
+    /// The figures of all of them.
+    pub fn figures(&self) -> GroupFigures {
+        let all = self.iter();
         let successes = all.iter().filter(|(_, episode)| episode.success).count();
-        Group {
+        GroupFigures {
             episodes: all.len(),
             successes,
             success: if all.is_empty() { 0.0 } else { successes as f64 / all.len() as f64 },
@@ -129,7 +130,7 @@ impl<'a> Grouped<'a> {
     }
 
     /// Figures by scene.
-    pub fn by_scene(&self) -> BTreeMap<String, Group> {
+    pub fn by_scene(&self) -> BTreeMap<String, GroupFigures> {
         let mut scenes: BTreeMap<String, Vec<(&'a Task, Vec<&'a Episode>)>> = BTreeMap::new();
         for (task, group) in &self.groups {
             let name = match &task.scene {
@@ -138,7 +139,7 @@ impl<'a> Grouped<'a> {
             };
             scenes.entry(name).or_default().push((task, group.clone()));
         }
-        scenes.into_iter().map(|(name, groups)| (name, Grouped { groups }.group())).collect()
+        scenes.into_iter().map(|(name, groups)| (name, EpisodesByTask { groups }.figures())).collect()
     }
 
     /// Steps of successful episodes as a multiple of the expert's, where the task says how many those are.
@@ -153,13 +154,13 @@ impl<'a> Grouped<'a> {
 }
 
 /// Why episodes fell short.
-pub fn failures(grouped: &Grouped<'_>) -> BTreeMap<Failure, FailureClass> {
-    let all = grouped.pairs();
-    let mut classes: BTreeMap<Failure, FailureClass> = BTreeMap::new();
+pub fn failures(episodes: &EpisodesByTask<'_>) -> BTreeMap<Failure, FailureCount> {
+    let all = episodes.iter();
+    let mut classes: BTreeMap<Failure, FailureCount> = BTreeMap::new();
     for (task, episode) in &all {
         let Some(failure) = episode.failure else { continue };
         let new =
-            || FailureClass { episodes: 0, share: 0.0, example_task: task.id.clone(), example_seed: episode.seed };
+            || FailureCount { episodes: 0, share: 0.0, example_task: task.id.clone(), example_seed: episode.seed };
         let class = classes.entry(failure).or_insert_with(new);
         class.episodes += 1;
         class.share = class.episodes as f64 / all.len() as f64;
@@ -168,9 +169,9 @@ pub fn failures(grouped: &Grouped<'_>) -> BTreeMap<Failure, FailureClass> {
 }
 
 /// Every episode that ended with an error.
-pub fn errored(grouped: &Grouped<'_>) -> Vec<Errored> {
-    let errors = grouped.pairs().into_iter().filter_map(|(_, episode)| Some((episode, episode.error.clone()?)));
-    let listed = errors.map(|(episode, error)| Errored {
+pub fn errored(episodes: &EpisodesByTask<'_>) -> Vec<ErroredEpisode> {
+    let errors = episodes.iter().into_iter().filter_map(|(_, episode)| Some((episode, episode.error.clone()?)));
+    let listed = errors.map(|(episode, error)| ErroredEpisode {
         task: episode.task.clone(),
         seed: episode.seed,
         variant: episode.variant,
@@ -182,9 +183,9 @@ pub fn errored(grouped: &Grouped<'_>) -> Vec<Errored> {
 }
 
 /// Figures by instruction variant.
-pub fn instruction_variants(grouped: &Grouped<'_>) -> BTreeMap<InstructionVariant, Group> {
+pub fn instruction_variants(episodes: &EpisodesByTask<'_>) -> BTreeMap<InstructionVariant, GroupFigures> {
     let of = |variant: InstructionVariant| {
-        grouped.only(|episode| episode.variant == variant && episode.start_subtask == 0).group()
+        episodes.filter(|episode| episode.variant == variant && episode.start_subtask == 0).figures()
     };
     InstructionVariant::ALL
         .into_iter()
@@ -194,20 +195,20 @@ pub fn instruction_variants(grouped: &Grouped<'_>) -> BTreeMap<InstructionVarian
 }
 
 /// Figures by the subtask from which the agent acted.
-pub fn start_subtasks(grouped: &Grouped<'_>) -> BTreeMap<u32, Start> {
-    let own = grouped.only(|episode| episode.variant.is_original());
-    let last = own.pairs().iter().map(|(_, episode)| episode.start_subtask).max();
+pub fn start_subtasks(episodes: &EpisodesByTask<'_>) -> BTreeMap<u32, StartSubtaskFigures> {
+    let own = episodes.filter(|episode| episode.variant.is_original());
+    let last = own.iter().iter().map(|(_, episode)| episode.start_subtask).max();
     let of = |from: u32| {
-        let there = own.only(|episode| episode.start_subtask == from);
+        let there = own.filter(|episode| episode.start_subtask == from);
         let first = SkillRate::of(&there.values(|episode| f64::from(u8::from(episode.completed > 0))));
-        Start { first_subtask: first, remaining: there.group() }
+        StartSubtaskFigures { first_subtask: first, remaining: there.figures() }
     };
     last.map(|last| (0..=last).map(|from| (from, of(from))).collect()).unwrap_or_default()
 }
 
 /// How often a subtask whose turn came was completed, by its kind.
-pub fn skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
-    rates(grouped, |task, episode| {
+pub fn skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    rates(episodes, |task, episode| {
         let completed = episode.completed as usize;
         let turns = task.subtasks.iter().enumerate().take(completed + 1);
         turns.map(|(i, subtask)| (subtask.skill, i < completed)).collect()
@@ -215,8 +216,8 @@ pub fn skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
 }
 
 /// How often the agent completed its very first subtask, by the subtask's kind.
-pub fn first_subtask_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillRate> {
-    let own = grouped.only(|episode| episode.variant.is_original());
+pub fn first_subtask_skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
+    let own = episodes.filter(|episode| episode.variant.is_original());
     rates(&own, |task, episode| {
         let first = task.subtasks.get(episode.start_subtask as usize);
         first.map(|subtask| (subtask.skill, episode.completed > 0)).into_iter().collect()
@@ -225,11 +226,11 @@ pub fn first_subtask_skills(grouped: &Grouped<'_>) -> BTreeMap<SkillKind, SkillR
 
 /// Rates by kind of skill, of what each episode's turns came to.
 fn rates(
-    grouped: &Grouped<'_>,
+    episodes: &EpisodesByTask<'_>,
     turns: impl Fn(&Task, &Episode) -> Vec<(SkillKind, bool)>,
 ) -> BTreeMap<SkillKind, SkillRate> {
     let mut by_kind: BTreeMap<SkillKind, Vec<Vec<f64>>> = BTreeMap::new();
-    for (task, group) in &grouped.groups {
+    for (task, group) in &episodes.groups {
         let mut of_task: BTreeMap<SkillKind, Vec<f64>> = BTreeMap::new();
         for (kind, completed) in group.iter().flat_map(|episode| turns(task, episode)) {
             of_task.entry(kind).or_default().push(f64::from(u8::from(completed)));

@@ -23,13 +23,13 @@ use crate::run_dir::reader::RecordedRun;
 /// The side of a frame on the page, in pixels.
 const SIDE: u32 = 112;
 /// The page around the data.
-const PAGE: &str = include_str!("../../assets/report.html");
+const TEMPLATE: &str = include_str!("../../assets/report.html");
 
 /// The page of a run; `frames` is the most of an episode, 0 for none. Episodes are taken again on all cores.
 ///
 /// # Errors
 /// When a scene is missing, or a frame cannot be encoded.
-pub fn page(run: &RecordedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
+pub fn run_page(run: &RecordedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
     let row = |(number, episode): (usize, &Episode)| -> anyhow::Result<serde_json::Value> {
         let task = run.set.tasks.iter().find(|task| task.id == episode.task).context("an episode of no task")?;
         let outcome = match (&episode.error, episode.failure) {
@@ -53,15 +53,15 @@ pub fn page(run: &RecordedRun, summary: &Summary, frames: usize) -> anyhow::Resu
             "error": episode.error,
             "subtasks": task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect::<Vec<_>>(),
             "open": format!("sprint open {}#{}", run.path.display(), number + 1),
-            "frames": strip(run, task, episode, frames)?,
+            "frames": frames_of(run, task, episode, frames)?,
         }))
     };
     let rows: Vec<serde_json::Value> = run.episodes.par_iter().enumerate().map(row).collect::<anyhow::Result<_>>()?;
     let data = in_script(&rows)?;
     let title = format!("{} on {}", summary.policy, summary.task_set);
-    Ok(PAGE
+    Ok(TEMPLATE
         .replace("{{title}}", &escape(&title))
-        .replace("{{plot}}", &progress_by_length::progress_by_length(&[summary]).svg())
+        .replace("{{plot}}", &progress_by_length::draw(&[summary]).svg())
         .replace("{{summary}}", &escape(&summary.markdown()))
         .replace("{{episodes}}", &data))
 }
@@ -75,7 +75,7 @@ pub fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
 }
 
 /// Frames of an episode: the start, what each completed subtask left, the end; each with the step it follows, as a PNG.
-fn strip(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
+fn frames_of(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
     if most == 0 || episode.start_hash.is_empty() {
         return Ok(Vec::new());
     }
@@ -90,7 +90,7 @@ fn strip(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyh
     let mut shown = Vec::new();
     let mut show = |rollout: &mut Rollout, step: usize| -> anyhow::Result<()> {
         if steps.contains(&step) {
-            shown.push(json!({"step": step, "png": picture(rollout)?}));
+            shown.push(json!({"step": step, "png": frame_png(rollout)?}));
         }
         Ok(())
     };
@@ -103,7 +103,7 @@ fn strip(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyh
     Ok(shown)
 }
 
-fn picture(rollout: &mut Rollout) -> anyhow::Result<String> {
+fn frame_png(rollout: &mut Rollout) -> anyhow::Result<String> {
     let frame = rollout.env.house.frame();
     let (width, height) = (frame.width as u32, frame.height as u32);
     let image = RgbImage::from_raw(width, height, frame.rgb.clone()).context("a frame has another size")?;

@@ -1,58 +1,20 @@
 //! What a run came to: rates and means with their intervals.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::charts::progress_by_length;
+use super::estimates::{BOOTSTRAP_SEED, Mean, SkillRate};
 use super::groups;
-use super::groups::{Errored, FailureClass, Group, Grouped, Start};
+use super::groups::{EpisodesByTask, ErroredEpisode, FailureCount, GroupFigures, StartSubtaskFigures};
 use super::stats;
 use super::stats::Interval;
-use crate::data::{atomic_file, json};
 use crate::domain::{SkillKind, Task};
 use crate::episode::failure::Failure;
 use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 use crate::house::grading::Grading;
-use crate::run_dir::layout::SUMMARY;
 use crate::run_dir::manifest::Manifest;
-
-/// Drives the resampling of the bootstrap.
-pub const BOOTSTRAP_SEED: u64 = 0;
-
-/// A mean and its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Mean {
-    /// Over all episodes.
-    pub mean: f64,
-    /// Lower and upper end.
-    pub interval: Interval,
-}
-
-impl Mean {
-    /// Of the values of each task's episodes.
-    pub fn of(groups: &[Vec<f64>]) -> Mean {
-        let mean = stats::mean(groups.iter().flatten().copied());
-        Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
-    }
-}
-
-/// How often the skills of one kind, once reached, were completed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SkillRate {
-    /// Subtasks of the kind whose turn came.
-    pub reached: usize,
-    /// Of those, completed.
-    pub completed: usize,
-    /// The share; 0 when none was reached.
-    pub rate: f64,
-    /// Its 95 % interval.
-    pub interval: Interval,
-}
 
 /// How the intervals were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -104,7 +66,7 @@ pub struct Summary {
     /// By the kind of skill.
     pub skills: BTreeMap<SkillKind, SkillRate>,
     /// By the scene; generated houses by their room.
-    pub scenes: BTreeMap<String, Group>,
+    pub scenes: BTreeMap<String, GroupFigures>,
     /// Steps of an episode.
     pub steps_mean: f64,
     /// Steps that the expert takes, for the same episodes.
@@ -112,15 +74,15 @@ pub struct Summary {
     /// Steps of a successful episode as a multiple of the expert's; nothing without any.
     pub steps_over_expert: Option<Mean>,
     /// Why episodes fell short, by class.
-    pub failures: BTreeMap<Failure, FailureClass>,
+    pub failures: BTreeMap<Failure, FailureCount>,
     /// Every episode that ended with an error.
-    pub errored_episodes: Vec<Errored>,
+    pub errored_episodes: Vec<ErroredEpisode>,
     /// By instruction variant, where a run asked for them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub instruction_variants: BTreeMap<InstructionVariant, Group>,
+    pub instruction_variants: BTreeMap<InstructionVariant, GroupFigures>,
     /// By the subtask from which the agent acted, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub start_subtasks: BTreeMap<u32, Start>,
+    pub start_subtasks: BTreeMap<u32, StartSubtaskFigures>,
     /// By the kind of the first subtask that was the agent's own, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub first_subtask_skills: BTreeMap<SkillKind, SkillRate>,
@@ -131,56 +93,44 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Writes the summary in its three forms and the plots into a run's folder, each atomically.
-    ///
-    /// # Errors
-    /// When the folder cannot be written to.
-    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
-        atomic_file::write(&folder.join("summary.md"), self.markdown().as_bytes())?;
-        atomic_file::write(&folder.join("summary.csv"), &self.csv()?)?;
-        let plot = progress_by_length::progress_by_length(&[self]);
-        progress_by_length::write(folder, progress_by_length::PROGRESS, &plot)?;
-        json::write_pretty(&folder.join(SUMMARY), self)
-    }
-
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 2;
 
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
     pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
-        let every = Grouped::of(tasks, episodes);
-        let main = every.only(|episode| episode.is_plain());
-        let all = main.pairs();
+        let every = EpisodesByTask::new(tasks, episodes);
+        let plain = every.filter(|episode| episode.is_plain());
+        let all = plain.iter();
         let lengths: BTreeSet<u32> = all.iter().map(|(_, episode)| episode.of).collect();
         let by_length = |value: fn(&Episode) -> f64| -> BTreeMap<u32, f64> {
             let of_length = |length| all.iter().filter(move |(_, e)| e.of == length).map(move |(_, e)| value(e));
             lengths.iter().map(|&length| (length, stats::mean(of_length(length)))).collect()
         };
         let count = |length| all.iter().filter(|(_, episode)| episode.of == length).count();
-        let interval = |length: u32| Mean::of(&main.only(|e| e.of == length).values(Episode::progress)).interval;
+        let interval = |length: u32| Mean::of(&plain.filter(|e| e.of == length).values(Episode::progress)).interval;
         Summary {
             format_version: Summary::FORMAT,
             task_set: manifest.task_set.clone(),
             policy: manifest.policy.clone(),
             grader: manifest.grader,
             partial,
-            tasks: main.tasks(),
+            tasks: plain.tasks(),
             episodes: all.len(),
-            errors: every.pairs().iter().filter(|(_, episode)| episode.error.is_some()).count(),
+            errors: every.iter().iter().filter(|(_, episode)| episode.error.is_some()).count(),
             success: stats::mean(all.iter().map(|(_, episode)| episode.succeeded())),
-            success_interval: stats::wilson_of_groups(&main.values(Episode::succeeded)),
-            completed_subtasks: Mean::of(&main.values(|episode| f64::from(episode.completed))),
-            progress: Mean::of(&main.values(Episode::progress)),
+            success_interval: stats::wilson_of_groups(&plain.values(Episode::succeeded)),
+            completed_subtasks: Mean::of(&plain.values(|episode| f64::from(episode.completed))),
+            progress: Mean::of(&plain.values(Episode::progress)),
             progress_by_length: by_length(Episode::progress),
             progress_interval_by_length: lengths.iter().map(|&length| (length, interval(length))).collect(),
             success_by_length: by_length(Episode::succeeded),
             episodes_by_length: lengths.iter().map(|&length| (length, count(length))).collect(),
-            skills: groups::skills(&main),
-            scenes: main.by_scene(),
+            skills: groups::skills(&plain),
+            scenes: plain.by_scene(),
             steps_mean: stats::mean(all.iter().map(|(_, episode)| f64::from(episode.steps))),
             expert_steps_mean: stats::mean(all.iter().map(|(task, _)| f64::from(task.expert_steps))),
-            steps_over_expert: main.steps_over_expert(),
-            failures: groups::failures(&main),
+            steps_over_expert: plain.steps_over_expert(),
+            failures: groups::failures(&plain),
             errored_episodes: groups::errored(&every),
             instruction_variants: if manifest.instruction_variants {
                 groups::instruction_variants(&every)
@@ -195,7 +145,7 @@ impl Summary {
             },
             episodes_hash: String::new(),
             interval_methods: IntervalMethods {
-                rates: match all.len() > main.tasks() {
+                rates: match all.len() > plain.tasks() {
                     false => "Wilson score, 95 %".into(),
                     true => {
                         "Wilson score, 95 %, over the effective number of episodes: a task's seeds are alike".into()
@@ -207,15 +157,6 @@ impl Summary {
                 ),
             },
         }
-    }
-}
-
-impl SkillRate {
-    /// Of each task's subtasks of the kind whose turn came: 1 where it was completed, else 0.
-    pub(crate) fn of(groups: &[Vec<f64>]) -> SkillRate {
-        let (reached, completed) = (groups.iter().map(Vec::len).sum(), groups.iter().flatten().sum::<f64>() as usize);
-        let rate = if reached == 0 { 0.0 } else { completed as f64 / reached as f64 };
-        SkillRate { reached, completed, rate, interval: stats::wilson_of_groups(groups) }
     }
 }
 

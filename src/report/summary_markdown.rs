@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::groups::Group;
+use super::estimates::SkillRate;
+use super::groups::GroupFigures;
+use super::markdown_table::{aligned_table, between, percent, table};
 use super::stats::Interval;
-use super::summary::{SkillRate, Summary};
+use super::summary::Summary;
 use crate::domain::SkillKind;
 
 impl Summary {
@@ -14,8 +16,8 @@ impl Summary {
             "\n**Partial: the run was interrupted. The same command with this folder as --out continues it.**\n";
         let mut parts = vec![
             format!("# {} on {}\n", self.policy, self.task_set) + if self.partial { partial } else { "" },
-            table(["measure", "value", "95 % interval"], self.whole()),
-            self.lengths(),
+            table(["measure", "value", "95 % interval"], self.overall_rows()),
+            self.length_table(),
             table(["skill", "reached", "completed", "rate", "95 % interval"], skill_rows(&self.skills)),
         ];
         if !self.failures.is_empty() {
@@ -61,7 +63,7 @@ impl Summary {
     }
 
     /// The measures of the whole run.
-    fn whole(&self) -> Vec<[String; 3]> {
+    fn overall_rows(&self) -> Vec<[String; 3]> {
         let completed = self.completed_subtasks;
         let [low, high] = completed.interval;
         let mut whole = vec![
@@ -82,7 +84,7 @@ impl Summary {
     }
 
     /// Progress by length, a column each as the paper's table has it.
-    fn lengths(&self) -> String {
+    fn length_table(&self) -> String {
         let lengths: Vec<u32> = self.episodes_by_length.keys().copied().collect();
         let row = |name: &str, cell: &dyn Fn(u32) -> String| -> Vec<String> {
             std::iter::once(name.to_owned()).chain(lengths.iter().map(|&length| cell(length))).collect()
@@ -98,7 +100,7 @@ impl Summary {
             row("95 % interval", &interval),
             row("success", &|length| share(&self.success_by_length, length)),
         ];
-        lined_up(&row("subtasks of the task", &|length| length.to_string()), &rows)
+        aligned_table(&row("subtasks of the task", &|length| length.to_string()), &rows)
     }
 
     /// One row for each figure of the whole, of each length, and of each kind of skill.
@@ -144,14 +146,6 @@ impl Summary {
     }
 }
 
-pub(crate) fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
-}
-
-pub(crate) fn between([low, high]: Interval) -> String {
-    format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
-}
-
 fn skill_rows(skills: &BTreeMap<SkillKind, SkillRate>) -> Vec<[String; 5]> {
     let row = |(kind, skill): (&SkillKind, &SkillRate)| {
         let (reached, completed) = (skill.reached.to_string(), skill.completed.to_string());
@@ -160,38 +154,10 @@ fn skill_rows(skills: &BTreeMap<SkillKind, SkillRate>) -> Vec<[String; 5]> {
     skills.iter().map(row).collect()
 }
 
-fn group_row(name: String, group: &Group) -> [String; 6] {
+fn group_row(name: String, group: &GroupFigures) -> [String; 6] {
     let (success, progress) = (percent(group.success), percent(group.progress.mean));
     let intervals = (between(group.success_interval), between(group.progress.interval));
     [name, group.episodes.to_string(), success, intervals.0, progress, intervals.1]
-}
-
-/// A Markdown table of rows of one width.
-pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
-    let rows: Vec<Vec<String>> = rows.into_iter().map(Vec::from).collect();
-    lined_up(&head.map(String::from), &rows)
-}
-
-/// A Markdown table whose columns line up in plain text too; all but the first are aligned right.
-pub fn lined_up(head: &[String], rows: &[Vec<String>]) -> String {
-    let lines = || std::iter::once(head).chain(rows.iter().map(Vec::as_slice));
-    let columns = 0..head.len();
-    let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();
-    let widths: Vec<usize> =
-        columns.clone().map(|i| lines().map(|row| cell(row, i).chars().count()).max().unwrap_or(0)).collect();
-    let line = |row: &[String]| {
-        let padded = columns.clone().map(|i| match i {
-            0 => format!("{:<1$}", cell(row, i), widths[i]),
-            _ => format!("{:>1$}", cell(row, i), widths[i]),
-        });
-        format!("| {} |\n", padded.collect::<Vec<_>>().join(" | "))
-    };
-    let rules = widths.iter().enumerate().map(|(i, width)| match i {
-        0 => "-".repeat(width + 2),
-        _ => format!("{}:", "-".repeat(width + 1)),
-    });
-    let rule = format!("|{}|\n", rules.collect::<Vec<_>>().join("|"));
-    std::iter::once(line(head)).chain([rule]).chain(rows.iter().map(|row| line(row))).collect()
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
 //! A drawing of lines, dots and texts on white, as vectors or as pixels.
 
 use std::fmt::Write;
+use std::path::Path;
 
+use crate::data::atomic_file;
 use crate::report::export::Canvas;
 use crate::report::export::lettering::{ADVANCE, glyph};
 
 /// Red, green, blue.
-pub type Colour = [u8; 3];
+pub type Rgb = [u8; 3];
 
 /// Where a text's point lies.
 #[derive(Clone, Copy, Debug)]
@@ -20,10 +22,10 @@ pub enum Anchor {
 }
 
 #[derive(Clone, Debug)]
-enum Mark {
-    Line { points: Vec<(f64, f64)>, colour: Colour, width: f64 },
-    Dot { at: (f64, f64), colour: Colour },
-    Text { at: (f64, f64), text: String, anchor: Anchor, colour: Colour },
+enum Shape {
+    Line { points: Vec<(f64, f64)>, colour: Rgb, width: f64 },
+    Dot { at: (f64, f64), colour: Rgb },
+    Text { at: (f64, f64), text: String, anchor: Anchor, colour: Rgb },
 }
 
 /// Pixels of the picture to a unit of the drawing.
@@ -36,28 +38,28 @@ const RADIUS: f64 = 3.5;
 pub struct Drawing {
     size: (f64, f64),
     title: String,
-    marks: Vec<Mark>,
+    shapes: Vec<Shape>,
 }
 
 impl Drawing {
     /// An empty drawing; the title is for those who cannot see it.
     pub fn new(width: f64, height: f64, title: &str) -> Drawing {
-        Drawing { size: (width, height), title: title.to_owned(), marks: Vec::new() }
+        Drawing { size: (width, height), title: title.to_owned(), shapes: Vec::new() }
     }
 
     /// A line through points.
-    pub fn line(&mut self, points: &[(f64, f64)], colour: Colour, width: f64) {
-        self.marks.push(Mark::Line { points: points.to_vec(), colour, width });
+    pub fn line(&mut self, points: &[(f64, f64)], colour: Rgb, width: f64) {
+        self.shapes.push(Shape::Line { points: points.to_vec(), colour, width });
     }
 
     /// A dot.
-    pub fn dot(&mut self, at: (f64, f64), colour: Colour) {
-        self.marks.push(Mark::Dot { at, colour });
+    pub fn dot(&mut self, at: (f64, f64), colour: Rgb) {
+        self.shapes.push(Shape::Dot { at, colour });
     }
 
     /// A text in one line, its baseline at `at`.
-    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: Colour) {
-        self.marks.push(Mark::Text { at, text: text.to_owned(), anchor, colour });
+    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: Rgb) {
+        self.shapes.push(Shape::Text { at, text: text.to_owned(), anchor, colour });
     }
 
     /// As an SVG document, or as a part of a page.
@@ -69,11 +71,11 @@ impl Drawing {
              <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
             escape(&self.title)
         );
-        let hex = |[r, g, b]: &Colour| format!("#{r:02x}{g:02x}{b:02x}");
-        for mark in &self.marks {
+        let hex = |[r, g, b]: &Rgb| format!("#{r:02x}{g:02x}{b:02x}");
+        for shape in &self.shapes {
             // Writing to a string cannot fail.
-            let _ = match mark {
-                Mark::Line { points, colour, width } => {
+            let _ = match shape {
+                Shape::Line { points, colour, width } => {
                     let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
                     let (points, colour) = (points.join(" "), hex(colour));
                     writeln!(
@@ -81,10 +83,10 @@ impl Drawing {
                         r#"<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}"/>"#
                     )
                 }
-                Mark::Dot { at: (x, y), colour } => {
+                Shape::Dot { at: (x, y), colour } => {
                     writeln!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{RADIUS}" fill="{}"/>"#, hex(colour))
                 }
-                Mark::Text { at: (x, y), text, anchor, colour } => {
+                Shape::Text { at: (x, y), text, anchor, colour } => {
                     let anchor = match anchor {
                         Anchor::Start => "start",
                         Anchor::Middle => "middle",
@@ -98,6 +100,15 @@ impl Drawing {
         svg + "</svg>\n"
     }
 
+    /// Writes the drawing as SVG and PNG, each atomically.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub fn write(&self, folder: &Path, file_stem: &str) -> anyhow::Result<()> {
+        atomic_file::write(&folder.join(format!("{file_stem}.svg")), self.svg().as_bytes())?;
+        atomic_file::write(&folder.join(format!("{file_stem}.png")), &self.png()?)
+    }
+
     /// As a PNG file.
     ///
     /// # Errors
@@ -105,13 +116,13 @@ impl Drawing {
     pub fn png(&self) -> anyhow::Result<Vec<u8>> {
         let (width, height) = ((SCALE * self.size.0).ceil() as usize, (SCALE * self.size.1).ceil() as usize);
         let mut canvas = Canvas::new(width, height, [255; 3]);
-        for mark in &self.marks {
-            match mark {
-                Mark::Line { points, colour, width } => {
+        for shape in &self.shapes {
+            match shape {
+                Shape::Line { points, colour, width } => {
                     points.windows(2).for_each(|ends| stroke(&mut canvas, ends[0], ends[1], *colour, *width));
                 }
-                Mark::Dot { at, colour } => disc(&mut canvas, *at, RADIUS, *colour),
-                Mark::Text { at, text, anchor, colour } => write(&mut canvas, *at, text, *anchor, *colour),
+                Shape::Dot { at, colour } => disc(&mut canvas, *at, RADIUS, *colour),
+                Shape::Text { at, text, anchor, colour } => write(&mut canvas, *at, text, *anchor, *colour),
             }
         }
         canvas.png()
@@ -124,13 +135,13 @@ pub fn escape(text: &str) -> String {
 }
 
 /// Sets the pixel of a place in pixels.
-fn put(canvas: &mut Canvas, x: f64, y: f64, colour: Colour) {
+fn put(canvas: &mut Canvas, x: f64, y: f64, colour: Rgb) {
     if x >= 0.0 && y >= 0.0 {
         canvas.set(x as usize, y as usize, colour);
     }
 }
 
-fn disc(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, colour: Colour) {
+fn disc(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, colour: Rgb) {
     let radius = SCALE * radius;
     let reach = radius.ceil() as i32;
     for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (f64::from(dx), f64::from(dy)))) {
@@ -140,7 +151,7 @@ fn disc(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, colour: Colour) {
     }
 }
 
-fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), colour: Colour, width: f64) {
+fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), colour: Rgb, width: f64) {
     let parts = (SCALE * (to.0 - from.0).hypot(to.1 - from.1)).ceil().max(1.0);
     for part in 0..=parts as u32 {
         let share = f64::from(part) / parts;
@@ -149,7 +160,7 @@ fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), colour: Colour,
     }
 }
 
-fn write(canvas: &mut Canvas, (x, y): (f64, f64), text: &str, anchor: Anchor, colour: Colour) {
+fn write(canvas: &mut Canvas, (x, y): (f64, f64), text: &str, anchor: Anchor, colour: Rgb) {
     // A dot of a letter is a unit of the drawing.
     let length = (text.chars().count() * ADVANCE) as f64;
     let left = x - match anchor {

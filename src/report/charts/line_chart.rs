@@ -1,24 +1,24 @@
 //! Charts of lines: axes, lines with their intervals, and their names.
 
-use super::drawing::{Anchor, Colour, Drawing};
+use super::drawing::{Anchor, Drawing, Rgb};
 use crate::report::stats::Interval;
 
 /// A chart of lines.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Chart {
+pub struct LineChart {
     /// Above it.
     pub title: String,
     /// Below it.
-    pub across: String,
+    pub x_label: String,
     /// The lines.
-    pub lines: Vec<Line>,
+    pub series: Vec<Series>,
     /// The ends of the vertical axis; where there are none, those of the points.
-    pub vertical: Option<(f64, f64)>,
+    pub y_range: Option<(f64, f64)>,
 }
 
 /// One line of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
+pub struct Series {
     /// What it is of; written into the chart where it is not empty.
     pub name: String,
     /// Its points, from left to right; those that are no numbers are passed over.
@@ -28,17 +28,17 @@ pub struct Line {
 }
 
 /// Told apart by people who see few colours, too (Okabe and Ito, 2008).
-pub const COLOURS: [Colour; 7] =
+pub const COLOURS: [Rgb; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [90, 90, 90]];
 /// The colour of texts.
-pub const INK: Colour = [34, 34, 34];
-const FAINT: Colour = [221, 221, 221];
+pub const INK: Rgb = [34, 34, 34];
+const FAINT: Rgb = [221, 221, 221];
 /// What lies around the plane: left, above, right, below.
 const MARGINS: [f64; 4] = [64.0, 34.0, 18.0, 40.0];
 /// From the plane's sides to the first and the last point.
 const INSET: f64 = 8.0;
 
-impl Chart {
+impl LineChart {
     /// The chart as a drawing of its own.
     pub fn drawing(&self, width: f64, height: f64) -> Drawing {
         let mut drawing = Drawing::new(width, height, &self.title);
@@ -51,14 +51,14 @@ impl Chart {
         let [before, above, after, below] = MARGINS;
         let (left, top) = (corner.0 + before, corner.1 + above);
         let (right, bottom) = (corner.0 + size.0 - after, corner.1 + size.1 - below);
-        let values = || self.lines.iter().flat_map(Line::shown);
+        let values = || self.series.iter().flat_map(Series::shown);
         let (first, last) = ends(values().map(|(x, _)| x));
-        let (low, high) = self.vertical.unwrap_or_else(|| ends(values().map(|(_, y)| y)));
+        let (low, high) = self.y_range.unwrap_or_else(|| ends(values().map(|(_, y)| y)));
         let x = |value: f64| left + INSET + share(value, first, last) * (right - left - 2.0 * INSET);
         let y = |value: f64| bottom - share(value, low, high) * (bottom - top);
         let middle = f64::midpoint(left, right);
         drawing.text((middle, corner.1 + 20.0), &self.title, Anchor::Middle, INK);
-        drawing.text((middle, corner.1 + size.1 - 8.0), &self.across, Anchor::Middle, INK);
+        drawing.text((middle, corner.1 + size.1 - 8.0), &self.x_label, Anchor::Middle, INK);
         for part in 0..=4 {
             let value = low + (high - low) * f64::from(part) / 4.0;
             drawing.line(&[(left, y(value)), (right, y(value))], FAINT, 1.0);
@@ -67,7 +67,7 @@ impl Chart {
         for value in ticks(values().map(|(x, _)| x).collect(), (first, last)) {
             drawing.text((x(value), bottom + 16.0), &short(value), Anchor::Middle, INK);
         }
-        for (number, line) in self.lines.iter().enumerate() {
+        for (number, line) in self.series.iter().enumerate() {
             let colour = COLOURS[number % COLOURS.len()];
             for ((at, _), &[from, to]) in line.points.iter().zip(&line.intervals) {
                 drawing.line(&[(x(*at), y(from)), (x(*at), y(to))], colour, 1.0);
@@ -80,7 +80,7 @@ impl Chart {
     }
 }
 
-impl Line {
+impl Series {
     fn shown(&self) -> impl Iterator<Item = (f64, f64)> {
         self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
     }
@@ -125,10 +125,18 @@ fn short(number: f64) -> String {
 mod tests {
     use super::*;
 
-    fn chart() -> Chart {
-        let line =
-            Line { name: "a<b".into(), points: vec![(1.0, 0.2), (2.0, 0.8)], intervals: vec![[0.1, 0.3], [0.7, 0.9]] };
-        Chart { title: "Progress".into(), across: "subtasks".into(), lines: vec![line], vertical: Some((0.0, 1.0)) }
+    fn chart() -> LineChart {
+        let line = Series {
+            name: "a<b".into(),
+            points: vec![(1.0, 0.2), (2.0, 0.8)],
+            intervals: vec![[0.1, 0.3], [0.7, 0.9]],
+        };
+        LineChart {
+            title: "Progress".into(),
+            x_label: "subtasks".into(),
+            series: vec![line],
+            y_range: Some((0.0, 1.0)),
+        }
     }
 
     #[test]
@@ -147,9 +155,9 @@ mod tests {
         for points in
             [vec![], vec![(3.0, 0.5)], vec![(1.0, f64::NAN), (2.0, f64::INFINITY)], vec![(0.0, -1e308), (1e300, 1e308)]]
         {
-            for vertical in [None, Some((0.0, 1.0))] {
-                let line = Line { points: points.clone(), ..Line::default() };
-                let drawing = Chart { lines: vec![line], vertical, ..chart() }.drawing(640.0, 400.0);
+            for y_range in [None, Some((0.0, 1.0))] {
+                let line = Series { points: points.clone(), ..Series::default() };
+                let drawing = LineChart { series: vec![line], y_range, ..chart() }.drawing(640.0, 400.0);
                 assert!(!drawing.svg().contains("NaN") && !drawing.svg().contains("inf"), "{}", drawing.svg());
                 assert!(drawing.png().is_ok());
             }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::drawing::{Anchor, Drawing};
-use super::line_chart::{COLOURS, Chart, INK, Line};
+use super::line_chart::{COLOURS, INK, LineChart, Series};
 
 /// The size of a panel.
 const PANEL: (f64, f64) = (380.0, 230.0);
@@ -78,10 +78,10 @@ pub fn draw(trainings: &[(String, Curves)], only: &[String]) -> anyhow::Result<D
         let corner = (PANEL.0 * (i % columns) as f64, legend + PANEL.1 * (i / columns) as f64);
         let line = |(_, curves): &(String, Curves)| {
             let points = curves.get(name).into_iter().flatten().map(|(&step, &value)| (step as f64, value));
-            Line { points: points.collect(), ..Line::default() }
+            Series { points: points.collect(), ..Series::default() }
         };
-        let lines = trainings.iter().map(line).collect();
-        Chart { title: name.to_owned(), lines, ..Chart::default() }.draw(&mut drawing, corner, PANEL);
+        let series = trainings.iter().map(line).collect();
+        LineChart { title: name.to_owned(), series, ..LineChart::default() }.draw(&mut drawing, corner, PANEL);
     }
     Ok(drawing)
 }

@@ -2,18 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use super::paired::{Change, Difference, Paired};
-use super::{Comparison, Standing};
-use crate::report::summary_markdown::{between, lined_up, percent, table};
+use super::paired::{OutcomeChange, PairedComparison, PairedDifference};
+use super::{Comparison, RunFigures};
+use crate::report::markdown_table::{aligned_table, between, percent, table};
 
 impl Comparison {
     /// The page that people read.
     pub fn markdown(&self) -> String {
-        let mut parts = vec![self.standings(), self.lengths()];
+        let mut parts = vec![self.run_table(), self.length_table()];
         if self.pairs.len() > 1 {
-            parts.push(self.against());
+            parts.push(self.pair_table());
         }
-        parts.extend(self.pairs.iter().map(Paired::markdown));
+        parts.extend(self.pairs.iter().map(PairedComparison::markdown));
         if let Some(pair) = self.pairs.first() {
             parts.push(format!(
                 "Methods: rates by Wilson's score, by tasks where they were played with several seeds; {}.\n",
@@ -24,12 +24,12 @@ impl Comparison {
     }
 
     /// Every further run against the first, in a row.
-    fn against(&self) -> String {
-        let with_interval = |figure: Difference, show: fn(f64) -> String| {
+    fn pair_table(&self) -> String {
+        let with_interval = |figure: PairedDifference, show: fn(f64) -> String| {
             let [low, high] = figure.interval.map(show);
             format!("{} ({low} to {high})", show(figure.difference))
         };
-        let row = |pair: &Paired| {
+        let row = |pair: &PairedComparison| {
             let (fell, rose) = (pair.regressions.len().to_string(), pair.fixes.len().to_string());
             let success = with_interval(pair.success, points);
             let completed = with_interval(pair.completed_subtasks, signed);
@@ -41,8 +41,8 @@ impl Comparison {
     }
 
     /// Every run in a row.
-    fn standings(&self) -> String {
-        let row = |run: &Standing| {
+    fn run_table(&self) -> String {
+        let row = |run: &RunFigures| {
             let [low, high] = run.completed_subtasks.interval;
             let each: Vec<String> = run.completed_subtasks_by_folder.iter().map(|mean| format!("{mean:.2}")).collect();
             [
@@ -63,20 +63,20 @@ impl Comparison {
         // One folder a run is the rule: only where there are more, the last column has something to say.
         let columns = head.len() - usize::from(self.runs.iter().all(|run| run.completed_subtasks_by_folder.is_empty()));
         rows.iter_mut().for_each(|row| row.truncate(columns));
-        lined_up(&head[..columns].iter().map(ToString::to_string).collect::<Vec<_>>(), &rows)
+        aligned_table(&head[..columns].iter().map(ToString::to_string).collect::<Vec<_>>(), &rows)
     }
 
     /// Progress, in all and by length.
-    fn lengths(&self) -> String {
+    fn length_table(&self) -> String {
         let lengths: BTreeSet<u32> = self.runs.iter().flat_map(|run| run.progress_by_length.keys().copied()).collect();
         let head = ["progress by subtasks of the task".to_owned(), "all".into()];
         let head: Vec<String> = head.into_iter().chain(lengths.iter().map(u32::to_string)).collect();
-        let row = |run: &Standing| -> Vec<String> {
+        let row = |run: &RunFigures| -> Vec<String> {
             let share =
                 |length| run.progress_by_length.get(length).map_or_else(String::new, |share| format!("{share:.2}"));
             [label(&run.run), format!("{:.2}", run.progress)].into_iter().chain(lengths.iter().map(share)).collect()
         };
-        lined_up(&head, &self.runs.iter().map(row).collect::<Vec<_>>())
+        aligned_table(&head, &self.runs.iter().map(row).collect::<Vec<_>>())
     }
 }
 
@@ -88,9 +88,9 @@ fn label(run: &str) -> String {
     }
 }
 
-impl Paired {
+impl PairedComparison {
     fn markdown(&self) -> String {
-        let row = |name: &str, figure: Difference, show: fn(f64) -> String, change: fn(f64) -> String| {
+        let row = |name: &str, figure: PairedDifference, show: fn(f64) -> String, change: fn(f64) -> String| {
             let [low, high] = figure.interval.map(change);
             let (first, second) = (show(figure.first), show(figure.second));
             [name.to_owned(), first, second, change(figure.difference), format!("{low} to {high}")]
@@ -131,7 +131,7 @@ impl Paired {
     }
 }
 
-fn change_row(change: &Change) -> [String; 5] {
+fn change_row(change: &OutcomeChange) -> [String; 5] {
     let [first, second, of] = change.completed;
     let told: String = change.instruction.replace('|', "/").chars().take(60).collect();
     let completed = format!("{first} -> {second} of {of}");

@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use self::paired::Paired;
+use self::paired::PairedComparison;
+use super::estimates::Mean;
 use super::stats;
 use super::stats::Interval;
-use super::summary::{Mean, Summary};
+use super::summary::Summary;
 use crate::episode::record::Episode;
 use crate::run_dir::reader::RecordedRun;
 
@@ -20,16 +21,16 @@ use crate::run_dir::reader::RecordedRun;
 pub struct Comparison {
     /// Version of this format.
     pub format_version: u32,
-    /// The runs as they stand, in the order given.
-    pub runs: Vec<Standing>,
+    /// Each run by itself, in the order given.
+    pub runs: Vec<RunFigures>,
     /// Every further run against the first.
-    pub pairs: Vec<Paired>,
+    pub pairs: Vec<PairedComparison>,
 }
 
 /// A run's own figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Standing {
+pub struct RunFigures {
     /// Its folder, or its folders with commas between.
     pub run: String,
     /// Its task set.
@@ -71,7 +72,7 @@ impl Comparison {
             Summary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
         };
         let summaries: Vec<Summary> = runs.iter().map(summary).collect();
-        let standing = |(run, summary): (&RecordedRun, &Summary)| Standing {
+        let figures = |(run, summary): (&RecordedRun, &Summary)| RunFigures {
             run: run.path.display().to_string(),
             task_set: summary.task_set.clone(),
             policy: summary.policy.clone(),
@@ -86,8 +87,8 @@ impl Comparison {
         };
         let comparison = Comparison {
             format_version: Comparison::FORMAT,
-            runs: runs.iter().zip(&summaries).map(standing).collect(),
-            pairs: others.iter().map(|other| Paired::of(first, other)).collect::<anyhow::Result<_>>()?,
+            runs: runs.iter().zip(&summaries).map(figures).collect(),
+            pairs: others.iter().map(|other| PairedComparison::of(first, other)).collect::<anyhow::Result<_>>()?,
         };
         Ok((comparison, summaries))
     }

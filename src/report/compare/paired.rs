@@ -6,15 +6,15 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::episode::record::{Episode, Key};
+use crate::report::estimates::BOOTSTRAP_SEED;
 use crate::report::stats;
 use crate::report::stats::Interval;
-use crate::report::summary::BOOTSTRAP_SEED;
 use crate::run_dir::reader::RecordedRun;
 
 /// A difference of two means, second less first, and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Difference {
+pub struct PairedDifference {
     /// The first run's mean.
     pub first: f64,
     /// The second's.
@@ -28,7 +28,7 @@ pub struct Difference {
 /// An episode in which one run succeeded and the other did not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Change {
+pub struct OutcomeChange {
     /// The task.
     pub task: String,
     /// The seed.
@@ -43,44 +43,44 @@ pub struct Change {
     pub open_second: String,
 }
 
-/// What came of a comparison.
+/// Two runs compared episode by episode: same task, same seed, same start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Paired {
+pub struct PairedComparison {
     /// The first run's folder.
     pub first: String,
     /// The second run's folder.
     pub second: String,
-    /// Pairs of episodes: same task, seed and start, told the task's own words.
+    /// Pairs of episodes: same task, seed and start, with the task's own instruction.
     pub pairs: usize,
     /// Episodes of either run without a counterpart.
     pub unpaired: usize,
     /// Of those, episodes whose counterpart began in another state.
     pub start_mismatches: usize,
     /// Success.
-    pub success: Difference,
+    pub success: PairedDifference,
     /// Completed subtasks.
-    pub completed_subtasks: Difference,
+    pub completed_subtasks: PairedDifference,
     /// Completed subtasks as a share of those that were asked.
-    pub progress: Difference,
-    /// Tasks that the first run solved more often, and those that the second did.
+    pub progress: PairedDifference,
+    /// McNemar's discordant pairs: tasks that the first run solved more often, and those that the second did.
     pub discordant_tasks: [usize; 2],
     /// Two-sided exact McNemar test of equal success, a task a pair: several seeds of a task are alike.
     pub mcnemar_p: f64,
     /// Only the first run succeeded.
-    pub regressions: Vec<Change>,
+    pub regressions: Vec<OutcomeChange>,
     /// Only the second run succeeded.
-    pub fixes: Vec<Change>,
+    pub fixes: Vec<OutcomeChange>,
     /// How the intervals and the test were made.
     pub methods: String,
 }
 
-impl Paired {
+impl PairedComparison {
     /// Pairs the episodes of two runs.
     ///
     /// # Errors
     /// When they have no episode in common.
-    pub fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<Paired> {
+    pub fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<PairedComparison> {
         let mut others: BTreeMap<Key, &Episode> = second
             .episodes
             .iter()
@@ -113,8 +113,8 @@ impl Paired {
             first.path.display(),
             second.path.display()
         );
-        let change = |(a, b): &(&Episode, &Episode)| -> anyhow::Result<Change> {
-            Ok(Change {
+        let change = |(a, b): &(&Episode, &Episode)| -> anyhow::Result<OutcomeChange> {
+            Ok(OutcomeChange {
                 task: a.task.clone(),
                 seed: a.seed,
                 instruction: b.instruction.clone(),
@@ -123,7 +123,7 @@ impl Paired {
                 open_second: format!("sprint open {}", second.reference(&b.key())?),
             })
         };
-        let only = |wanted: bool| -> anyhow::Result<Vec<Change>> {
+        let only = |wanted: bool| -> anyhow::Result<Vec<OutcomeChange>> {
             all.iter().filter(|(a, b)| a.success == wanted && b.success != wanted).map(change).collect()
         };
         let (regressions, fixes) = (only(true)?, only(false)?);
@@ -133,7 +133,7 @@ impl Paired {
             groups.iter().filter(|group| lean(group) == toward).count()
         };
         let discordant_tasks = [discordant_tasks(Ordering::Greater), discordant_tasks(Ordering::Less)];
-        Ok(Paired {
+        Ok(PairedComparison {
             first: first.path.display().to_string(),
             second: second.path.display().to_string(),
             pairs: all.len(),
@@ -155,13 +155,13 @@ impl Paired {
     }
 }
 
-fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) -> Difference {
+fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) -> PairedDifference {
     let first = stats::mean(groups.iter().flatten().map(|(a, _)| value(a)));
     let second = stats::mean(groups.iter().flatten().map(|(_, b)| value(b)));
     let differences: Vec<Vec<f64>> =
         groups.iter().map(|group| group.iter().map(|(a, b)| value(b) - value(a)).collect()).collect();
     let interval = stats::bootstrap_mean(&differences, BOOTSTRAP_SEED);
-    Difference { first, second, difference: second - first, interval }
+    PairedDifference { first, second, difference: second - first, interval }
 }
 
 #[cfg(test)]
@@ -196,7 +196,7 @@ pub(crate) mod tests {
     #[test]
     fn regressions_and_fixes_are_told_apart_and_named_with_the_command_that_opens_them() {
         let (a, b) = (run("runs/a", &[true, true, false, false]), run("runs/b", &[true, false, true, false]));
-        let paired = Paired::of(&a, &b).unwrap();
+        let paired = PairedComparison::of(&a, &b).unwrap();
         assert_eq!((paired.pairs, paired.unpaired), (4, 0));
         assert_eq!(paired.regressions.len(), 1);
         assert_eq!(paired.regressions[0].seed, 1);
@@ -213,13 +213,13 @@ pub(crate) mod tests {
             (run.episodes[1].variant, run.episodes[2].start_subtask) = (InstructionVariant::Swapped, 1);
             run
         });
-        let paired = Paired::of(&a, &b).unwrap();
+        let paired = PairedComparison::of(&a, &b).unwrap();
         assert_eq!((paired.pairs, paired.unpaired, paired.regressions.len()), (1, 0, 0));
     }
 
     #[test]
     fn seeds_of_one_task_do_not_make_a_difference_certain() {
-        let paired = Paired::of(&run("a", &[false; 12]), &run("b", &[true; 12])).unwrap();
+        let paired = PairedComparison::of(&run("a", &[false; 12]), &run("b", &[true; 12])).unwrap();
         assert_eq!((paired.fixes.len(), paired.discordant_tasks, paired.mcnemar_p), (12, [0, 1], 1.0));
     }
 
@@ -227,16 +227,16 @@ pub(crate) mod tests {
     fn an_episode_that_began_elsewhere_is_no_counterpart() {
         let (a, mut b) = (run("a", &[true, true]), run("b", &[false, false]));
         b.episodes[0].start_hash = "77".into();
-        let paired = Paired::of(&a, &b).unwrap();
+        let paired = PairedComparison::of(&a, &b).unwrap();
         assert_eq!((paired.pairs, paired.unpaired, paired.start_mismatches), (1, 2, 2));
         b.episodes[1].seed = 9;
-        assert!(Paired::of(&a, &b).unwrap_err().to_string().contains("no episode in common"));
+        assert!(PairedComparison::of(&a, &b).unwrap_err().to_string().contains("no episode in common"));
     }
 
     #[test]
     fn a_run_against_itself_differs_in_nothing() {
         let a = run("a", &[true, false, true]);
-        let paired = Paired::of(&a, &a).unwrap();
+        let paired = PairedComparison::of(&a, &a).unwrap();
         assert_eq!((paired.success.difference, paired.success.interval), (0.0, [0.0, 0.0]));
         assert!(paired.regressions.is_empty() && paired.fixes.is_empty());
     }

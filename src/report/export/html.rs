@@ -9,14 +9,14 @@ use crate::episode::frames::FrameSequence;
 use crate::report::html::in_script;
 
 #[derive(Serialize)]
-struct Page<'a> {
+struct ReplayPage<'a> {
     title: &'a str,
     subtasks: &'a [String],
-    steps: Vec<Step<'a>>,
+    steps: Vec<ReplayStep<'a>>,
 }
 
 #[derive(Serialize)]
-struct Step<'a> {
+struct ReplayStep<'a> {
     step: u32,
     told: &'a str,
     words: String,
@@ -35,7 +35,7 @@ pub fn write(recording: &FrameSequence) -> anyhow::Result<String> {
     for shot in &recording.shots {
         let frame = camera.draw(shot);
         let canvas = Canvas { width: frame.width, height: frame.height, rgb: frame.rgb };
-        steps.push(Step {
+        steps.push(ReplayStep {
             step: shot.step,
             told: &shot.told,
             words: shot.words(),
@@ -44,7 +44,7 @@ pub fn write(recording: &FrameSequence) -> anyhow::Result<String> {
             frame: format!("data:image/png;base64,{}", STANDARD.encode(canvas.png()?)),
         });
     }
-    let page = Page { title: &recording.title, subtasks: &recording.subtasks, steps };
+    let page = ReplayPage { title: &recording.title, subtasks: &recording.subtasks, steps };
     let data = in_script(&page)?;
     Ok(TEMPLATE.replace("\"DATA\"", &data))
 }

@@ -1,0 +1,50 @@
+//! Estimates with their 95 % intervals, as summaries and comparisons give them.
+
+use serde::{Deserialize, Serialize};
+
+use super::stats;
+use super::stats::Interval;
+
+/// Drives the resampling of the bootstrap.
+pub const BOOTSTRAP_SEED: u64 = 0;
+
+/// A mean and its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mean {
+    /// Over all episodes.
+    pub mean: f64,
+    /// Lower and upper end.
+    pub interval: Interval,
+}
+
+impl Mean {
+    /// Of the values of each task's episodes.
+    pub fn of(groups: &[Vec<f64>]) -> Mean {
+        let mean = stats::mean(groups.iter().flatten().copied());
+        Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
+    }
+}
+
+/// How often the skills of one kind, once reached, were completed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkillRate {
+    /// Subtasks of the kind whose turn came.
+    pub reached: usize,
+    /// Of those, completed.
+    pub completed: usize,
+    /// The share; 0 when none was reached.
+    pub rate: f64,
+    /// Its 95 % interval.
+    pub interval: Interval,
+}
+
+impl SkillRate {
+    /// Of each task's subtasks of the kind whose turn came: 1 where it was completed, else 0.
+    pub(crate) fn of(groups: &[Vec<f64>]) -> SkillRate {
+        let (reached, completed) = (groups.iter().map(Vec::len).sum(), groups.iter().flatten().sum::<f64>() as usize);
+        let rate = if reached == 0 { 0.0 } else { completed as f64 / reached as f64 };
+        SkillRate { reached, completed, rate, interval: stats::wilson_of_groups(groups) }
+    }
+}
