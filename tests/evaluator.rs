@@ -7,6 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use sprint_explorer::data::schema;
+use sprint_explorer::eval::schemas;
 
 use crate::program::Sprint;
 
@@ -97,7 +98,7 @@ fn every_file_satisfies_its_schema() {
     assert_eq!(sprint.run("eval --tasks tasks.json --policy expert --out c --shard 1/2").code, Some(0));
     let satisfies = |name: &str, text: &str| {
         let document: Value = serde_json::from_str(text).unwrap();
-        assert_eq!(schema::faults(name, &document).unwrap(), [], "{name}");
+        assert_eq!(schema::faults(&schemas::schema(name).unwrap().to_value(), &document).unwrap(), [], "{name}");
     };
     satisfies("tasks", &sprint.read("tasks.json"));
     satisfies("comparison", &sprint.read("comparison.json"));

@@ -15,6 +15,7 @@ use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, Progress};
 use crate::eval::options::Options;
+use crate::eval::progress_event::ProgressEvent;
 use crate::eval::tasks::sample;
 use crate::house::grading::Grading;
 use crate::report::summary::Summary;
@@ -197,7 +198,8 @@ impl Meter {
             }
             None if self.json => {
                 let seconds = self.started.elapsed().as_secs_f64();
-                say(&serde_json::json!({"event": "progress", "progress": progress, "seconds": seconds}).to_string());
+                let event = ProgressEvent::Progress { progress, seconds };
+                say(&serde_json::to_string(&event).unwrap_or_default());
             }
             None if done == of || self.last.is_none_or(|last| last.elapsed() >= Meter::EVERY) => {
                 say(&format!("{done}/{of} episodes, {words}, {:.0} s", self.started.elapsed().as_secs_f64()));

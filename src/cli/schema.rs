@@ -5,13 +5,13 @@ use std::io::Write;
 use clap::Args;
 
 use super::{Ending, streams};
-use crate::data::schema;
+use crate::eval::schemas;
 
 /// Prints a JSON Schema.
 #[derive(Args)]
 pub struct Schema {
     /// Whose: tasks, manifest, episode, summary, comparison or progress
-    #[arg(value_name = "NAME", value_parser = schema::SCHEMAS.map(|(name, _)| name))]
+    #[arg(value_name = "NAME", value_parser = schemas::NAMES)]
     name: String,
 }
 
@@ -22,7 +22,9 @@ impl Schema {
     /// When standard output is closed.
     pub fn run(self) -> anyhow::Result<Ending> {
         let mut out = streams::out();
-        write!(out, "{}", schema::text(&self.name).unwrap_or_default())?;
+        if let Some(schema) = schemas::schema(&self.name) {
+            writeln!(out, "{}", serde_json::to_string_pretty(&schema)?)?;
+        }
         out.flush()?;
         Ok(Ending::Ok)
     }

@@ -1,18 +1,8 @@
-//! JSON Schemas of the files that the program reads and writes, and a check against them that finds every fault.
+//! Checks a document against a JSON Schema, and says in words what is wrong at which field.
 
-use std::collections::BTreeSet;
-
+use jsonschema::ValidationError;
+use jsonschema::error::ValidationErrorKind;
 use serde_json::{Map, Value};
-
-/// The schemas by name, as text.
-pub const SCHEMAS: [(&str, &str); 6] = [
-    ("tasks", include_str!("../../assets/schemas/tasks.json")),
-    ("manifest", include_str!("../../assets/schemas/manifest.json")),
-    ("episode", include_str!("../../assets/schemas/episode.json")),
-    ("summary", include_str!("../../assets/schemas/summary.json")),
-    ("comparison", include_str!("../../assets/schemas/comparison.json")),
-    ("progress", include_str!("../../assets/schemas/progress.json")),
-];
 
 /// A place in a document that departs from its schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,136 +13,104 @@ pub struct Fault {
     pub problem: String,
 }
 
-/// A schema of that name.
-pub fn text(name: &str) -> Option<&'static str> {
-    SCHEMAS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
-}
-
-/// Every place in which `document` departs from the schema of that name.
+/// Every place in which `document` departs from `schema`.
 ///
 /// # Errors
-/// When there is no such schema.
-pub fn faults(name: &str, document: &Value) -> anyhow::Result<Vec<Fault>> {
-    let text = text(name).ok_or_else(|| anyhow::anyhow!("there is no schema {name:?}"))?;
-    let root: Value = serde_json::from_str(text)?;
+/// When `schema` is no JSON Schema.
+pub fn faults(schema: &Value, document: &Value) -> anyhow::Result<Vec<Fault>> {
+    let validator = jsonschema::validator_for(schema).map_err(|error| anyhow::anyhow!("not a JSON Schema: {error}"))?;
     let mut found = Vec::new();
-    Check { root: &root }.value(&root, document, "", &mut found);
+    for error in validator.iter_errors(document) {
+        explain(schema, &error, &mut found);
+    }
     Ok(found)
 }
 
-/// The parts of JSON Schema that our schemas use.
-struct Check<'a> {
-    root: &'a Value,
-}
-
-impl Check<'_> {
-    fn value(&self, schema: &Value, value: &Value, field: &str, found: &mut Vec<Fault>) {
-        let Some(rules) = schema.as_object() else { return };
-        let mut fault = |problem: String| found.push(Fault { field: field.to_owned(), problem });
-        if let Some(target) = rules.get("$ref").and_then(Value::as_str) {
-            if let Some(target) = self.root.pointer(target.trim_start_matches('#')) {
-                self.value(target, value, field, found);
-            }
+/// Puts a validator's error into words.
+fn explain(schema: &Value, error: &ValidationError<'_>, found: &mut Vec<Fault>) {
+    let (field, value) = (field_name(error.instance_path().as_str()), error.instance());
+    let under = |name: &str| if field.is_empty() { name.to_owned() } else { format!("{field}.{name}") };
+    let none = Map::new();
+    let rules = rules_of(schema, error).unwrap_or(&none);
+    let known = rules.get("properties").and_then(Value::as_object).unwrap_or(&none);
+    let problem = match error.kind() {
+        ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
+            return explain_alternatives(schema, error, context, found);
+        }
+        ValidationErrorKind::Required { property } => {
+            let name = property.as_str().unwrap_or_default();
+            let about = known.get(name).and_then(Value::as_object).map(about).unwrap_or_default();
+            found.push(Fault { field: under(name), problem: format!("missing{about}") });
             return;
         }
-        if let Some(kinds) = rules.get("type")
-            && !is_kind(kinds, value)
-        {
-            return fault(format!("{}, but {} was expected{}", shown(value), kind_words(kinds), about(rules)));
-        }
-        if let Some(wanted) = rules.get("const")
-            && wanted != value
-        {
-            return fault(format!("{}, but {wanted} was expected", shown(value)));
-        }
-        if let Some(known) = rules.get("enum").and_then(Value::as_array)
-            && !known.contains(value)
-        {
-            return fault(format!("{}, but one of {} was expected{}", shown(value), list(known, value), about(rules)));
-        }
-        if let Some(problem) = size(rules, value) {
-            fault(problem);
-        }
-        if let Some(choices) = rules.get("anyOf").and_then(Value::as_array) {
-            self.any(choices, rules, value, field, found);
-        }
-        match value {
-            Value::Array(items) => {
-                if let Some(schema) = rules.get("items") {
-                    for (place, item) in items.iter().enumerate() {
-                        self.value(schema, item, &format!("{field}[{place}]"), found);
-                    }
-                }
-            }
-            Value::Object(fields) => self.fields(rules, fields, field, found),
-            _ => {}
-        }
-    }
-
-    fn fields(&self, rules: &Map<String, Value>, fields: &Map<String, Value>, field: &str, found: &mut Vec<Fault>) {
-        let under = |name: &str| if field.is_empty() { name.to_owned() } else { format!("{field}.{name}") };
-        let known = rules.get("properties").and_then(Value::as_object);
-        for name in rules.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
-            if !fields.contains_key(name) {
-                let schema = known.and_then(|known| known.get(name)).and_then(Value::as_object);
-                let about = schema.map(about).unwrap_or_default();
-                found.push(Fault { field: under(name), problem: format!("missing{about}") });
-            }
-        }
-        for (name, value) in fields {
-            match (known.and_then(|known| known.get(name)), rules.get("additionalProperties")) {
-                (Some(schema), _) => self.value(schema, value, &under(name), found),
-                (None, Some(Value::Bool(false))) => {
-                    let names: Vec<&str> = known.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
-                    let problem = format!("there is no such field; known are {}", names.join(", "));
-                    found.push(Fault { field: under(name), problem });
-                }
-                (None, Some(schema)) => self.value(schema, value, &under(name), found),
-                (None, None) => {}
-            }
-        }
-    }
-
-    /// The faults of the alternative that comes closest: one that shares a field with the value, else all in words.
-    fn any(&self, choices: &[Value], rules: &Map<String, Value>, value: &Value, field: &str, found: &mut Vec<Fault>) {
-        let tried: Vec<Vec<Fault>> = choices
-            .iter()
-            .map(|choice| {
-                let mut faults = Vec::new();
-                self.value(choice, value, field, &mut faults);
-                faults
-            })
-            .collect();
-        if tried.iter().any(Vec::is_empty) {
+        ValidationErrorKind::AdditionalProperties { unexpected } => {
+            let names: Vec<&str> = known.keys().map(String::as_str).collect();
+            let problem = format!("there is no such field; known are {}", names.join(", "));
+            found.extend(unexpected.iter().map(|name| Fault { field: under(name), problem: problem.clone() }));
             return;
         }
-        let own: BTreeSet<&String> = value.as_object().into_iter().flat_map(Map::keys).collect();
-        let shares = |choice: &Value| {
-            let known = choice.get("properties").and_then(Value::as_object);
-            known.is_some_and(|known| known.keys().any(|name| own.contains(name)))
-        };
-        match choices.iter().position(shares) {
-            Some(closest) => found.extend(tried.into_iter().nth(closest).unwrap_or_default()),
-            None => found.push(Fault {
-                field: field.to_owned(),
-                problem: format!("{}, but something else was expected{}", shown(value), about(rules)),
-            }),
+        ValidationErrorKind::Type { .. } => {
+            let kinds = rules.get("type").map(kind_words).unwrap_or_default();
+            format!("{}, but {kinds} was expected{}", shown(value), about(rules))
         }
-    }
-}
-
-fn is_kind(kinds: &Value, value: &Value) -> bool {
-    let is = |kind: &Value| match kind.as_str() {
-        Some("object") => value.is_object(),
-        Some("array") => value.is_array(),
-        Some("string") => value.is_string(),
-        Some("integer") => value.is_i64() || value.is_u64(),
-        Some("number") => value.is_number(),
-        Some("boolean") => value.is_boolean(),
-        Some("null") => value.is_null(),
-        _ => false,
+        ValidationErrorKind::Constant { expected_value } => {
+            format!("{}, but {expected_value} was expected", shown(value))
+        }
+        ValidationErrorKind::Enum { options } => {
+            let options = options.as_array().map(Vec::as_slice).unwrap_or_default();
+            format!("{}, but one of {} was expected{}", shown(value), list(options, value), about(rules))
+        }
+        _ => size(rules, value).unwrap_or_else(|| error.to_string()),
     };
-    kinds.as_array().map_or_else(|| is(kinds), |kinds| kinds.iter().any(is))
+    found.push(Fault { field, problem });
+}
+
+/// The faults of the alternative that the value comes closest to: the one that it departs from furthest inside.
+fn explain_alternatives(
+    schema: &Value,
+    error: &ValidationError<'_>,
+    alternatives: &[Vec<ValidationError<'static>>],
+    found: &mut Vec<Fault>,
+) {
+    let own = error.instance_path().as_str().len();
+    let depth = |errors: &Vec<ValidationError<'static>>| {
+        errors.iter().map(|error| error.instance_path().as_str().len()).max().unwrap_or(0)
+    };
+    if let Some(closest) = alternatives.iter().filter(|errors| depth(errors) > own).max_by_key(|errors| depth(errors)) {
+        return closest.iter().for_each(|error| explain(schema, error, found));
+    }
+    let constant = |error: &ValidationError<'static>| match error.kind() {
+        ValidationErrorKind::Constant { expected_value } => Some((**expected_value).clone()),
+        _ => None,
+    };
+    let constants: Vec<Value> = alternatives.iter().flatten().filter_map(constant).collect();
+    let expected = match constants.is_empty() {
+        true => "something else".into(),
+        false => format!("one of {}", list(&constants, error.instance())),
+    };
+    let about = rules_of(schema, error).map(about).unwrap_or_default();
+    let problem = format!("{}, but {expected} was expected{about}", shown(error.instance()));
+    found.push(Fault { field: field_name(error.instance_path().as_str()), problem });
+}
+
+/// The part of the schema that an error departs from.
+fn rules_of<'a>(schema: &'a Value, error: &ValidationError<'_>) -> Option<&'a Map<String, Value>> {
+    let (rules, _keyword) = error.schema_path().as_str().rsplit_once('/')?;
+    schema.pointer(rules)?.as_object()
+}
+
+/// A JSON pointer as people write it: `tasks[1].roles[0].class`.
+fn field_name(pointer: &str) -> String {
+    let mut field = String::new();
+    for part in pointer.split('/').skip(1) {
+        let part = part.replace("~1", "/").replace("~0", "~");
+        match part.parse::<usize>() {
+            Ok(index) => field += &format!("[{index}]"),
+            Err(_) if field.is_empty() => field = part,
+            Err(_) => field += &format!(".{part}"),
+        }
+    }
+    field
 }
 
 fn kind_words(kinds: &Value) -> String {
@@ -210,7 +168,11 @@ fn list(known: &[Value], value: &Value) -> String {
 }
 
 fn about(rules: &Map<String, Value>) -> String {
-    rules.get("description").and_then(Value::as_str).map(|about| format!(" ({about})")).unwrap_or_default()
+    rules
+        .get("description")
+        .and_then(Value::as_str)
+        .map(|about| format!(" ({})", about.trim_end_matches('.')))
+        .unwrap_or_default()
 }
 
 /// A value, short enough for a message.
@@ -227,12 +189,18 @@ fn shown(value: &Value) -> String {
 mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
-    use crate::domain::Class;
+    use crate::data::taskset::{LONGEST_HORIZON, MOST_SUBTASKS};
+    use crate::domain::{Class, TaskSet};
+
+    fn task_schema() -> Value {
+        schemars::schema_for!(TaskSet).to_value()
+    }
 
     fn complaints(change: impl FnOnce(&mut Value)) -> Vec<String> {
         let mut set = serde_json::to_value(sample_set()).unwrap();
         change(&mut set);
-        faults("tasks", &set).unwrap().into_iter().map(|fault| format!("{}: {}", fault.field, fault.problem)).collect()
+        let found = faults(&task_schema(), &set).unwrap();
+        found.into_iter().map(|fault| format!("{}: {}", fault.field, fault.problem)).collect()
     }
 
     #[test]
@@ -257,18 +225,26 @@ mod tests {
     }
 
     #[test]
+    fn a_value_that_fits_no_alternative_is_told_what_does() {
+        let told = complaints(|set| set["tasks"][0]["start"]["agent"]["heading"] = "up".into()).join("\n");
+        assert!(told.contains("tasks[0].start.agent.heading: \"up\", but one of north, east"), "{told}");
+        let told = complaints(|set| set["tasks"][0]["scene"] = 7.into()).join("\n");
+        assert!(told.contains("tasks[0].scene: 7, but something else was expected"), "{told}");
+    }
+
+    #[test]
     fn the_schema_knows_the_classes_that_an_action_can_name() {
-        let schema: Value = serde_json::from_str(text("tasks").unwrap()).unwrap();
-        let listed = schema.pointer("/$defs/role/properties/class/enum").unwrap().as_array().unwrap();
+        let schema = task_schema();
+        let listed = schema.pointer("/$defs/Role/properties/class/enum").unwrap().as_array().unwrap();
         let known: Vec<&str> = Class::all().filter(|class| class.in_vocabulary()).map(Class::name).collect();
         assert_eq!(listed.iter().map(|name| name.as_str().unwrap()).collect::<Vec<_>>(), known);
     }
 
     #[test]
-    fn every_schema_is_json_with_a_title() {
-        for (name, text) in SCHEMAS {
-            let schema: Value = serde_json::from_str(text).unwrap();
-            assert!(schema["title"].is_string(), "{name}");
-        }
+    fn the_schema_has_the_limits_that_the_reader_has() {
+        let schema = task_schema();
+        let limit = |field: &str| schema.pointer(&format!("/$defs/Task/properties/{field}")).unwrap().as_u64().unwrap();
+        assert_eq!(limit("horizon/maximum"), u64::from(LONGEST_HORIZON));
+        assert_eq!([limit("roles/maxItems"), limit("subtasks/maxItems")], [MOST_SUBTASKS as u64; 2]);
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::world::Instance;
 
 /// The kind of a low-level action: five to move about, seven that act on an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[allow(missing_docs)]
 pub enum ActionType {
     MoveAhead,

@@ -155,6 +155,28 @@ impl std::fmt::Display for Class {
     }
 }
 
+impl schemars::JsonSchema for Class {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Class".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "An object class, or one that scenes hold",
+            "type": "string",
+            "enum": Class::all().map(Class::name).collect::<Vec<_>>(),
+        })
+    }
+}
+
+impl Class {
+    /// The JSON Schema of a class that an action can name.
+    pub(crate) fn vocabulary_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let names: Vec<&str> = Class::all().filter(|class| class.in_vocabulary()).map(Class::name).collect();
+        schemars::json_schema!({"description": "An object class", "type": "string", "enum": names})
+    }
+}
+
 impl Serialize for Class {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())

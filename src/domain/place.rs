@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 /// A point in the scene's frame, in millimetres; y is up, x and z span the floor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(from = "[i32; 3]", into = "[i32; 3]")]
 pub struct Point {
     /// East, in millimetres.
@@ -58,7 +60,9 @@ impl Point {
 }
 
 /// A cell of the 0.25 m grid on which the agent stands; its centre is at 250 mm times its coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(from = "[i16; 2]", into = "[i16; 2]")]
 pub struct Cell {
     /// East.
@@ -107,7 +111,9 @@ impl Cell {
 }
 
 /// One of the four directions the agent may face.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Heading {
     /// +z.
@@ -167,7 +173,9 @@ impl Heading {
 }
 
 /// Where the agent stands and looks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
     /// The cell under the agent.

@@ -7,7 +7,7 @@ use super::place::{Cell, Cuboid, Heading, Point, Pose, Rect};
 use super::world::Object;
 
 /// The kind of a room; ALFRED numbers its floor plans by it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs)]
 pub enum Room {

@@ -6,7 +6,7 @@ use super::class::Class;
 use super::world::Instance;
 
 /// The kind of a skill, after GotoLocation is merged into the skill that follows it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[allow(missing_docs)]
 pub enum SkillKind {
     Pickup,
@@ -32,7 +32,7 @@ impl SkillKind {
 }
 
 /// An instance as the expert's recording names it: a thing that exists at the start, or one of the slices it fell into.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Original {
     /// The thing itself, or what the slice is cut from.
@@ -44,10 +44,11 @@ pub struct Original {
 
 /// A part that some instance plays in a task: "the apple", "the slice that we heat". The class grader binds a role to
 /// the instance that the agent chose; two roles are never bound to one instance.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Role {
     /// The class that is asked for.
+    #[schemars(schema_with = "Class::vocabulary_schema")]
     pub class: Class,
     /// A slice of that class is asked for, not a whole one.
     #[serde(default)]
@@ -61,7 +62,7 @@ pub struct Role {
 }
 
 /// What the released code's grader asks of a subtask beyond its roles (strict grading only).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Literal {
     /// The expert's skill has a Close anywhere.
@@ -73,7 +74,7 @@ pub struct Literal {
 }
 
 /// One step of a task: a skill with the roles it is about.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Subtask {
     /// What is to be done.
@@ -92,7 +93,7 @@ pub struct Subtask {
 }
 
 /// ALFRED's seven task types.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs)]
 pub enum GoalKind {
@@ -106,7 +107,7 @@ pub enum GoalKind {
 }
 
 /// The goal of a whole ALFRED trajectory, matched by parts of names as ALFRED does.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     /// Which of the seven conditions.

@@ -7,7 +7,7 @@ use super::skill::{Goal, Role, Subtask};
 use super::world::World;
 
 /// Which scene a task plays in.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum SceneRef {
     /// The house that the generator makes of this room and seed.
@@ -22,10 +22,11 @@ pub enum SceneRef {
 }
 
 /// One task.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
     /// A name that is unique in its set.
+    #[schemars(length(min = 1, max = 200))]
     pub id: String,
     /// Where it plays.
     pub scene: SceneRef,
@@ -33,18 +34,22 @@ pub struct Task {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<World>,
     /// What the agent is told.
+    #[schemars(length(min = 1, max = 2000))]
     pub instruction: String,
     /// One sentence for each subtask, when there are any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sentences: Vec<String>,
     /// The parts that instances play.
+    #[schemars(length(max = 100))]
     pub roles: Vec<Role>,
     /// The steps, in order.
+    #[schemars(length(min = 1, max = 100))]
     pub subtasks: Vec<Subtask>,
     /// How many actions the expert takes; 0 where that is not known.
     #[serde(default)]
     pub expert_steps: u32,
     /// After how many actions the episode ends: twice the expert's.
+    #[schemars(range(min = 1, max = 100_000))]
     pub horizon: u32,
     /// The goal of the whole ALFRED trajectory, for strict grading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -58,10 +63,11 @@ pub struct Task {
 }
 
 /// A file of tasks.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSet {
     /// Version of this format.
+    #[schemars(extend("const" = TaskSet::FORMAT))]
     pub format_version: u32,
     /// What the set is called in reports.
     pub name: String,
@@ -69,6 +75,7 @@ pub struct TaskSet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenes: Option<String>,
     /// The tasks.
+    #[schemars(length(min = 1))]
     pub tasks: Vec<Task>,
 }
 

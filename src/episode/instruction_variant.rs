@@ -11,7 +11,9 @@ use crate::domain::Task;
 use crate::language::{instruction, phrases};
 
 /// How the instruction is derived from the task's own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum InstructionVariant {
     /// The task's own.

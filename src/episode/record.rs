@@ -11,7 +11,7 @@ use crate::env::Environment;
 use crate::house::Outcome;
 
 /// One line of a run's `episodes.jsonl`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Episode {
     /// The task's id.
@@ -114,7 +114,7 @@ fn once() -> u32 {
 }
 
 /// One action of an episode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
     /// What was done.
@@ -140,7 +140,7 @@ pub struct Step {
 }
 
 /// Who chose a step of an explored episode.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Author {
     /// `hand` for a person, else the policy's name.

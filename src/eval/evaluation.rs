@@ -28,7 +28,7 @@ pub struct Evaluation {
 }
 
 /// How far an evaluation is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Progress {
     /// Episodes that are over.
     pub done: usize,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::domain::Class;
 
 /// What an action came to. An impossible action leaves the world as it was.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
     /// It was carried out.
@@ -31,7 +31,7 @@ impl std::fmt::Display for Outcome {
 }
 
 /// Why an action was impossible.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs)]
 pub enum Reason {

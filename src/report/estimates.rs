@@ -9,7 +9,7 @@ use super::stats::Interval;
 pub const BOOTSTRAP_SEED: u64 = 0;
 
 /// A mean and its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {
     /// Over all episodes.
@@ -27,7 +27,7 @@ impl Mean {
 }
 
 /// How often the skills of one kind, once reached, were completed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkillRate {
     /// Subtasks of the kind whose turn came.

@@ -21,7 +21,7 @@ pub struct EpisodesByTask<'a> {
 }
 
 /// Figures of some of a run's episodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupFigures {
     /// Episodes.
@@ -37,7 +37,7 @@ pub struct GroupFigures {
 }
 
 /// Episodes that fell short for one reason.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailureCount {
     /// How many.
@@ -51,7 +51,7 @@ pub struct FailureCount {
 }
 
 /// An episode that ended with an error.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErroredEpisode {
     /// The task.
@@ -70,7 +70,7 @@ pub struct ErroredEpisode {
 }
 
 /// Episodes that the expert led to the same subtask.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StartSubtaskFigures {
     /// The agent's very first subtask.

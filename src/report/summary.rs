@@ -17,7 +17,7 @@ use crate::house::grading::Grading;
 use crate::run_dir::manifest::Manifest;
 
 /// How the intervals were made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalMethods {
     /// Of rates.
@@ -28,10 +28,11 @@ pub struct IntervalMethods {
 
 /// The summary of a run. Its figures are of the episodes in the tasks' own words from their starts; those in other words or
 /// from later subtasks have tables of their own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
     /// Version of this format.
+    #[schemars(extend("const" = Summary::FORMAT))]
     pub format_version: u32,
     /// The task set's name.
     pub task_set: String,

@@ -9,10 +9,11 @@ use crate::data::json;
 use crate::house::grading::Grading;
 
 /// What a run was made from; two runs with equal manifests measure the same thing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// Version of this format, for the whole folder.
+    #[schemars(extend("const" = Manifest::FORMAT))]
     pub format_version: u32,
     /// The version of the program.
     pub sprint_version: String,

@@ -49,8 +49,10 @@ pub fn mistakes(path: &Path) -> anyhow::Result<Vec<Mistake>> {
             }]);
         }
     };
-    let mut found: Vec<(String, String)> =
-        schema::faults("tasks", &document)?.into_iter().map(|fault| (fault.field, fault.problem)).collect();
+    let mut found: Vec<(String, String)> = schema::faults(&schemars::schema_for!(TaskSet).to_value(), &document)?
+        .into_iter()
+        .map(|fault| (fault.field, fault.problem))
+        .collect();
     meaning(path, &document, &mut found);
     let places = json_positions::lines_of(text, found.iter().map(|(field, _)| field.as_str()));
     let mut mistakes: Vec<Mistake> = found

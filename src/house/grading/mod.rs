@@ -15,7 +15,7 @@ use crate::domain::{Action, ActionType, Scene, World};
 pub use words::describe;
 
 /// How subtasks are graded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Grading {
     /// A subtask asks for classes; the instance that the agent chose is bound for the subtasks after it.

@@ -16,10 +16,11 @@ use crate::episode::record::Episode;
 use crate::run_dir::reader::RecordedRun;
 
 /// What a comparison found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
     /// Version of this format.
+    #[schemars(extend("const" = Comparison::FORMAT))]
     pub format_version: u32,
     /// Each run by itself, in the order given.
     pub runs: Vec<RunFigures>,
@@ -28,7 +29,7 @@ pub struct Comparison {
 }
 
 /// A run's own figures.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunFigures {
     /// Its folder, or its folders with commas between.

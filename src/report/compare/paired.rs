@@ -12,7 +12,7 @@ use crate::report::stats::Interval;
 use crate::run_dir::reader::RecordedRun;
 
 /// A difference of two means, second less first, and its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PairedDifference {
     /// The first run's mean.
@@ -26,7 +26,7 @@ pub struct PairedDifference {
 }
 
 /// An episode in which one run succeeded and the other did not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutcomeChange {
     /// The task.
@@ -44,7 +44,7 @@ pub struct OutcomeChange {
 }
 
 /// Two runs compared episode by episode: same task, same seed, same start.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PairedComparison {
     /// The first run's folder.

@@ -1,0 +1,96 @@
+//! JSON Schemas of the files that the program reads and writes, derived from the types that it reads and writes them with.
+
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema};
+
+use super::progress_event::ProgressEvent;
+use crate::domain::TaskSet;
+use crate::episode::record::Episode;
+use crate::report::compare::Comparison;
+use crate::report::summary::Summary;
+use crate::run_dir::manifest::Manifest;
+
+/// Whose schemas there are.
+pub const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
+
+/// The schema of that name.
+pub fn schema(name: &str) -> Option<Schema> {
+    Some(match name {
+        "tasks" => schemars::schema_for!(TaskSet),
+        "manifest" => written::<Manifest>(),
+        "episode" => written::<Episode>(),
+        "summary" => written::<Summary>(),
+        "comparison" => written::<Comparison>(),
+        "progress" => written::<ProgressEvent>(),
+        _ => return None,
+    })
+}
+
+/// The schema of what the program writes: every field that is always there is required.
+fn written<T: JsonSchema>() -> Schema {
+    SchemaSettings::default().for_serialize().into_generator().into_root_schema_for::<T>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::schema;
+    use crate::data::taskset::tests::sample_set;
+    use crate::domain::{ActionType, Class, Instance};
+    use crate::episode::record::{Author, Step};
+    use crate::eval::evaluation::Progress;
+    use crate::house::{Outcome, Reason};
+    use crate::report::compare::paired::tests::run;
+    use crate::report::summary::tests::sample;
+    use crate::run_dir::episodes::tests::episode;
+    use crate::run_dir::manifest::tests::manifest;
+
+    fn faults(name: &str, document: &impl serde::Serialize) -> Vec<schema::Fault> {
+        schema::faults(&super::schema(name).unwrap().to_value(), &serde_json::to_value(document).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn what_the_program_writes_satisfies_its_schema() {
+        let (tasks, episodes) = sample();
+        let all = Manifest { instruction_variants: true, all_start_subtasks: true, ..manifest() };
+        let step = Step {
+            kind: ActionType::Pickup,
+            target: Some(Instance::Object(3)),
+            class: Class::named("Mug"),
+            outcome: Outcome::Impossible(Reason::TooFar { class: Class::named("Mug").unwrap(), millimetres: 1700 }),
+            subtask: None,
+            instruction: Some("Go.".into()),
+            author: Some(Author::hand()),
+        };
+        let explored = Episode { trace: vec![step], ..episode("a") };
+        let comparison = Comparison::of(&[run("a", &[true, false]), run("b", &[false, true])]).unwrap().0;
+        let progress = Progress { done: 1, of: 2, successes: 1, errors: 0 };
+        assert_eq!(faults("tasks", &sample_set()), []);
+        assert_eq!(faults("manifest", &all), []);
+        assert_eq!(faults("episode", &explored), []);
+        assert_eq!(faults("summary", &Summary::of(&all, &tasks, &episodes, false)), []);
+        assert_eq!(faults("comparison", &comparison), []);
+        assert_eq!(faults("progress", &ProgressEvent::Progress { progress, seconds: 0.5 }), []);
+    }
+
+    #[test]
+    fn a_field_too_many_or_of_another_kind_is_found() {
+        let mut written = serde_json::to_value(manifest()).unwrap();
+        written["speed"] = 1.into();
+        written["seeds"] = "two".into();
+        written["format_version"] = 1.into();
+        let fields: Vec<String> = faults("manifest", &written).into_iter().map(|fault| fault.field).collect();
+        assert!(
+            ["speed", "seeds", "format_version"].iter().all(|field| fields.iter().any(|f| f == field)),
+            "{fields:?}"
+        );
+    }
+
+    #[test]
+    fn every_schema_has_a_title_and_describes_its_fields() {
+        for name in NAMES {
+            let schema = schema(name).unwrap().to_value();
+            assert!(schema["title"].is_string() && schema["description"].is_string(), "{name}");
+        }
+    }
+}
