@@ -1,6 +1,9 @@
 //! Where a run goes that was given no folder.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use time::UtcDateTime;
 
 /// The folder of a run that was given none: `runs/NAME-YYYYMMDD-HHMMSS`, in universal time. Where there is one already,
 /// of a run that began in the same second or before the clock was set back, a number is added.
@@ -14,17 +17,9 @@ pub fn default_path(name: &str, unix_seconds: u64, is_taken: &dyn Fn(&Path) -> b
 
 /// `YYYYMMDD-HHMMSS` in universal time.
 fn timestamp(unix_seconds: u64) -> String {
-    let (days, second) = (unix_seconds / 86_400, unix_seconds % 86_400);
-    // Howard Hinnant's calendar arithmetic, counting from 0000-03-01.
-    let from_march = days + 719_468;
-    let (era, day_of_era) = (from_march / 146_097, from_march % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted_month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    let year = era * 400 + year_of_era + u64::from(month <= 2);
-    format!("{year:04}{month:02}{day:02}-{:02}{:02}{:02}", second / 3600, second / 60 % 60, second % 60)
+    let now = UtcDateTime::UNIX_EPOCH + Duration::from_secs(unix_seconds);
+    let (hour, minute, second) = now.as_hms();
+    format!("{:04}{:02}{:02}-{hour:02}{minute:02}{second:02}", now.year(), u8::from(now.month()), now.day())
 }
 
 #[cfg(test)]

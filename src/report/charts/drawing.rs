@@ -3,12 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::data::atomic_file;
-use crate::report::export::Canvas;
-use crate::report::export::lettering::{ADVANCE, glyph};
+use embedded_graphics::mono_font::iso_8859_1::FONT_10X20;
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::prelude::{Point, Primitive};
+use embedded_graphics::primitives::{Circle, Polyline, PrimitiveStyle};
+use embedded_graphics::text::{Alignment, Text};
 
-/// Red, green, blue.
-pub type Rgb = [u8; 3];
+use crate::data::atomic_file;
+use crate::report::raster::{Raster, Rgb, rgb888};
 
 /// Where a text's point lies.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +32,8 @@ enum Shape {
 
 /// Pixels of the picture to a unit of the drawing.
 const SCALE: f64 = 2.0;
+/// The font of the picture; the SVG leaves it to whoever shows it.
+const FONT: MonoFont<'_> = FONT_10X20;
 /// A dot's radius.
 const RADIUS: f64 = 3.5;
 
@@ -114,70 +118,43 @@ impl Drawing {
     /// # Errors
     /// Never in practice: it is written to memory.
     pub fn png(&self) -> anyhow::Result<Vec<u8>> {
-        let (width, height) = ((SCALE * self.size.0).ceil() as usize, (SCALE * self.size.1).ceil() as usize);
-        let mut canvas = Canvas::new(width, height, [255; 3]);
+        let pixel = |(x, y): (f64, f64)| Point::new((SCALE * x).round() as i32, (SCALE * y).round() as i32);
+        let (width, height) = (SCALE * self.size.0, SCALE * self.size.1);
+        let mut raster = Raster::new(width.ceil() as usize, height.ceil() as usize, [255; 3]);
         for shape in &self.shapes {
             match shape {
                 Shape::Line { points, colour, width } => {
-                    points.windows(2).for_each(|ends| stroke(&mut canvas, ends[0], ends[1], *colour, *width));
+                    let points: Vec<Point> = points.iter().copied().map(pixel).collect();
+                    let style = PrimitiveStyle::with_stroke(rgb888(*colour), (SCALE * width).round() as u32);
+                    raster.draw(&Polyline::new(&points).into_styled(style));
                 }
-                Shape::Dot { at, colour } => disc(&mut canvas, *at, RADIUS, *colour),
-                Shape::Text { at, text, anchor, colour } => write(&mut canvas, *at, text, *anchor, *colour),
+                Shape::Dot { at, colour } => {
+                    let circle = Circle::with_center(pixel(*at), (2.0 * SCALE * RADIUS).round() as u32);
+                    raster.draw(&circle.into_styled(PrimitiveStyle::with_fill(rgb888(*colour))));
+                }
+                Shape::Text { at, text, anchor, colour } => {
+                    let style = MonoTextStyle::new(&FONT, rgb888(*colour));
+                    raster.draw(&Text::with_alignment(text, pixel(*at), style, (*anchor).into()));
+                }
             }
         }
-        canvas.png()
+        raster.png()
+    }
+}
+
+impl From<Anchor> for Alignment {
+    fn from(anchor: Anchor) -> Alignment {
+        match anchor {
+            Anchor::Start => Alignment::Left,
+            Anchor::Middle => Alignment::Center,
+            Anchor::End => Alignment::Right,
+        }
     }
 }
 
 /// Text as it stands in SVG and HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// Sets the pixel of a place in pixels.
-fn put(canvas: &mut Canvas, x: f64, y: f64, colour: Rgb) {
-    if x >= 0.0 && y >= 0.0 {
-        canvas.set(x as usize, y as usize, colour);
-    }
-}
-
-fn disc(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, colour: Rgb) {
-    let radius = SCALE * radius;
-    let reach = radius.ceil() as i32;
-    for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (f64::from(dx), f64::from(dy)))) {
-        if dx.hypot(dy) <= radius {
-            put(canvas, SCALE * x + dx, SCALE * y + dy, colour);
-        }
-    }
-}
-
-fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), colour: Rgb, width: f64) {
-    let parts = (SCALE * (to.0 - from.0).hypot(to.1 - from.1)).ceil().max(1.0);
-    for part in 0..=parts as u32 {
-        let share = f64::from(part) / parts;
-        let at = (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
-        disc(canvas, at, width / 2.0, colour);
-    }
-}
-
-fn write(canvas: &mut Canvas, (x, y): (f64, f64), text: &str, anchor: Anchor, colour: Rgb) {
-    // A dot of a letter is a unit of the drawing.
-    let length = (text.chars().count() * ADVANCE) as f64;
-    let left = x - match anchor {
-        Anchor::Start => 0.0,
-        Anchor::Middle => length / 2.0,
-        Anchor::End => length,
-    };
-    for (place, letter) in text.chars().enumerate() {
-        for (down, bits) in glyph(letter).into_iter().enumerate() {
-            for across in (0..5usize).filter(|across| bits >> (4 - across) & 1 == 1) {
-                let corner = (SCALE * (left + (place * ADVANCE + across) as f64), SCALE * (y - 7.0 + down as f64));
-                for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                    put(canvas, corner.0.round() + dx, corner.1.round() + dy, colour);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Charts of lines: axes, lines with their intervals, and their names.
 
-use super::drawing::{Anchor, Drawing, Rgb};
+use super::drawing::{Anchor, Drawing};
+use crate::report::raster::Rgb;
 use crate::report::stats::Interval;
 
 /// A chart of lines.

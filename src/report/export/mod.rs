@@ -1,17 +1,14 @@
 //! What was recorded, for people: a picture, a film, a strip of pictures, a transcript, or a page that replays it.
 
-mod canvas;
+mod captions;
 mod film;
 mod html;
-pub mod lettering;
 mod strip;
 mod text;
 
 use std::path::Path;
 
 use anyhow::bail;
-
-pub use canvas::Canvas;
 
 use crate::data::atomic_file;
 use crate::episode::frames::FrameSequence;

@@ -2,14 +2,13 @@
 
 use anyhow::Context;
 
-use super::canvas::Canvas;
-use super::lettering;
-use super::lettering::LINE;
+use super::captions::{FONT, LINE, wrap};
 use crate::episode::frames::{FrameSequence, Shot};
+use crate::report::raster::{Raster, Rgb};
 
-const PAPER: [u8; 3] = [255, 255, 255];
-const INK: [u8; 3] = [20, 20, 24];
-const DONE: [u8; 3] = [20, 120, 60];
+const PAPER: Rgb = [255, 255, 255];
+const INK: Rgb = [20, 20, 24];
+const DONE: Rgb = [20, 120, 60];
 /// Space around frames, in pixels.
 const MARGIN: usize = 8;
 /// Frames of a strip where no subtask was done.
@@ -21,35 +20,35 @@ const SIDE: usize = 150;
 ///
 /// # Errors
 /// When there is no such step.
-pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Canvas> {
+pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Raster> {
     let shot = recording.shots.get(at as usize).with_context(|| format!("there is no step {at}"))?;
     let frame = recording.camera().draw(shot);
-    Ok(Canvas { width: frame.width, height: frame.height, rgb: frame.rgb })
+    Ok(Raster { width: frame.width, height: frame.height, rgb: frame.rgb })
 }
 
 /// The first frame, those at which a subtask was done, and the last one, each over its words.
-pub fn draw(recording: &FrameSequence) -> Canvas {
+pub fn draw(recording: &FrameSequence) -> Raster {
     let shots = chosen(recording);
-    let words: Vec<Vec<String>> = shots.iter().map(|shot| lettering::broken(&caption(shot), SIDE)).collect();
+    let words: Vec<Vec<String>> = shots.iter().map(|shot| wrap(&caption(shot), SIDE)).collect();
     let lines = words.iter().map(Vec::len).max().unwrap_or(1);
     let width = MARGIN + shots.len() * (SIDE + MARGIN);
-    let title = lettering::broken(&recording.told(), width - 2 * MARGIN);
+    let title = wrap(&recording.told(), width - 2 * MARGIN);
     let top = MARGIN + title.len() * LINE;
-    let mut canvas = Canvas::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
+    let mut raster = Raster::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
     for (row, line) in title.iter().enumerate() {
-        lettering::write(&mut canvas, MARGIN, MARGIN / 2 + row * LINE, line, INK);
+        raster.text(MARGIN, MARGIN / 2 + row * LINE, line, &FONT, INK);
     }
     let mut camera = recording.camera();
     for (place, (shot, words)) in shots.iter().zip(words).enumerate() {
         let left = MARGIN + place * (SIDE + MARGIN);
         let frame = camera.draw(shot);
-        canvas.place(&frame, left, top, (frame.width / SIDE).max(1));
+        raster.frame(&frame, left, top, (frame.width / SIDE).max(1));
         let colour = if shot.done.is_some() { DONE } else { INK };
         for (row, line) in words.iter().enumerate() {
-            lettering::write(&mut canvas, left, top + SIDE + MARGIN / 2 + row * LINE, line, colour);
+            raster.text(left, top + SIDE + MARGIN / 2 + row * LINE, line, &FONT, colour);
         }
     }
-    canvas
+    raster
 }
 
 fn caption(shot: &Shot) -> String {
