@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 use anyhow::Context;
 use clap::Args;
 
-use super::Ending;
 use super::appraised::appraised;
 use super::bar::Bars;
+use super::exit_status::ExitStatus;
 use crate::agent::average::average;
 use crate::data::ensure_free;
 use crate::nets::device::best_device;
@@ -45,7 +45,7 @@ impl Average {
     ///
     /// # Errors
     /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         ensure_free::check(&self.out)?;
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;
@@ -66,6 +66,6 @@ impl Average {
         let swaps = if config.policy.goal.is_some() { 0 } else { tasks / 2 };
         let appraisal = Appraisal { tasks, swaps, ..Preset::sized("sprint", None)?.appraisal };
         appraised(&self.out, &appraisal, Arc::new(Mutex::new(sentences)), Bars::new())?;
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

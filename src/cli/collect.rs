@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 use anyhow::ensure;
 use clap::{Args, ValueEnum};
 
-use super::Ending;
 use super::bar::Bars;
+use super::exit_status::ExitStatus;
 use super::stop;
 use super::streams::say;
 use crate::data::taskset;
@@ -74,7 +74,7 @@ impl Collect {
     ///
     /// # Errors
     /// When the folder cannot be written to.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let Where::Generated = self.scenes;
         ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
@@ -111,8 +111,8 @@ impl Collect {
             collected.trajectories
         ));
         if collected.stopped {
-            return Ok(Ending::Interrupted);
+            return Ok(ExitStatus::Interrupted);
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

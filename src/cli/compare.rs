@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::exit_status::ExitStatus;
+use super::streams;
 use super::streams::say;
-use super::{Ending, streams};
 use crate::data::json;
 use crate::report::compare::Comparison;
 use crate::report::threshold::Threshold;
@@ -14,7 +15,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Compares runs, episode by episode.
 #[derive(Args)]
-pub struct Compare {
+pub struct CompareArgs {
     /// The run folders; the others are compared with the first. RUN,RUN,...: the same method's, trained with several seeds
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
@@ -32,12 +33,12 @@ pub struct Compare {
     max_regressions: Option<usize>,
 }
 
-impl Compare {
-    /// Compares.
+impl CompareArgs {
+    /// Prints the comparison, and holds it against the thresholds.
     ///
     /// # Errors
     /// When a folder holds no run, or two have no episode in common.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let runs: Vec<RecordedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
         let (comparison, summaries) = Comparison::of(&runs)?;
         if let Some(path) = &self.out {
@@ -50,19 +51,19 @@ impl Compare {
             write!(out, "{}", comparison.markdown())?;
         }
         out.flush()?;
-        let mut ending = Ending::Ok;
+        let mut status = ExitStatus::Ok;
         if let Some(most) = self.max_regressions.filter(|&most| comparison.regressions() > most) {
             say(&format!("{} regressions, at most {most} are allowed", comparison.regressions()));
-            ending = Ending::BelowThreshold;
+            status = ExitStatus::BelowThreshold;
         }
         let last = summaries.last();
         for (threshold, summary) in self.fail_below.iter().filter_map(|threshold| Some((threshold, last?))) {
             if let Some(measured) = threshold.missed_by(summary)? {
                 say(&format!("{threshold} was missed: {measured:.4}"));
-                ending = Ending::BelowThreshold;
+                status = ExitStatus::BelowThreshold;
             }
         }
-        Ok(ending)
+        Ok(status)
     }
 }
 

@@ -6,7 +6,8 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use super::{Ending, logging, streams};
+use super::exit_status::ExitStatus;
+use super::{logging, streams};
 use crate::agent::policy_source;
 use crate::nets::{device, home, sentence};
 
@@ -44,7 +45,7 @@ impl Doctor {
     ///
     /// # Errors
     /// When something is missing: names it.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let findings =
             [libtorch(), computes_on(), encoder(), graphics(), threads(), cache(), checkpoints(), log_file()];
         let mut out = streams::out();
@@ -69,7 +70,7 @@ impl Doctor {
             "not everything is in place: {} (see the remedies above)",
             missing.join(", ")
         );
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 

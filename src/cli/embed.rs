@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 
-use super::Ending;
+use super::exit_status::ExitStatus;
 use crate::nets::device::best_device;
 use crate::nets::sentence::{SentenceEncoder, default_folder};
 
@@ -15,19 +15,19 @@ const TOGETHER: usize = 256;
 
 /// Embeds sentences.
 #[derive(Args)]
-pub struct Embed {
+pub struct EmbedArgs {
     /// A sentence encoder's folder, as sentence-transformers publishes them [default: all-MiniLM-L6-v2, which `make setup` fetched]
     #[arg(long, value_name = "DIR")]
     encoder: Option<PathBuf>,
 }
 
-impl Embed {
+impl EmbedArgs {
     /// Embeds standard input to standard output. Answers as soon as no further line is waiting, so that a program can
     /// hold a conversation with it.
     ///
     /// # Errors
     /// When the encoder cannot be loaded or a line is not UTF-8.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let encoder = SentenceEncoder::load(&self.encoder.unwrap_or_else(default_folder), best_device())?;
         let mut lines = BufReader::with_capacity(1 << 16, std::io::stdin());
         let mut out = std::io::stdout().lock();
@@ -44,7 +44,7 @@ impl Embed {
             }
             out.flush()?;
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 

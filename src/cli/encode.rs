@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Ending;
 use super::bar::Bars;
+use super::exit_status::ExitStatus;
 use super::stop;
 use super::streams::say;
 use crate::agent::checkpoint::Networks;
@@ -43,7 +43,7 @@ impl Encode {
     ///
     /// # Errors
     /// When the datasets or the encoder cannot be read, or a cache not be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let encoder = self.encoder.load()?;
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let frame_store = FrameStore::open(&datasets)?;
@@ -54,12 +54,12 @@ impl Encode {
         bars.end();
         let Some(features) = features else {
             say("stopped; the same command goes on from here");
-            return Ok(Ending::Interrupted);
+            return Ok(ExitStatus::Interrupted);
         };
         let size = (features.len() as f64 * features.width() as f64) / 1e9;
         let seconds = begun.elapsed().as_secs_f64();
         say(&format!("{} frames, {size:.2} GB of features, in {seconds:.0} s", features.len()));
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 

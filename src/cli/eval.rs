@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::exit_status::ExitStatus;
 use super::policies::PolicyChoice;
 use super::streams::say;
-use super::{Ending, streams};
+use super::{jobs, stop, streams};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, Progress};
@@ -57,8 +58,8 @@ pub struct Eval {
     #[arg(long)]
     language: bool,
     /// `all`: also play each task from each of its subtasks on; the expert does those before
-    #[arg(long, value_name = "all")]
-    from_subtask: Option<Starts>,
+    #[arg(long, value_name = "all", value_parser = ["all"])]
+    from_subtask: Option<String>,
     /// How subtasks are graded: class, or strict as the released code does
     #[arg(long, value_name = "class|strict", default_value_t = Grading::Class)]
     grader: Grading,
@@ -76,19 +77,12 @@ pub struct Eval {
     fail_below: Vec<Threshold>,
 }
 
-/// From where each task is played besides its start.
-#[derive(Clone, Copy, ValueEnum)]
-enum Starts {
-    /// From each of its subtasks
-    All,
-}
-
 impl Eval {
-    /// Evaluates.
+    /// Plays what is not in the run folder yet, and prints the summary.
     ///
     /// # Errors
     /// When the tasks, the policy or the folder cannot be used. An episode's own errors are counted instead.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let set = taskset::read(&self.tasks)?;
         let scenes = Scenes::of(&self.tasks, &set.value);
         let chosen = self.policy.open(self.sample)?;
@@ -98,7 +92,7 @@ impl Eval {
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunWriter::open(&path, evaluation.manifest())?;
         run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
-        let stop = super::stop::on_signals()?;
+        let stop = stop::on_signals()?;
         let mut meter = Meter::new(self.json);
         let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.make, &mut run, &stop, &mut |progress| {
             meter.show(progress)
@@ -107,7 +101,7 @@ impl Eval {
         print(&summary, self.json)?;
         say(&format!("wrote {}", path.display()));
         chosen.check_unchanged()?;
-        self.ending(&summary)
+        self.status(&summary)
     }
 
     fn options(&self) -> Options {
@@ -115,7 +109,7 @@ impl Eval {
             grading: self.grader,
             seeds: self.seeds,
             limit: self.limit.map(|limit| limit as usize),
-            jobs: super::threads(self.jobs),
+            jobs: jobs::threads(self.jobs),
             step_by_step: self.step_by_step,
             sampling: self.sample,
             language: self.language,
@@ -135,19 +129,19 @@ impl Eval {
         self.shard.map_or_else(|| run.clone(), |shard| run.join(shard.folder()))
     }
 
-    fn ending(&self, summary: &Summary) -> anyhow::Result<Ending> {
+    fn status(&self, summary: &Summary) -> anyhow::Result<ExitStatus> {
         if summary.partial {
             say("interrupted: the summary is partial; the same command with this folder as --out continues it");
-            return Ok(Ending::Interrupted);
+            return Ok(ExitStatus::Interrupted);
         }
-        let mut ending = if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed };
+        let mut status = if summary.errors == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed };
         for threshold in &self.fail_below {
             if let Some(measured) = threshold.missed_by(summary)? {
                 say(&format!("{threshold} was missed: {measured:.4}"));
-                ending = Ending::BelowThreshold;
+                status = ExitStatus::BelowThreshold;
             }
         }
-        Ok(ending)
+        Ok(status)
     }
 }
 

@@ -7,11 +7,13 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use etcetera::BaseStrategy;
 
-use super::rooms::RoomName;
-use super::{Ending, logging};
+use super::exit_status::ExitStatus;
+use super::logging;
+use super::value_names;
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
+use crate::domain::Room;
 use crate::episode::scenes::Scenes;
 use crate::explore::episode_source::{EpisodeSource, Start};
 use crate::explore::plain;
@@ -49,8 +51,8 @@ struct Origin {
     #[arg(long, value_name = "DIR", default_value = "data")]
     data: PathBuf,
     /// The kind of room of a generated house
-    #[arg(long, value_enum, default_value = "kitchen", conflicts_with_all = ["scene", "task"])]
-    room: RoomName,
+    #[arg(long, value_parser = value_names::room(), default_value = "kitchen", conflicts_with_all = ["scene", "task"])]
+    room: Room,
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
@@ -86,11 +88,11 @@ impl Display {
         kind: PolicyKind,
         manual: bool,
         open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
-    ) -> anyhow::Result<Ending> {
+    ) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
             plain::run(open()?, kind, input, out)?;
-            return Ok(Ending::Ok);
+            return Ok(ExitStatus::Ok);
         }
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
@@ -110,8 +112,8 @@ impl Display {
         let runs = !self.paused;
         let screen = screen::Screen { protocol, policy: kind, manual, runs, config, memory, history, bandwidth, log };
         match screen::run(screen, open)? {
-            Farewell::Signal(_) => Ok(Ending::Interrupted),
-            Farewell::Asked | Farewell::WorkerGone => Ok(Ending::Ok),
+            Farewell::Signal(_) => Ok(ExitStatus::Interrupted),
+            Farewell::Asked | Farewell::WorkerGone => Ok(ExitStatus::Ok),
         }
     }
 
@@ -158,7 +160,7 @@ impl Explore {
     ///
     /// # Errors
     /// When what it should start in cannot be opened, or there is no terminal.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let manual = matches!(self.policy, PolicyName::Manual);
         let kind = match self.policy {
             PolicyName::Agent | PolicyName::Manual => PolicyKind::Agent,
@@ -213,6 +215,6 @@ impl Origin {
             }
             return Ok((Start::Recorded { scene, trajectories }, none));
         }
-        Ok((Start::Generated(self.room.into()), none))
+        Ok((Start::Generated(self.room), none))
     }
 }

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, open::Reference, streams};
+use super::exit_status::ExitStatus;
+use super::{open::Reference, streams};
 use crate::episode::frames::FrameSequence;
 use crate::report::export;
 
@@ -28,7 +29,7 @@ impl Export {
     ///
     /// # Errors
     /// When the episode cannot be read, or a file cannot be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let episode = &recorded.episodes[reference.episode];
         let (_, task, setting) = recorded.setting(episode)?;
@@ -38,6 +39,6 @@ impl Export {
             let size = export::write(&recording, reference.step.unwrap_or(0), path)?;
             writeln!(out, "{}: {:.1} kB", path.display(), size as f64 / 1000.0)?;
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
-use super::Ending;
+use super::exit_status::ExitStatus;
+use super::progress_style;
 use super::streams::say;
 use crate::data::alfred::{self, Progress};
 
@@ -39,15 +40,15 @@ impl Import {
     ///
     /// # Errors
     /// When nothing can be imported or the folder cannot be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let From::Alfred(alfred) = self.from;
         alfred.run()
     }
 }
 
 impl Alfred {
-    fn run(self) -> anyhow::Result<Ending> {
-        let bar = ProgressBar::new(0).with_style(style());
+    fn run(self) -> anyhow::Result<ExitStatus> {
+        let bar = ProgressBar::new(0).with_style(progress_style::counted());
         let show = |progress: Progress| {
             let (what, done, total) = match progress {
                 Progress::Reading(done, total) => ("reading", done, total),
@@ -86,12 +87,6 @@ impl Alfred {
         }
         let skipped = manifest.skipped.len();
         say(&format!("{} scenes in {}; {skipped} files skipped", manifest.scenes, self.out.display()));
-        Ok(if skipped == 0 { Ending::Ok } else { Ending::SomeFailed })
+        Ok(if skipped == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
-}
-
-/// How progress is drawn.
-pub(super) fn style() -> ProgressStyle {
-    let template = "{msg:15} {bar:40} {pos}/{len} {elapsed}";
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Ending;
+use super::exit_status::ExitStatus;
 use crate::eval::merge;
 
 /// Joins the shares that `sprint eval --shard` wrote into one run.
 #[derive(Args)]
-pub struct Merge {
+pub struct MergeArgs {
     /// The run folder; its shares lie in RUN/shards
     run: PathBuf,
     /// The shares, where they lie elsewhere
@@ -19,15 +19,15 @@ pub struct Merge {
     json: bool,
 }
 
-impl Merge {
-    /// Merges.
+impl MergeArgs {
+    /// Joins the shares, and prints the summary of the whole.
     ///
     /// # Errors
     /// When a share is missing or not complete, or they are not of one run.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let shares = if self.shares.is_empty() { merge::shares_in(&self.run)? } else { self.shares };
         let summary = merge::merge(&shares, &self.run)?;
         super::eval::print(&summary, self.json)?;
-        Ok(if summary.errors == 0 { Ending::Ok } else { Ending::SomeFailed })
+        Ok(if summary.errors == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
 }

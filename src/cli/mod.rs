@@ -2,7 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+
+use exit_status::ExitStatus;
 
 mod appraised;
 mod average;
@@ -14,23 +16,26 @@ mod embed;
 mod encode;
 mod explore;
 mod eval;
+mod exit_status;
 mod export;
 mod import;
+mod jobs;
 mod logging;
 mod plot;
 mod merge;
 mod open;
 mod policies;
 mod pretrain;
+mod progress_style;
 mod relabel;
 mod replay;
 mod report;
-mod rooms;
 mod schema;
 mod shell;
 mod stop;
 mod streams;
 mod tasks;
+mod value_names;
 mod verify;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
@@ -51,11 +56,11 @@ enum Command {
     /// Play a task set, and write a run folder with every episode and a summary
     Eval(eval::Eval),
     /// Compare runs of the same tasks, episode by episode
-    Compare(compare::Compare),
+    Compare(compare::CompareArgs),
     /// Join the shares of a run that several machines played
-    Merge(merge::Merge),
+    Merge(merge::MergeArgs),
     /// Draw a run's plots and write it as one HTML page; draw a training's curves
-    Report(report::Report),
+    Report(report::ReportArgs),
     /// Print the JSON Schema of a file that the program reads or writes
     Schema(schema::Schema),
     /// Show a recorded episode in the explorer, at any of its steps
@@ -81,37 +86,13 @@ enum Command {
     /// Draw the curves of trainings to SVG and PNG
     Plot(plot::PlotCurves),
     /// Re-run recorded demonstrations in the simulator
-    Replay(replay::Replay),
+    Replay(replay::ReplayArgs),
     /// Embed sentences: a sentence a line in, a JSON array a line out
-    Embed(embed::Embed),
+    Embed(embed::EmbedArgs),
     /// Print a completion script for a shell
     Completions(shell::Completions),
     /// Print the manual page (roff)
     Man,
-}
-
-/// How the program ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
-    /// All went well.
-    Ok,
-    /// A threshold that the user set was missed.
-    BelowThreshold,
-    /// Some items failed; the rest is complete.
-    SomeFailed,
-    /// Stopped by a signal, with a valid partial result.
-    Interrupted,
-}
-
-impl From<Ending> for ExitCode {
-    fn from(ending: Ending) -> ExitCode {
-        ExitCode::from(match ending {
-            Ending::Ok => 0,
-            Ending::BelowThreshold => 2,
-            Ending::SomeFailed => 3,
-            Ending::Interrupted => 130,
-        })
-    }
 }
 
 /// Parses the command line, runs the command, and prints an error's chain once.
@@ -120,7 +101,7 @@ pub fn main() -> ExitCode {
     logging::start();
     match run(cli.command) {
         Ok(ending) => ending.into(),
-        Err(error) if reader_left(&error) => Ending::Ok.into(),
+        Err(error) if reader_left(&error) => ExitStatus::Ok.into(),
         Err(error) => {
             tracing::error!("{error:#}");
             complain(&error);
@@ -129,7 +110,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command) -> anyhow::Result<Ending> {
+fn run(command: Command) -> anyhow::Result<ExitStatus> {
     match command {
         Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
@@ -151,8 +132,8 @@ fn run(command: Command) -> anyhow::Result<Ending> {
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
-        Command::Completions(completions) => completions.run(),
-        Command::Man => shell::man(),
+        Command::Completions(completions) => completions.run(Cli::command()),
+        Command::Man => shell::man(Cli::command()),
     }
 }
 
@@ -160,11 +141,6 @@ fn run(command: Command) -> anyhow::Result<Ending> {
 fn reader_left(error: &anyhow::Error) -> bool {
     let kind = error.root_cause().downcast_ref::<std::io::Error>().map(std::io::Error::kind);
     kind == Some(std::io::ErrorKind::BrokenPipe)
-}
-
-/// How many threads: what was asked for, or one a core.
-fn threads(asked: Option<u16>) -> usize {
-    asked.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
 }
 
 /// The one place that prints an error: its chain, outermost first.

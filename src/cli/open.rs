@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use clap::Args;
 
-use super::{Ending, explore::Display};
+use super::exit_status::ExitStatus;
+use super::explore::Display;
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
@@ -75,7 +76,7 @@ impl Open {
     ///
     /// # Errors
     /// When it cannot be read, its tasks are not at hand, or the simulator does not come to what was recorded.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let (at, task, _) = recorded.setting(&recorded.episodes[reference.episode])?;
         let (task, episode) = (task.clone(), recorded.episodes[reference.episode].clone());

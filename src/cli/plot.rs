@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, streams};
+use super::exit_status::ExitStatus;
+use super::streams;
 use crate::data::atomic_file;
 use crate::report::charts::training_curves;
 
@@ -28,7 +29,7 @@ impl PlotCurves {
     ///
     /// # Errors
     /// When a training's progress cannot be read, or the picture not be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let read = |folder: &PathBuf| Ok((folder.display().to_string(), training_curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
         let plot = training_curves::draw(&trainings, &self.only)?;
@@ -44,6 +45,6 @@ impl PlotCurves {
             atomic_file::write(&file, &bytes)?;
             writeln!(out, "{}", file.display())?;
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

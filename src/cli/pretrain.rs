@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex};
 
 use clap::Args;
 
-use super::Ending;
 use super::appraised::{appraised, name};
 use super::bar::Bars;
+use super::exit_status::ExitStatus;
 use super::stop;
 use super::streams::say;
 use crate::agent::learned::SharedEmbedder;
@@ -71,7 +71,7 @@ impl Pretrain {
     ///
     /// # Errors
     /// When data or an earlier state cannot be read, or the checkpoint not be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
             preset.visual_training.optimisation.steps = steps;
@@ -104,9 +104,9 @@ impl Pretrain {
         if pretraining.run(&mut bars, &stop)? == Trained::Stopped {
             bars.end();
             say("stopped; --resume goes on from here");
-            return Ok(Ending::Interrupted);
+            return Ok(ExitStatus::Interrupted);
         }
         appraised(&pretraining.out, &pretraining.preset.appraisal, sentences, bars)?;
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

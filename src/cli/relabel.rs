@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::Ending;
 use super::bar::Bars;
+use super::exit_status::ExitStatus;
 use super::stop;
 use super::streams::say;
 use crate::language::passage::{Concatenation, Summarizer};
@@ -35,7 +35,7 @@ impl Relabel {
     ///
     /// # Errors
     /// When the dataset cannot be read or its folder not be written to.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let summarizer: &dyn Summarizer = match self.with {
             With::Rules => &Rules,
             With::Concat => &Concatenation,
@@ -46,7 +46,7 @@ impl Relabel {
         bars.end();
         if found.stopped {
             say("stopped; the same command goes on from here");
-            return Ok(Ending::Interrupted);
+            return Ok(ExitStatus::Interrupted);
         }
         let (source, version) = (summarizer.source(), summarizer.version());
         say(&format!(
@@ -56,6 +56,6 @@ impl Relabel {
             found.known,
             found.asked
         ));
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

@@ -6,17 +6,18 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::ProgressBar;
 
+use super::exit_status::ExitStatus;
 use super::streams::say;
-use super::{Ending, import, streams};
+use super::{progress_style, streams};
 use crate::data::Dataset;
-use crate::eval::replay::{Options, Report, replay};
+use crate::eval::replay::{ReplayOptions, ReplayReport, replay};
 
 /// How many failures of each kind are listed.
 const LISTED: usize = 500;
 
 /// Re-runs recorded demonstrations.
 #[derive(Args)]
-pub struct Replay {
+pub struct ReplayArgs {
     /// The dataset folder
     data: PathBuf,
     /// Only this split (train, valid_seen, ...)
@@ -33,12 +34,12 @@ pub struct Replay {
     json: bool,
 }
 
-impl Replay {
+impl ReplayArgs {
     /// Replays and prints what came of it.
     ///
     /// # Errors
     /// When the dataset cannot be read, or holds nothing of the split.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let dataset = Dataset::open(&self.data)?;
         let counts = &dataset.manifest().counts;
         let of = |split: &String| counts.get(split).map_or(0, |counts| counts.trajectories);
@@ -46,8 +47,8 @@ impl Replay {
         if let Some(split) = &self.split {
             dataset.check_split(split)?;
         }
-        let bar = ProgressBar::new(total).with_style(import::style()).with_message("replaying");
-        let options = Options { split: self.split, boxes: self.boxes, sight: self.sight };
+        let bar = ProgressBar::new(total).with_style(progress_style::counted()).with_message("replaying");
+        let options = ReplayOptions { split: self.split, boxes: self.boxes, sight: self.sight };
         let report = replay(&dataset, &options, &|done| bar.inc(done));
         bar.finish_and_clear();
         let report = report?;
@@ -58,11 +59,11 @@ impl Replay {
         } else {
             print(&report, &mut out)?;
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 
-fn list_failures(report: &Report) {
+fn list_failures(report: &ReplayReport) {
     for (what, count) in &report.failures {
         for failure in report.failed.iter().filter(|failure| failure.what == *what).take(LISTED) {
             say(&format!("{what}: {}: {}", failure.id, failure.reason));
@@ -73,7 +74,7 @@ fn list_failures(report: &Report) {
     }
 }
 
-fn print(report: &Report, out: &mut impl Write) -> std::io::Result<()> {
+fn print(report: &ReplayReport, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(out, "trajectories        {}", report.trajectories)?;
     for (what, share) in [
         ("actions possible", report.legal),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Args;
 
-use super::Ending;
+use super::exit_status::ExitStatus;
 use super::streams::say;
 use crate::data::{atomic_file, json};
 use crate::report::charts::progress_by_length;
@@ -16,7 +16,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Draws a run: its plots and its page.
 #[derive(Args)]
-pub struct Report {
+pub struct ReportArgs {
     /// A run folder: its page is written to report.html there
     folder: PathBuf,
     /// The most frames of an episode on the page
@@ -27,12 +27,12 @@ pub struct Report {
     out: Option<PathBuf>,
 }
 
-impl Report {
-    /// Draws.
+impl ReportArgs {
+    /// Writes the page and the plot of a run.
     ///
     /// # Errors
     /// When the folder holds none, or cannot be written to.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
         if self.folder.join(MANIFEST).exists() {
             let run = RecordedRun::open_evaluated(&self.folder)?;
@@ -50,6 +50,6 @@ impl Report {
                 self.folder.display()
             );
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

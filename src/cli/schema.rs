@@ -4,7 +4,8 @@ use std::io::Write;
 
 use clap::Args;
 
-use super::{Ending, streams};
+use super::exit_status::ExitStatus;
+use super::streams;
 use crate::eval::schemas;
 
 /// Prints a JSON Schema.
@@ -16,16 +17,16 @@ pub struct Schema {
 }
 
 impl Schema {
-    /// Prints it.
+    /// Prints the schema of that name.
     ///
     /// # Errors
     /// When standard output is closed.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let mut out = streams::out();
         if let Some(schema) = schemas::schema(&self.name) {
             writeln!(out, "{}", serde_json::to_string_pretty(&schema)?)?;
         }
         out.flush()?;
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }

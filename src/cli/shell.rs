@@ -2,10 +2,10 @@
 
 use std::io::Write;
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::{Cli, Ending};
+use super::exit_status::ExitStatus;
 
 /// Prints a completion script.
 #[derive(Args)]
@@ -19,11 +19,11 @@ impl Completions {
     ///
     /// # Errors
     /// When standard output cannot be written.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self, mut program: Command) -> anyhow::Result<ExitStatus> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "sprint", &mut script);
+        clap_complete::generate(self.shell, &mut program, "sprint", &mut script);
         std::io::stdout().write_all(&script)?;
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 
@@ -31,8 +31,7 @@ impl Completions {
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn man() -> anyhow::Result<Ending> {
-    let mut program = Cli::command();
+pub fn man(mut program: Command) -> anyhow::Result<ExitStatus> {
     program.build();
     let mut page = Vec::new();
     clap_mangen::Man::new(program.clone()).render(&mut page)?;
@@ -40,5 +39,5 @@ pub fn man() -> anyhow::Result<Ending> {
         clap_mangen::Man::new(command.clone()).render(&mut page)?;
     }
     std::io::stdout().write_all(&page)?;
-    Ok(Ending::Ok)
+    Ok(ExitStatus::Ok)
 }

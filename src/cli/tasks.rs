@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, ensure};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use indicatif::ProgressBar;
 
-use super::rooms::RoomName;
-use super::{Ending, streams};
+use super::exit_status::ExitStatus;
+use super::{jobs, progress_style, streams, value_names};
 use crate::agent::policy_source::PolicySource;
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
@@ -20,29 +20,29 @@ use crate::eval::evaluation::Evaluation;
 use crate::eval::options::Options;
 use crate::eval::tasks::check;
 use crate::eval::tasks::sample;
-use crate::eval::tasks::sample::{Phrasing, Wish};
+use crate::eval::tasks::sample::{Phrasing, SampleSpec};
 use crate::house::grading::{Grading, describe};
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
 pub struct Tasks {
     #[command(subcommand)]
-    what: What,
+    what: TasksCommand,
 }
 
 #[derive(Subcommand)]
-enum What {
+enum TasksCommand {
     /// Write a task set from generated houses or a dataset's demonstrations
-    Sample(Sample),
+    Sample(SampleArgs),
     /// Check that a task set can be played: it parses, its scenes exist, and the expert solves every task
-    Check(Check),
+    Check(CheckArgs),
     /// Show a task in words, or list a set's tasks
-    Show(Show),
+    Show(ShowArgs),
 }
 
 /// Writes a task set.
 #[derive(Args)]
-struct Sample {
+struct SampleArgs {
     /// The file to write
     out: PathBuf,
     /// Where the tasks play: `generated` houses, or the folder of a dataset
@@ -50,7 +50,7 @@ struct Sample {
     scenes: PathBuf,
     /// Subtasks of each task; of several lengths (1,2,3 or 1-5) there are as many tasks each, as far as there are any
     #[arg(long, value_name = "N|N,N|N-N", default_value = "1")]
-    length: Lengths,
+    length: TaskLengths,
     /// Tasks
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
@@ -58,11 +58,11 @@ struct Sample {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// The kinds of rooms to take [default: all]
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "ROOM,...")]
-    rooms: Vec<RoomName>,
+    #[arg(long, value_parser = value_names::room(), value_delimiter = ',', value_name = "ROOM,...")]
+    rooms: Vec<Room>,
     /// Whose words tell the agent what to do, in tasks from a dataset
-    #[arg(long, value_enum, default_value = "own")]
-    phrasing: PhrasingName,
+    #[arg(long, value_parser = value_names::phrasing(), default_value = Phrasing::GRAMMAR)]
+    phrasing: Phrasing,
     /// Only demonstrations of this split of a dataset
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
@@ -71,14 +71,14 @@ struct Sample {
     force: bool,
 }
 
-/// Lengths of tasks.
+/// Lengths of tasks, as ranges or listed.
 #[derive(Clone)]
-struct Lengths(Vec<usize>);
+struct TaskLengths(Vec<usize>);
 
-impl std::str::FromStr for Lengths {
+impl std::str::FromStr for TaskLengths {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Lengths, String> {
+    fn from_str(text: &str) -> Result<TaskLengths, String> {
         let number = |text: &str| match text.trim().parse::<usize>() {
             Ok(length) if (1..=50).contains(&length) => Ok(length),
             _ => Err(format!("{text:?} is not a number of subtasks, 1 to 50")),
@@ -92,21 +92,13 @@ impl std::str::FromStr for Lengths {
         }
         lengths.sort_unstable();
         lengths.dedup();
-        if lengths.is_empty() { Err(format!("{text:?} names no length")) } else { Ok(Lengths(lengths)) }
+        if lengths.is_empty() { Err(format!("{text:?} names no length")) } else { Ok(TaskLengths(lengths)) }
     }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PhrasingName {
-    /// The program's own grammar
-    Own,
-    /// What people wrote of the demonstrations
-    Annotators,
 }
 
 /// Checks a task set.
 #[derive(Args)]
-struct Check {
+struct CheckArgs {
     /// The task file
     file: PathBuf,
     /// Threads [default: one a core]
@@ -116,60 +108,58 @@ struct Check {
 
 /// Shows a task.
 #[derive(Args)]
-struct Show {
+struct ShowArgs {
     /// The task file, with the task's number from 1 or its id: FILE#N; all tasks in a line each without
     #[arg(value_name = "FILE[#N]")]
     task: String,
 }
 
 impl Tasks {
-    /// Does what was asked.
+    /// Samples, checks or shows.
     ///
     /// # Errors
     /// When a file cannot be used; names it.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         match self.what {
-            What::Sample(sample) => sample.run(),
-            What::Check(check) => check.run(),
-            What::Show(show) => show.run(),
+            TasksCommand::Sample(sample) => sample.run(),
+            TasksCommand::Check(check) => check.run(),
+            TasksCommand::Show(show) => show.run(),
         }
     }
 }
 
-impl Sample {
-    fn run(self) -> anyhow::Result<Ending> {
+impl SampleArgs {
+    fn run(self) -> anyhow::Result<ExitStatus> {
         ensure!(self.force || !self.out.exists(), "{} exists; --force replaces it", self.out.display());
         let rooms = match self.rooms.is_empty() {
             true => Room::ALL.to_vec(),
-            false => self.rooms.iter().map(|&room| room.into()).collect(),
+            false => self.rooms,
         };
         let name = self.out.file_stem().map_or_else(|| "tasks".into(), |stem| stem.to_string_lossy().into_owned());
         let lengths = self.length.0;
-        let wish = Wish { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
+        let spec = SampleSpec { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
         let set = if self.scenes == Path::new("generated") {
             let bar =
-                ProgressBar::new(u64::from(self.count)).with_style(super::import::style()).with_message("sampling");
-            let set = sample::balanced(&wish, &lengths, &|wish| sample::sample_generated(wish, &|| bar.inc(1)));
+                ProgressBar::new(u64::from(self.count)).with_style(progress_style::counted()).with_message("sampling");
+            let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| bar.inc(1)));
             bar.finish_and_clear();
             set?
         } else {
             let dataset = Dataset::open(&self.scenes)?;
             let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-            let phrasing = match self.phrasing {
-                PhrasingName::Own => Phrasing::Own,
-                PhrasingName::Annotators => Phrasing::Annotators,
-            };
             let split = self.split.as_deref();
-            sample::balanced(&wish, &lengths, &|wish| sample::sample_dataset(wish, &dataset, split, phrasing, folder))?
+            sample::balanced(&spec, &lengths, &|spec| {
+                sample::sample_dataset(spec, &dataset, split, self.phrasing, folder)
+            })?
         };
         taskset::write(&self.out, &set)?;
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 
-impl Check {
-    fn run(self) -> anyhow::Result<Ending> {
+impl CheckArgs {
+    fn run(self) -> anyhow::Result<ExitStatus> {
         let mistakes = check::mistakes(&self.file)?;
         let mut out = streams::out();
         for mistake in &mistakes {
@@ -178,7 +168,7 @@ impl Check {
         check::none(&mistakes, &self.file)?;
         let set = taskset::read(&self.file)?;
         let scenes = Scenes::of(&self.file, &set.value);
-        let options = Options { jobs: super::threads(self.jobs), ..Options::plain(Grading::Class) };
+        let options = Options { jobs: jobs::threads(self.jobs), ..Options::plain(Grading::Class) };
         let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
             .with_context(|| self.file.display().to_string())?;
         let mut unsolved = 0;
@@ -198,12 +188,12 @@ impl Check {
         )?;
         let count = set.value.tasks.len();
         writeln!(out, "{}: {count} tasks, {} solved by the expert", self.file.display(), count - unsolved)?;
-        Ok(if unsolved == 0 { Ending::Ok } else { Ending::SomeFailed })
+        Ok(if unsolved == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
 }
 
-impl Show {
-    fn run(self) -> anyhow::Result<Ending> {
+impl ShowArgs {
+    fn run(self) -> anyhow::Result<ExitStatus> {
         let (file, wanted) = taskset::split_reference(&self.task);
         let set = taskset::read(&file)?.value;
         let mut out = streams::out();
@@ -218,7 +208,7 @@ impl Show {
                 show(&mut out, &set.tasks[at], &Scenes::of(&file, &set)).with_context(|| self.task.clone())?;
             }
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 

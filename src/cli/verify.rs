@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Ending, streams};
+use super::exit_status::ExitStatus;
+use super::{jobs, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
 use crate::eval::verify;
@@ -35,7 +36,7 @@ impl Verify {
     ///
     /// # Errors
     /// When the run or its tasks cannot be read.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub fn run(self) -> anyhow::Result<ExitStatus> {
         let run = RecordedRun::open(&self.run, self.tasks.as_deref())?;
         let mut find = |author: &Author| {
             policy_source::find(
@@ -47,7 +48,7 @@ impl Verify {
         };
         let bar = indicatif::ProgressBar::new(run.episodes.len() as u64);
         let verdict =
-            verify::verify(&run, &mut find, super::threads(self.jobs), &mut |done| bar.set_position(done as u64))?;
+            verify::verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| bar.set_position(done as u64))?;
         bar.finish_and_clear();
         let mut out = streams::out();
         if self.json {
@@ -67,6 +68,6 @@ impl Verify {
             }
             writeln!(out, "{}", if verdict.is_equal() { "equal" } else { "different" })?;
         }
-        Ok(if verdict.is_equal() { Ending::Ok } else { Ending::SomeFailed })
+        Ok(if verdict.is_equal() { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
 }

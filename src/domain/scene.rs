@@ -32,6 +32,16 @@ impl Room {
         }
     }
 
+    /// The name in options.
+    pub fn option_name(self) -> &'static str {
+        match self {
+            Room::Kitchen => "kitchen",
+            Room::LivingRoom => "living-room",
+            Room::Bedroom => "bedroom",
+            Room::Bathroom => "bathroom",
+        }
+    }
+
     /// The name in a sentence.
     pub fn spoken(self) -> &'static str {
         match self {
@@ -40,6 +50,15 @@ impl Room {
             Room::Bedroom => "bedroom",
             Room::Bathroom => "bathroom",
         }
+    }
+}
+
+impl std::str::FromStr for Room {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Room, String> {
+        let known = Room::ALL.into_iter().find(|room| room.option_name() == text);
+        known.ok_or_else(|| format!("{text:?} is not one of {}", Room::ALL.map(Room::option_name).join(", ")))
     }
 }
 

@@ -14,9 +14,9 @@ use crate::house::Outcome;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Episode {
-    /// The task's id.
+    /// The id of the task that was played.
     pub task: String,
-    /// Which of the run's seeds.
+    /// The episode's seed, one of the run's.
     pub seed: u64,
     /// How the instruction was derived from the task's own; the task's own where absent.
     #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
@@ -30,9 +30,9 @@ pub struct Episode {
     pub instruction: String,
     /// How many subtasks the agent completed.
     pub completed: u32,
-    /// Of how many.
+    /// How many subtasks the agent had to complete.
     pub of: u32,
-    /// All were.
+    /// Every subtask was completed.
     pub success: bool,
     /// How many actions the agent took.
     pub steps: u32,
@@ -54,13 +54,13 @@ pub struct Episode {
 /// What tells the episodes of a run apart.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
-    /// The task's id.
+    /// The id of the task.
     pub task: String,
-    /// Which seed.
+    /// One of the run's seeds.
     pub seed: u64,
     /// How the instruction was derived from the task's own.
     pub variant: InstructionVariant,
-    /// From which subtask.
+    /// The subtask from which the agent acts.
     pub start_subtask: u32,
 }
 
@@ -117,16 +117,16 @@ fn once() -> u32 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
-    /// What was done.
+    /// The action that was taken.
     #[serde(rename = "action")]
     pub kind: ActionType,
-    /// To what.
+    /// The thing that it was done to, by its position in the scene or world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<Instance>,
-    /// The target's class.
+    /// The class of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<Class>,
-    /// What it came to.
+    /// Whether it was carried out, or why it was impossible.
     pub outcome: Outcome,
     /// The subtask that it completed, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -159,12 +159,12 @@ impl Author {
     /// The name of a person who acts.
     pub const HAND: &str = "hand";
 
-    /// A person.
+    /// The author of what a person does.
     pub fn hand() -> Author {
         Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, sampling: false }
     }
 
-    /// Whether a person chose.
+    /// Whether a person chose, no policy.
     pub fn is_hand(&self) -> bool {
         self.policy == Author::HAND
     }

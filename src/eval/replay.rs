@@ -21,10 +21,10 @@ use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
 use crate::house::{House, Outcome, Replay};
 
-/// What to replay.
+/// Which demonstrations to replay, and what to compare beside their outcomes.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Only this split.
+pub struct ReplayOptions {
+    /// Only demonstrations of this split; of all without.
     pub split: Option<String>,
     /// Compare projected with recorded boxes.
     pub boxes: bool,
@@ -34,8 +34,8 @@ pub struct Options {
 
 /// What a replay came to. Shares are of trajectories, from 0 to 1.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
-    /// How many trajectories.
+pub struct ReplayReport {
+    /// How many demonstrations were replayed.
     pub trajectories: usize,
     /// Share whose every action is possible, sight and reach apart.
     pub legal: f64,
@@ -53,37 +53,37 @@ pub struct Report {
     /// The official task sets that the dataset holds, with the expert's recorded actions as the policy.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub task_sets: BTreeMap<String, SetReport>,
-    /// Projected beside recorded boxes.
+    /// How well projected boxes fit the recorded ones, where that was asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub boxes: Option<BoxReport>,
     /// Every failure: which, the trajectory, and why.
     #[serde(skip)]
-    pub failed: Vec<Failure>,
+    pub failed: Vec<ReplayFailure>,
 }
 
-/// One failure.
+/// A check that one demonstration, or task of an official set, did not pass.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Failure {
+pub struct ReplayFailure {
     /// `legal`, `seen`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
     pub what: &'static str,
-    /// The trajectory or task.
+    /// The id of the trajectory or task.
     pub id: String,
-    /// Why.
+    /// What the simulator found instead.
     pub reason: String,
 }
 
 /// How many tasks of a set the expert's recorded actions complete.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SetReport {
-    /// How many tasks.
+    /// How many tasks the set has.
     pub tasks: usize,
-    /// Completed, graded by class.
+    /// How many are completed, graded by class.
     pub class: usize,
     /// Completed, graded as the released code does.
     pub strict: usize,
 }
 
-/// Projected beside recorded boxes.
+/// How well the boxes of targets, as the simulator projects them, fit those that ALFRED recorded.
 #[derive(Clone, Debug, Serialize)]
 pub struct BoxReport {
     /// How many boxes were compared.
@@ -96,12 +96,12 @@ pub struct BoxReport {
     pub per_class: BTreeMap<String, ClassBoxes>,
 }
 
-/// Boxes of one class.
+/// The same for one action and class.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClassBoxes {
-    /// How many.
+    /// How many boxes of it were compared.
     pub n: usize,
-    /// Median intersection over union.
+    /// Median intersection over union of projected and recorded box.
     pub median_iou: f64,
 }
 
@@ -112,11 +112,15 @@ struct Replayed {
     ious: Vec<(ActionType, &'static str, f32)>,
 }
 
-/// Replays a dataset.
+/// Replays a dataset's demonstrations on all cores; `progress` is called as they are done.
 ///
 /// # Errors
 /// When a file of the dataset cannot be read or names a scene that is absent.
-pub fn replay(dataset: &Dataset, options: &Options, progress: &(dyn Fn(u64) + Sync)) -> anyhow::Result<Report> {
+pub fn replay(
+    dataset: &Dataset,
+    options: &ReplayOptions,
+    progress: &(dyn Fn(u64) + Sync),
+) -> anyhow::Result<ReplayReport> {
     let scenes = dataset.scenes()?;
     let wanted = |trajectory: &Trajectory| options.split.as_ref().is_none_or(|split| *split == trajectory.split);
     let replayed = dataset
@@ -294,7 +298,7 @@ pub fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
     if all > 0.0 { shared / all } else { 0.0 }
 }
 
-fn summarise(replayed: &[(String, Replayed)], options: &Options) -> Report {
+fn summarise(replayed: &[(String, Replayed)], options: &ReplayOptions) -> ReplayReport {
     let mut failures: BTreeMap<&'static str, usize> =
         ["legal", "goals", "skills_class", "skills_strict"].map(|what| (what, 0)).into();
     failures.extend(options.sight.then_some(("seen", 0)));
@@ -302,14 +306,14 @@ fn summarise(replayed: &[(String, Replayed)], options: &Options) -> Report {
     for (id, one) in replayed {
         for (what, reason) in &one.failures {
             *failures.entry(what).or_default() += 1;
-            failed.push(Failure { what, id: id.clone(), reason: reason.clone() });
+            failed.push(ReplayFailure { what, id: id.clone(), reason: reason.clone() });
         }
     }
     let share = |what: &str| {
         let failed = failures.get(what).copied().unwrap_or_default();
         if replayed.is_empty() { 0.0 } else { 1.0 - failed as f64 / replayed.len() as f64 }
     };
-    Report {
+    ReplayReport {
         trajectories: replayed.len(),
         legal: share("legal"),
         seen: options.sight.then(|| share("seen")),
@@ -351,7 +355,7 @@ fn replay_set(
     tasks: &[Task],
     recorded: &BTreeMap<String, Trajectory>,
     scenes: &BTreeMap<String, Arc<Scene>>,
-    failed: &mut Vec<Failure>,
+    failed: &mut Vec<ReplayFailure>,
 ) -> anyhow::Result<SetReport> {
     let mut report = SetReport { tasks: tasks.len(), ..SetReport::default() };
     for task in tasks {
@@ -375,7 +379,7 @@ fn replay_set(
         for (what, grader) in [("task_class", &graders[0]), ("task_strict", &graders[1])] {
             if !grader.is_done() {
                 let reason = format!("{id}: {}", grader.waits_for(scene, &world));
-                failed.push(Failure { what, id: task.id.clone(), reason });
+                failed.push(ReplayFailure { what, id: task.id.clone(), reason });
             }
         }
     }
@@ -432,7 +436,7 @@ mod tests {
         let dataset = Dataset::open(out.path()).unwrap();
         let set = dataset.tasks("eval_100").unwrap();
         assert_eq!(set.tasks.iter().filter(|task| task.reworded).count(), 25);
-        let report = replay(&dataset, &Options { boxes: true, ..Options::default() }, &|_| {}).unwrap();
+        let report = replay(&dataset, &ReplayOptions { boxes: true, ..ReplayOptions::default() }, &|_| {}).unwrap();
         assert_eq!(report.trajectories, 6825);
         assert!(report.legal >= 0.999, "{}", report.legal);
         assert!(report.goals >= 0.995, "{}", report.goals);
@@ -442,7 +446,7 @@ mod tests {
         let boxes = report.boxes.unwrap();
         assert!(boxes.pickup_median_iou >= 0.78, "{}", boxes.pickup_median_iou);
         assert!(boxes.put_median_iou >= 0.80, "{}", boxes.put_median_iou);
-        let looking = Options { split: Some("valid_seen".into()), sight: true, ..Options::default() };
+        let looking = ReplayOptions { split: Some("valid_seen".into()), sight: true, ..ReplayOptions::default() };
         let seen = replay(&dataset, &looking, &|_| {}).unwrap().seen.unwrap();
         assert!(seen >= 0.87, "{seen}");
     }

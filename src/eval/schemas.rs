@@ -10,7 +10,7 @@ use crate::report::compare::Comparison;
 use crate::report::summary::Summary;
 use crate::run_dir::manifest::Manifest;
 
-/// Whose schemas there are.
+/// The files and lines that have a schema, as `sprint schema` names them.
 pub const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
 
 /// The schema of that name.

@@ -12,9 +12,9 @@ pub const BOOTSTRAP_SEED: u64 = 0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {
-    /// Over all episodes.
+    /// The mean of all episodes, whatever their task.
     pub mean: f64,
-    /// Lower and upper end.
+    /// Its 95 % interval, lower end first: bootstrap over tasks.
     pub interval: Interval,
 }
 
@@ -32,11 +32,11 @@ impl Mean {
 pub struct SkillRate {
     /// Subtasks of the kind whose turn came.
     pub reached: usize,
-    /// Of those, completed.
+    /// Subtasks among those that were completed.
     pub completed: usize,
-    /// The share; 0 when none was reached.
+    /// `completed` as a share of `reached`; 0 when none was reached.
     pub rate: f64,
-    /// Its 95 % interval.
+    /// The 95 % Wilson interval of the rate, lower end first.
     pub interval: Interval,
 }
 

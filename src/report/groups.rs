@@ -24,13 +24,13 @@ pub struct EpisodesByTask<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupFigures {
-    /// Episodes.
+    /// How many episodes the figures are of.
     pub episodes: usize,
-    /// Of those, successes.
+    /// How many of them completed every subtask.
     pub successes: usize,
-    /// The share of successes.
+    /// `successes` as a share of `episodes`.
     pub success: f64,
-    /// Its 95 % interval.
+    /// The 95 % Wilson interval of `success`, lower end first.
     pub success_interval: Interval,
     /// Completed subtasks as a share of those that were asked.
     pub progress: Mean,
@@ -40,13 +40,13 @@ pub struct GroupFigures {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailureCount {
-    /// How many.
+    /// How many episodes fell short for this reason.
     pub episodes: usize,
     /// As a share of all episodes.
     pub share: f64,
     /// The task of the first such episode.
     pub example_task: String,
-    /// Its seed.
+    /// The seed of that episode.
     pub example_seed: u64,
 }
 
@@ -54,9 +54,9 @@ pub struct FailureCount {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErroredEpisode {
-    /// The task.
+    /// The id of its task.
     pub task: String,
-    /// The seed.
+    /// Its seed.
     pub seed: u64,
     /// How the instruction was derived from the task's own.
     #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
@@ -65,7 +65,7 @@ pub struct ErroredEpisode {
     pub start_subtask: u32,
     /// How often it was begun.
     pub attempts: u32,
-    /// What was reported.
+    /// The error that ended it, as the policy or the environment reported it.
     pub error: String,
 }
 
@@ -75,7 +75,7 @@ pub struct ErroredEpisode {
 pub struct StartSubtaskFigures {
     /// The agent's very first subtask.
     pub first_subtask: SkillRate,
-    /// All that was left.
+    /// Figures of all subtasks that were left to the agent.
     pub remaining: GroupFigures,
 }
 
@@ -129,7 +129,7 @@ impl<'a> EpisodesByTask<'a> {
         }
     }
 
-    /// Figures by scene.
+    /// The figures of each scene's episodes; generated houses count by their room.
     pub fn by_scene(&self) -> BTreeMap<String, GroupFigures> {
         let mut scenes: BTreeMap<String, Vec<(&'a Task, Vec<&'a Episode>)>> = BTreeMap::new();
         for (task, group) in &self.groups {
@@ -153,7 +153,7 @@ impl<'a> EpisodesByTask<'a> {
     }
 }
 
-/// Why episodes fell short.
+/// How many episodes fell short for each reason, with an example.
 pub fn failures(episodes: &EpisodesByTask<'_>) -> BTreeMap<Failure, FailureCount> {
     let all = episodes.iter();
     let mut classes: BTreeMap<Failure, FailureCount> = BTreeMap::new();
@@ -182,7 +182,7 @@ pub fn errored(episodes: &EpisodesByTask<'_>) -> Vec<ErroredEpisode> {
     listed.collect()
 }
 
-/// Figures by instruction variant.
+/// The figures of each instruction variant, over episodes that start where their tasks do.
 pub fn instruction_variants(episodes: &EpisodesByTask<'_>) -> BTreeMap<InstructionVariant, GroupFigures> {
     let of = |variant: InstructionVariant| {
         episodes.filter(|episode| episode.variant == variant && episode.start_subtask == 0).figures()

@@ -20,9 +20,9 @@ use crate::run_dir::manifest::Manifest;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalMethods {
-    /// Of rates.
+    /// How intervals of rates were made.
     pub rates: String,
-    /// Of means.
+    /// How intervals of means were made.
     pub means: String,
 }
 
@@ -31,14 +31,14 @@ pub struct IntervalMethods {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
-    /// Version of this format.
+    /// Version of the format of `summary.json`.
     #[schemars(extend("const" = Summary::FORMAT))]
     pub format_version: u32,
-    /// The task set's name.
+    /// The name that the task file gives itself.
     pub task_set: String,
-    /// The policy's name.
+    /// The name of the policy that acted: of an agent, its checkpoint's.
     pub policy: String,
-    /// How subtasks were graded.
+    /// The rules by which subtasks counted as completed.
     pub grader: Grading,
     /// The run was interrupted; only some of its episodes are in.
     pub partial: bool,
@@ -50,7 +50,7 @@ pub struct Summary {
     pub errors: usize,
     /// The share of episodes in which every subtask was completed.
     pub success: f64,
-    /// Its 95 % interval.
+    /// The 95 % Wilson interval of `success`, lower end first.
     pub success_interval: Interval,
     /// Completed subtasks of an episode.
     pub completed_subtasks: Mean,
@@ -68,7 +68,7 @@ pub struct Summary {
     pub skills: BTreeMap<SkillKind, SkillRate>,
     /// By the scene; generated houses by their room.
     pub scenes: BTreeMap<String, GroupFigures>,
-    /// Steps of an episode.
+    /// Mean steps of an episode, successful or not.
     pub steps_mean: f64,
     /// Steps that the expert takes, for the same episodes.
     pub expert_steps_mean: f64,

@@ -13,7 +13,7 @@ pub struct EpisodeSpec {
     pub index: usize,
     /// The task's position in the set.
     pub task: usize,
-    /// Which seed.
+    /// One of the run's seeds, from 0.
     pub seed: u64,
     /// How the instruction is derived from the task's own.
     pub variant: InstructionVariant,

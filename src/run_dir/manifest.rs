@@ -12,18 +12,18 @@ use crate::house::grading::Grading;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Version of this format, for the whole folder.
+    /// Version of the format of the whole folder.
     #[schemars(extend("const" = Manifest::FORMAT))]
     pub format_version: u32,
     /// The version of the program.
     pub sprint_version: String,
-    /// The task set's name.
+    /// The name that the task file gives itself.
     pub task_set: String,
     /// SHA-256 of the task file.
     pub task_set_hash: String,
     /// SHA-256 over the scenes that its tasks play in.
     pub scenes_hash: String,
-    /// The policy's name.
+    /// The name of the policy that acts: of an agent, its checkpoint's.
     pub policy: String,
     /// SHA-256 of the checkpoint, where the policy has one.
     pub checkpoint_hash: Option<String>,
@@ -31,7 +31,7 @@ pub struct Manifest {
     pub tasks: usize,
     /// Each task is played with the seeds 0 to this, exclusive.
     pub seeds: u64,
-    /// How subtasks are graded.
+    /// The rules by which subtasks count as completed.
     pub grader: Grading,
     /// The agent is told all steps instead of the task's instruction.
     pub step_by_step: bool,

@@ -25,7 +25,7 @@ pub struct RecordedRun {
     pub manifest: Manifest,
     /// The tasks that it plays.
     pub set: TaskSet,
-    /// Where they play.
+    /// The scenes that its tasks play in.
     pub scenes: Scenes,
     /// Its episodes, in the order of their lines.
     pub episodes: Vec<Episode>,

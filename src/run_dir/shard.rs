@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(try_from = "Written")]
 pub struct Shard {
-    /// Which share, from 1.
+    /// The number of this share, from 1.
     pub index: u32,
-    /// Of how many.
+    /// How many shares the run has.
     pub of: u32,
 }
 

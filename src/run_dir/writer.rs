@@ -69,7 +69,7 @@ impl RunWriter {
         Ok(RunWriter { path: path.to_owned(), episodes, earlier })
     }
 
-    /// Where it is.
+    /// The run's folder.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -20,7 +20,7 @@ use sprint_explorer::eval::evaluation::evaluate;
 use sprint_explorer::eval::options::Options;
 use sprint_explorer::eval::tasks::check;
 use sprint_explorer::eval::tasks::sample;
-use sprint_explorer::eval::tasks::sample::Wish;
+use sprint_explorer::eval::tasks::sample::SampleSpec;
 use sprint_explorer::eval::verify::verify;
 use sprint_explorer::house::expert::TurnTiming;
 use sprint_explorer::house::grading::Grading;
@@ -85,7 +85,7 @@ fn shipped(file: &str) -> Vec<u8> {
 }
 
 fn sampled() -> TaskSet {
-    let wish = Wish { name: "sampled".into(), length: 2, count: 2, seed: 5, rooms: vec![Room::Bathroom] };
+    let wish = SampleSpec { name: "sampled".into(), length: 2, count: 2, seed: 5, rooms: vec![Room::Bathroom] };
     sample::sample_generated(&wish, &|| ()).unwrap()
 }
 

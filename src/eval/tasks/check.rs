@@ -12,7 +12,7 @@ use crate::episode::scenes::Scenes;
 /// A mistake in a task file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// Its line, from 1.
+    /// The line of the file, from 1.
     pub line: usize,
     /// The field, as in `tasks[1].roles[0].class`; empty for the whole file.
     pub field: String,

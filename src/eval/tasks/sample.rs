@@ -20,28 +20,47 @@ use crate::language::phrases;
 /// The seeds of sampled tasks' houses lie from here on, those of collected demonstrations far below: no task is played in a
 /// house that an agent was trained in. Still small enough for readers of JSON that keep numbers as floats.
 const HELD_OUT: u64 = 1 << 41;
-/// How many houses are tried for one task before the wish is called unfulfillable.
+/// How many houses are tried for one task before the length is given up.
 const ATTEMPTS: u64 = 200;
 /// After so many houses without a task, the next kind of room is tried.
 const ATTEMPTS_A_ROOM: u64 = 20;
 
-/// Whose words tell the agent what to do.
+/// Where the instructions of sampled tasks come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phrasing {
     /// The program's own grammar.
-    Own,
+    Grammar,
     /// What people wrote of the demonstrations.
     Annotators,
 }
 
-/// What to sample.
+impl Phrasing {
+    /// The option's name of the program's own grammar.
+    pub const GRAMMAR: &str = "own";
+    /// The option's name of what people wrote.
+    pub const ANNOTATORS: &str = "annotators";
+}
+
+impl std::str::FromStr for Phrasing {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Phrasing, String> {
+        match text {
+            Phrasing::GRAMMAR => Ok(Phrasing::Grammar),
+            Phrasing::ANNOTATORS => Ok(Phrasing::Annotators),
+            _ => Err(format!("{text:?} is neither {} nor {}", Phrasing::GRAMMAR, Phrasing::ANNOTATORS)),
+        }
+    }
+}
+
+/// Which tasks to sample, and how many.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wish {
+pub struct SampleSpec {
     /// What the set is called in reports.
     pub name: String,
-    /// Subtasks of each task.
+    /// How many subtasks each task has.
     pub length: usize,
-    /// Tasks.
+    /// How many tasks to sample.
     pub count: usize,
     /// The same seed gives the same set.
     pub seed: u64,
@@ -49,9 +68,9 @@ pub struct Wish {
     pub rooms: Vec<Room>,
 }
 
-impl Wish {
+impl SampleSpec {
     /// The random numbers of the task at `place` in its `attempt`: no task's chance depends on another's.
-    fn source(&self, place: u64, attempt: u64) -> ChaCha8Rng {
+    fn rng(&self, place: u64, attempt: u64) -> ChaCha8Rng {
         let mut key = [0; 32];
         for (part, number) in key.chunks_exact_mut(8).zip([self.seed, place, attempt, self.length as u64]) {
             part.copy_from_slice(&number.to_le_bytes());
@@ -66,21 +85,21 @@ impl Wish {
 /// # Errors
 /// When there are too few tasks of all these lengths together.
 pub fn balanced(
-    wish: &Wish,
+    spec: &SampleSpec,
     lengths: &[usize],
-    sample: &dyn Fn(&Wish) -> anyhow::Result<TaskSet>,
+    sample: &dyn Fn(&SampleSpec) -> anyhow::Result<TaskSet>,
 ) -> anyhow::Result<TaskSet> {
     if let [_] = lengths {
-        return sample(wish);
+        return sample(spec);
     }
     let mut whole: Option<TaskSet> = None;
-    let mut wanted = wish.count;
+    let mut wanted = spec.count;
     for (left, &length) in (1..=lengths.len()).rev().zip(lengths.iter().rev()) {
         let count = if left == lengths.len() { wanted.div_ceil(left) } else { wanted / left };
         if count == 0 {
             continue;
         }
-        let of = |count: usize| sample(&Wish { length, count, ..wish.clone() });
+        let of = |count: usize| sample(&SampleSpec { length, count, ..spec.clone() });
         let set = match of(count) {
             Err(error) => match error.downcast_ref::<TooFew>() {
                 Some(&TooFew { there, .. }) if left > 1 && there > 0 => of(there)?,
@@ -112,24 +131,24 @@ pub struct TooFew {
 ///
 /// # Errors
 /// When no house gives a task of that length.
-pub fn sample_generated(wish: &Wish, done: &(dyn Fn() + Sync)) -> anyhow::Result<TaskSet> {
-    ensure!(!wish.rooms.is_empty(), "no kind of room is left to take");
+pub fn sample_generated(spec: &SampleSpec, done: &(dyn Fn() + Sync)) -> anyhow::Result<TaskSet> {
+    ensure!(!spec.rooms.is_empty(), "no kind of room is left to take");
     let task = |place: usize| -> anyhow::Result<Task> {
         for attempt in 0..ATTEMPTS {
-            let mut rng = wish.source(place as u64, attempt);
-            let room = wish.rooms[(place + (attempt / ATTEMPTS_A_ROOM) as usize) % wish.rooms.len()];
+            let mut rng = spec.rng(place as u64, attempt);
+            let room = spec.rooms[(place + (attempt / ATTEMPTS_A_ROOM) as usize) % spec.rooms.len()];
             let seed = HELD_OUT + u64::from(rng.random::<u32>());
             let (scene, world) = generate::house(room, seed);
             let reference = SceneRef::Generated { room, seed };
-            if let Some(task) = generate::task(&scene, &world, reference, wish.length, &mut rng) {
+            if let Some(task) = generate::task(&scene, &world, reference, spec.length, &mut rng) {
                 done();
                 return Ok(Task { id: format!("{}-{place}", scene.name), ..task });
             }
         }
-        bail!("no task of {} subtasks was found in {ATTEMPTS} houses; ask for shorter ones", wish.length)
+        bail!("no task of {} subtasks was found in {ATTEMPTS} houses; ask for shorter ones", spec.length)
     };
-    let tasks = (0..wish.count).into_par_iter().map(task).collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes: None, tasks })
+    let tasks = (0..spec.count).into_par_iter().map(task).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(TaskSet { format_version: TaskSet::FORMAT, name: spec.name.clone(), scenes: None, tasks })
 }
 
 /// Samples spans of a dataset's demonstrations, no span twice, and none that the dataset keeps from training. A task starts
@@ -138,7 +157,7 @@ pub fn sample_generated(wish: &Wish, done: &(dyn Fn() + Sync)) -> anyhow::Result
 /// # Errors
 /// When the dataset cannot be read, or holds too few such spans.
 pub fn sample_dataset(
-    wish: &Wish,
+    spec: &SampleSpec,
     dataset: &Dataset,
     split: Option<&str>,
     phrasing: Phrasing,
@@ -149,8 +168,8 @@ pub fn sample_dataset(
     }
     let scenes = dataset.scenes()?;
     let fits = |trajectory: &Trajectory| match &trajectory.scene {
-        SceneRef::Named(name) => scenes.get(name).is_some_and(|scene| wish.rooms.contains(&scene.room)),
-        SceneRef::Generated { room, .. } => wish.rooms.contains(room),
+        SceneRef::Named(name) => scenes.get(name).is_some_and(|scene| spec.rooms.contains(&scene.room)),
+        SceneRef::Generated { room, .. } => spec.rooms.contains(room),
     };
     let mut spans: Vec<(u32, usize)> = Vec::new();
     for (number, trajectory) in (0..).zip(dataset.trajectories()?) {
@@ -159,28 +178,28 @@ pub fn sample_dataset(
             continue;
         }
         let said = |first: &usize| {
-            phrasing == Phrasing::Own || !annotators(&trajectory, *first..*first + wish.length).is_empty()
+            phrasing == Phrasing::Grammar || !annotators(&trajectory, *first..*first + spec.length).is_empty()
         };
         let held_out = dataset.manifest().held_out.contains(&trajectory.id);
-        let free = |_: &usize| !(held_out && wish.length == trajectory.skills.len());
-        let firsts = (0..=trajectory.skills.len()).take_while(|first| first + wish.length <= trajectory.skills.len());
+        let free = |_: &usize| !(held_out && spec.length == trajectory.skills.len());
+        let firsts = (0..=trajectory.skills.len()).take_while(|first| first + spec.length <= trajectory.skills.len());
         spans.extend(firsts.filter(free).filter(said).map(|first| (number, first)));
     }
-    if spans.len() < wish.count {
+    if spans.len() < spec.count {
         let folder = dataset.folder().display().to_string();
-        return Err(TooFew { folder, there: spans.len(), length: wish.length }.into());
+        return Err(TooFew { folder, there: spans.len(), length: spec.length }.into());
     }
-    let (chosen, _) = spans.partial_shuffle(&mut wish.source(u64::MAX, 0), wish.count);
+    let (chosen, _) = spans.partial_shuffle(&mut spec.rng(u64::MAX, 0), spec.count);
     let mut places: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
     for (place, &mut (number, first)) in chosen.iter_mut().enumerate() {
         places.entry(number).or_default().push((place, first));
     }
-    let mut tasks: Vec<Option<Task>> = vec![None; wish.count];
+    let mut tasks: Vec<Option<Task>> = vec![None; spec.count];
     for (number, trajectory) in (0..).zip(dataset.trajectories()?) {
         let Some(spans) = places.get(&number) else { continue };
         let trajectory = trajectory?;
         for &(place, first) in spans {
-            let span = first..first + wish.length;
+            let span = first..first + spec.length;
             let id = format!("{}-{first}-{place}", trajectory.id);
             let scene = match &trajectory.scene {
                 SceneRef::Named(name) => scenes.get(name).cloned(),
@@ -191,26 +210,26 @@ pub fn sample_dataset(
                 .with_context(|| format!("trajectory {}: start", trajectory.id))?;
             let mut task = span_task(id, &trajectory, &scene, span.clone())
                 .map_err(|problem| anyhow::anyhow!("trajectory {}: {problem}", trajectory.id))?;
-            let mut rng = wish.source(place as u64, 0);
+            let mut rng = spec.rng(place as u64, 0);
             let wrote = annotators(&trajectory, span.clone());
-            if phrasing == Phrasing::Own || wrote.is_empty() {
+            if phrasing == Phrasing::Grammar || wrote.is_empty() {
                 task.sentences =
                     task.subtasks.iter().map(|subtask| phrases::sentence(&task.roles, subtask, &mut rng)).collect();
                 task.instruction = phrases::instruction(&task.roles, &task.subtasks, &mut rng);
             } else {
                 let annotation = &trajectory.annotations[wrote[rng.random_range(0..wrote.len())]];
                 task.sentences = annotation.steps[span].to_vec();
-                let whole = wish.length == trajectory.skills.len() && !annotation.goal.trim().is_empty();
+                let whole = spec.length == trajectory.skills.len() && !annotation.goal.trim().is_empty();
                 task.instruction = if whole { annotation.goal.clone() } else { task.sentences.join(" ") };
             }
             tasks[place] = Some(task);
         }
     }
     let tasks: Vec<Task> = tasks.into_iter().flatten().collect();
-    ensure!(tasks.len() == wish.count, "the dataset changed while it was read");
+    ensure!(tasks.len() == spec.count, "the dataset changed while it was read");
     let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let scenes = named.then(|| relative(&dataset.folder().join("scenes"), set_folder)).transpose()?;
-    Ok(TaskSet { format_version: TaskSet::FORMAT, name: wish.name.clone(), scenes, tasks })
+    Ok(TaskSet { format_version: TaskSet::FORMAT, name: spec.name.clone(), scenes, tasks })
 }
 
 /// The set with these of its tasks, as it is written in another folder: the scenes are where they were.
@@ -259,23 +278,23 @@ mod tests {
     use crate::house::grading::{Grader, Grading};
     use crate::house::testing::kitchen_house;
 
-    fn wish(length: usize, count: usize, seed: u64) -> Wish {
-        Wish { name: "sampled".into(), length, count, seed, rooms: Room::ALL.to_vec() }
+    fn spec(length: usize, count: usize, seed: u64) -> SampleSpec {
+        SampleSpec { name: "sampled".into(), length, count, seed, rooms: Room::ALL.to_vec() }
     }
 
     #[test]
     fn a_sample_is_the_same_for_the_same_seed_and_another_for_another() {
-        let sample = |seed| sample_generated(&wish(1, 6, seed), &|| ()).unwrap();
+        let sample = |seed| sample_generated(&spec(1, 6, seed), &|| ()).unwrap();
         assert_eq!(sample(3), sample(3));
         assert_ne!(sample(3), sample(4));
-        let longer = sample_generated(&wish(1, 8, 3), &|| ()).unwrap();
+        let longer = sample_generated(&spec(1, 8, 3), &|| ()).unwrap();
         assert_eq!(longer.tasks[..6], sample(3).tasks, "asking for more keeps the first ones");
     }
 
     #[test]
     fn sampled_tasks_have_the_wished_length_and_rooms_and_are_sound() {
         let rooms = vec![Room::Kitchen];
-        let set = sample_generated(&Wish { rooms, ..wish(3, 4, 0) }, &|| ()).unwrap();
+        let set = sample_generated(&SampleSpec { rooms, ..spec(3, 4, 0) }, &|| ()).unwrap();
         taskset::check(&set).unwrap();
         Scenes::in_folder(None).check(&set.tasks).unwrap();
         for task in &set.tasks {
@@ -335,7 +354,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset(folder.path());
         let sample =
-            |length, count, phrasing| sample_dataset(&wish(length, count, 5), &dataset, None, phrasing, folder.path());
+            |length, count, phrasing| sample_dataset(&spec(length, count, 5), &dataset, None, phrasing, folder.path());
         let told = sample(1, 2, Phrasing::Annotators).unwrap();
         let put = told.tasks.iter().find(|task| task.subtasks[0].skill == SkillKind::Put).unwrap();
         assert_eq!(put.instruction, "put the cup down");
@@ -344,13 +363,13 @@ mod tests {
         assert_eq!(start.held.map(Instance::Object), put.roles[usize::from(put.subtasks[0].object)].bound);
         assert!(start.held.is_some(), "the mug is in the hand already");
         assert_eq!(sample(2, 1, Phrasing::Annotators).unwrap().tasks[0].instruction, "Set the table.");
-        let own = sample(1, 2, Phrasing::Own).unwrap();
+        let own = sample(1, 2, Phrasing::Grammar).unwrap();
         assert!(own.tasks.iter().all(|task| !task.instruction.is_empty() && !task.instruction.contains("cup down")));
         for set in [told, own] {
             taskset::check(&set).unwrap();
             Scenes::of(&folder.path().join("set.json"), &set).check(&set.tasks).unwrap();
         }
-        let error = sample(1, 3, Phrasing::Own).unwrap_err().to_string();
+        let error = sample(1, 3, Phrasing::Grammar).unwrap_err().to_string();
         assert!(error.contains("2 spans of 1 subtasks"), "{error}");
     }
 
@@ -359,7 +378,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset_without(folder.path(), &["mug"]);
         let sample = |length, count| {
-            sample_dataset(&wish(length, count, 5), &dataset, None, Phrasing::Annotators, folder.path())
+            sample_dataset(&spec(length, count, 5), &dataset, None, Phrasing::Annotators, folder.path())
         };
         assert_eq!(sample(1, 2).unwrap().tasks.len(), 2);
         assert!(sample(2, 1).unwrap_err().to_string().contains("holds 0 spans of 2 subtasks"));
@@ -369,13 +388,13 @@ mod tests {
     fn a_balanced_set_takes_what_there_is_of_the_long_ones_and_fills_up_with_short_ones() {
         let folder = tempfile::tempdir().unwrap();
         let dataset = dataset(folder.path());
-        let sample = |wish: &Wish| sample_dataset(wish, &dataset, None, Phrasing::Own, folder.path());
-        let set = balanced(&wish(1, 3, 0), &[1, 2], &sample).unwrap();
+        let sample = |spec: &SampleSpec| sample_dataset(spec, &dataset, None, Phrasing::Grammar, folder.path());
+        let set = balanced(&spec(1, 3, 0), &[1, 2], &sample).unwrap();
         let lengths: Vec<usize> = set.tasks.iter().map(|task| task.subtasks.len()).collect();
         assert_eq!(lengths, [2, 1, 1]);
         taskset::check(&set).unwrap();
-        assert!(balanced(&wish(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtasks"));
-        let long = balanced(&wish(1, 2, 0), &[1, 2, 7], &sample).unwrap();
+        assert!(balanced(&spec(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtasks"));
+        let long = balanced(&spec(1, 2, 0), &[1, 2, 7], &sample).unwrap();
         assert_eq!(long.tasks.len(), 2);
     }
 

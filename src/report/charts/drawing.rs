@@ -12,14 +12,14 @@ use embedded_graphics::text::{Alignment, Text};
 use crate::data::atomic_file;
 use crate::report::raster::{Raster, Rgb, rgb888};
 
-/// Where a text's point lies.
+/// How a text lies about its point.
 #[derive(Clone, Copy, Debug)]
 pub enum Anchor {
-    /// At its left end.
+    /// The text begins at the point.
     Start,
-    /// In its middle.
+    /// The text is centred on the point.
     Middle,
-    /// At its right end.
+    /// The text ends at the point.
     End,
 }
 
@@ -34,7 +34,7 @@ enum Shape {
 const SCALE: f64 = 2.0;
 /// The font of the picture; the SVG leaves it to whoever shows it.
 const FONT: MonoFont<'_> = FONT_10X20;
-/// A dot's radius.
+/// The radius of a dot, in units of the drawing.
 const RADIUS: f64 = 3.5;
 
 /// Lines, dots and texts, in the order in which they cover each other.
@@ -51,22 +51,22 @@ impl Drawing {
         Drawing { size: (width, height), title: title.to_owned(), shapes: Vec::new() }
     }
 
-    /// A line through points.
+    /// Adds a line through points.
     pub fn line(&mut self, points: &[(f64, f64)], colour: Rgb, width: f64) {
         self.shapes.push(Shape::Line { points: points.to_vec(), colour, width });
     }
 
-    /// A dot.
+    /// Adds a dot, which marks a point of a line.
     pub fn dot(&mut self, at: (f64, f64), colour: Rgb) {
         self.shapes.push(Shape::Dot { at, colour });
     }
 
-    /// A text in one line, its baseline at `at`.
+    /// Adds a text in one line, its baseline at `at`.
     pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: Rgb) {
         self.shapes.push(Shape::Text { at, text: text.to_owned(), anchor, colour });
     }
 
-    /// As an SVG document, or as a part of a page.
+    /// The drawing as an SVG document, or as a part of a page.
     pub fn svg(&self) -> String {
         let (width, height) = self.size;
         let mut svg = format!(
@@ -113,7 +113,7 @@ impl Drawing {
         atomic_file::write(&folder.join(format!("{file_stem}.png")), &self.png()?)
     }
 
-    /// As a PNG file.
+    /// The drawing as a PNG file, at two pixels a unit.
     ///
     /// # Errors
     /// Never in practice: it is written to memory.

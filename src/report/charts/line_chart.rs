@@ -4,14 +4,14 @@ use super::drawing::{Anchor, Drawing};
 use crate::report::raster::Rgb;
 use crate::report::stats::Interval;
 
-/// A chart of lines.
+/// Lines in a plane with labelled axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineChart {
-    /// Above it.
+    /// The heading above the plane.
     pub title: String,
-    /// Below it.
+    /// What the horizontal axis measures, below the plane.
     pub x_label: String,
-    /// The lines.
+    /// The lines, in the order of their colours.
     pub series: Vec<Series>,
     /// The ends of the vertical axis; where there are none, those of the points.
     pub y_range: Option<(f64, f64)>,
@@ -31,7 +31,7 @@ pub struct Series {
 /// Told apart by people who see few colours, too (Okabe and Ito, 2008).
 pub const COLOURS: [Rgb; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [90, 90, 90]];
-/// The colour of texts.
+/// The colour of titles and labels.
 pub const INK: Rgb = [34, 34, 34];
 const FAINT: Rgb = [221, 221, 221];
 /// What lies around the plane: left, above, right, below.

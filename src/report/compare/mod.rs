@@ -15,11 +15,11 @@ use super::summary::Summary;
 use crate::episode::record::Episode;
 use crate::run_dir::reader::RecordedRun;
 
-/// What a comparison found.
+/// Several runs of the same tasks, each further one compared with the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
-    /// Version of this format.
+    /// Version of the format of a comparison.
     #[schemars(extend("const" = Comparison::FORMAT))]
     pub format_version: u32,
     /// Each run by itself, in the order given.
@@ -28,32 +28,32 @@ pub struct Comparison {
     pub pairs: Vec<PairedComparison>,
 }
 
-/// A run's own figures.
+/// The figures of one run, from its summary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunFigures {
-    /// Its folder, or its folders with commas between.
+    /// The run's folder, or its folders with commas between.
     pub run: String,
-    /// Its task set.
+    /// The name of the task set that it played.
     pub task_set: String,
-    /// Who acted.
+    /// The name of the policy that acted.
     pub policy: String,
     /// Episodes in the tasks' own words from their starts.
     pub episodes: usize,
     /// Episodes that ended with an error.
     pub errors: usize,
-    /// The share of successes.
+    /// The share of episodes in which every subtask was completed.
     pub success: f64,
-    /// Its 95 % interval.
+    /// The 95 % Wilson interval of `success`, lower end first.
     pub success_interval: Interval,
     /// Completed subtasks of an episode.
     pub completed_subtasks: Mean,
     /// The same by folder, where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub completed_subtasks_by_folder: Vec<f64>,
-    /// Mean progress.
+    /// Mean of completed subtasks as a share of an episode's subtasks.
     pub progress: f64,
-    /// By the number of subtasks: mean progress.
+    /// The same by the number of subtasks.
     pub progress_by_length: BTreeMap<u32, f64>,
 }
 

@@ -15,13 +15,13 @@ use crate::run_dir::reader::RecordedRun;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PairedDifference {
-    /// The first run's mean.
+    /// The mean over the first run's paired episodes.
     pub first: f64,
-    /// The second's.
+    /// The mean over the second run's paired episodes.
     pub second: f64,
-    /// Second less first.
+    /// `second` less `first`.
     pub difference: f64,
-    /// Its 95 % interval.
+    /// The 95 % interval of the difference: paired bootstrap over tasks.
     pub interval: Interval,
 }
 
@@ -29,9 +29,9 @@ pub struct PairedDifference {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutcomeChange {
-    /// The task.
+    /// The id of the task.
     pub task: String,
-    /// The seed.
+    /// The episode's seed.
     pub seed: u64,
     /// What the agent was told in the second run.
     pub instruction: String,
@@ -57,9 +57,9 @@ pub struct PairedComparison {
     pub unpaired: usize,
     /// Of those, episodes whose counterpart began in another state.
     pub start_mismatches: usize,
-    /// Success.
+    /// The share of successes.
     pub success: PairedDifference,
-    /// Completed subtasks.
+    /// Completed subtasks of an episode.
     pub completed_subtasks: PairedDifference,
     /// Completed subtasks as a share of those that were asked.
     pub progress: PairedDifference,

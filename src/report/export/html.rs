@@ -25,7 +25,7 @@ struct ReplayStep<'a> {
     frame: String,
 }
 
-/// The page.
+/// Makes the page that replays a recording.
 ///
 /// # Errors
 /// Never in practice: it is written to memory.

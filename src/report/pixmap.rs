@@ -13,7 +13,7 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use crate::house::view::Frame;
 
-/// Red, green, blue.
+/// A colour: red, green, blue.
 pub type Rgb = [u8; 3];
 
 /// A picture of three bytes a pixel, row by row. Whatever `embedded-graphics` has can be drawn on it; what lies outside is cut.
@@ -21,9 +21,9 @@ pub type Rgb = [u8; 3];
 pub struct Raster {
     /// Pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// Rows of pixels.
     pub height: usize,
-    /// Red, green, blue.
+    /// Red, green and blue of every pixel, row by row.
     pub rgb: Vec<u8>,
 }
 
@@ -38,7 +38,7 @@ impl Raster {
         Raster { width, height, rgb: colour.repeat(width * height) }
     }
 
-    /// Draws something.
+    /// Draws a shape or a text of `embedded-graphics`.
     pub fn draw(&mut self, drawable: &impl Drawable<Color = Rgb888>) {
         let Ok(_) = drawable.draw(self);
     }
@@ -67,7 +67,7 @@ impl Raster {
         }
     }
 
-    /// As a PNG file.
+    /// The picture encoded as a PNG file.
     ///
     /// # Errors
     /// Never in practice: it is written to memory.
