@@ -19,7 +19,7 @@ use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
 use crate::eval::tasks::sample;
 use crate::house::grading::Grading;
-use crate::report::summary::Summary;
+use crate::report::summary::RunSummary;
 use crate::report::threshold::Threshold;
 use crate::run_dir::default_path;
 use crate::run_dir::shard::Shard;
@@ -129,7 +129,7 @@ impl Eval {
         self.shard.map_or_else(|| run.clone(), |shard| run.join(shard.folder()))
     }
 
-    fn status(&self, summary: &Summary) -> anyhow::Result<ExitStatus> {
+    fn status(&self, summary: &RunSummary) -> anyhow::Result<ExitStatus> {
         if summary.partial {
             say("interrupted: the summary is partial; the same command with this folder as --out continues it");
             return Ok(ExitStatus::Interrupted);
@@ -146,7 +146,7 @@ impl Eval {
 }
 
 /// Prints what was measured to standard output: a page, or a JSON object in a line.
-pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
+pub fn print(summary: &RunSummary, json: bool) -> anyhow::Result<()> {
     let mut out = streams::out();
     if json {
         writeln!(out, "{}", serde_json::to_string(summary)?)?;

@@ -10,7 +10,7 @@ use super::streams::say;
 use crate::data::{atomic_file, json};
 use crate::report::charts::progress_by_length;
 use crate::report::html;
-use crate::report::summary::Summary;
+use crate::report::summary::RunSummary;
 use crate::run_dir::layout::{MANIFEST, SUMMARY};
 use crate::run_dir::reader::RecordedRun;
 
@@ -37,7 +37,7 @@ impl ReportArgs {
         if self.folder.join(MANIFEST).exists() {
             let run = RecordedRun::open_evaluated(&self.folder)?;
             let path = self.folder.join(SUMMARY);
-            let summary = json::read::<Summary>(&path, Summary::FORMAT)
+            let summary = json::read::<RunSummary>(&path, RunSummary::FORMAT)
                 .context("the same eval command writes the summary")?
                 .value;
             let page = out.join("report.html");

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use super::failure::Failure;
-use super::record::Step;
+use super::record::TraceStep;
 use super::rollout::{Observer, Rollout, Tick};
 use super::scenes::Setting;
 use crate::agent::{Decision, Policy};
@@ -38,14 +38,14 @@ struct Evidence {
 ///
 /// # Errors
 /// When the steps cannot be taken again.
-pub fn classify(task: &Task, grading: Grading, setting: &Setting, trace: &[Step]) -> anyhow::Result<Failure> {
+pub fn classify(task: &Task, grading: Grading, setting: &Setting, trace: &[TraceStep]) -> anyhow::Result<Failure> {
     let house = House::new(setting.scene.clone(), setting.world.clone());
     let mut rollout = Rollout::new(HouseEnvironment::of_task(task, house, grading), String::new(), None);
     let last_done = trace.iter().rposition(|step| step.subtask.is_some()).map_or(0, |step| step + 1);
     let (before, after) = trace.split_at(last_done);
-    rollout.replay(before.iter().map(Step::action), &mut ())?;
+    rollout.replay(before.iter().map(TraceStep::action), &mut ())?;
     let mut evidence = Evidence { later: later_graders(task, &rollout), ..Evidence::default() };
-    rollout.replay(after.iter().map(Step::action), &mut evidence)?;
+    rollout.replay(after.iter().map(TraceStep::action), &mut evidence)?;
     Ok(evidence.verdict())
 }
 
@@ -181,7 +181,7 @@ mod tests {
             };
             let tick = rollout.carry_out(Decision::of(action)).unwrap();
             assert!(tick.outcome.is_done() || target.is_empty(), "{words}: {}", tick.outcome);
-            trace.push(Step::of(&tick, &rollout));
+            trace.push(TraceStep::of(&tick, &rollout));
         }
         assert!(rollout.end().is_none(), "the task was done after all");
         classify(&task, Grading::Class, &Setting { scene, world }, &trace).unwrap()

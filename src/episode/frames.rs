@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::ensure;
 
-use super::record::{Episode, Step};
+use super::record::{Episode, TraceStep};
 use super::rollout::{AfterEach, Rollout, Tick};
 use super::scenes::Setting;
 use crate::domain::{Scene, Task, World};
@@ -114,7 +114,7 @@ impl FrameSequence {
             });
             Ok(ControlFlow::Continue(()))
         });
-        rollout.replay(episode.trace.iter().map(Step::action), &mut record)?;
+        rollout.replay(episode.trace.iter().map(TraceStep::action), &mut record)?;
         let result = match (episode.success, episode.of) {
             (true, _) => "success".to_string(),
             (false, 0) => "not graded".to_string(),
@@ -149,9 +149,9 @@ pub(crate) mod tests {
         let mut task = crate::data::taskset::tests::sample_set().tasks.remove(0);
         task.instruction = "put the mug in the sink".into();
         let kinds = [ActionType::RotateLeft, ActionType::LookUp, ActionType::RotateLeft];
-        let trace: Vec<Step> = kinds
+        let trace: Vec<TraceStep> = kinds
             .into_iter()
-            .map(|kind| Step {
+            .map(|kind| TraceStep {
                 kind,
                 target: None,
                 class: None,

@@ -48,12 +48,12 @@ pub struct Episode {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prefix_steps: u32,
     /// What was done, step by step.
-    pub trace: Vec<Step>,
+    pub trace: Vec<TraceStep>,
 }
 
 /// What tells the episodes of a run apart.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Key {
+pub struct EpisodeKey {
     /// The id of the task.
     pub task: String,
     /// One of the run's seeds.
@@ -64,7 +64,7 @@ pub struct Key {
     pub start_subtask: u32,
 }
 
-impl std::fmt::Display for Key {
+impl std::fmt::Display for EpisodeKey {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "task {:?} and seed {}", self.task, self.seed)?;
         if !self.variant.is_original() {
@@ -79,8 +79,13 @@ impl std::fmt::Display for Key {
 
 impl Episode {
     /// What tells it apart from others of its run.
-    pub fn key(&self) -> Key {
-        Key { task: self.task.clone(), seed: self.seed, variant: self.variant, start_subtask: self.start_subtask }
+    pub fn key(&self) -> EpisodeKey {
+        EpisodeKey {
+            task: self.task.clone(),
+            seed: self.seed,
+            variant: self.variant,
+            start_subtask: self.start_subtask,
+        }
     }
 
     /// Whether it was played as the task asks: from its start, with its own instruction.
@@ -116,7 +121,7 @@ fn once() -> u32 {
 /// One action of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Step {
+pub struct TraceStep {
     /// The action that was taken.
     #[serde(rename = "action")]
     pub kind: ActionType,
@@ -170,17 +175,17 @@ impl Author {
     }
 }
 
-impl Step {
+impl TraceStep {
     /// What was done, as an action that can be taken again.
     pub fn action(&self) -> Action {
         Action { kind: self.kind, target: self.target }
     }
 
     /// The record of a step that `rollout` just took.
-    pub fn of<E: Environment>(tick: &Tick, rollout: &Rollout<E>) -> Step {
+    pub fn of<E: Environment>(tick: &Tick, rollout: &Rollout<E>) -> TraceStep {
         let action = tick.decision.action;
         let completed = rollout.env.grading().map_or(0, |(completed, _)| completed as u32);
-        Step {
+        TraceStep {
             kind: action.kind,
             target: action.target,
             class: action.target.and_then(|target| rollout.env.class_of(target)),

@@ -11,20 +11,20 @@ use crate::agent::policy_source::MakePolicy;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
 use crate::episode::instruction_variant;
-use crate::episode::record::{Episode, Key};
+use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::Scenes;
 use crate::house::grading::Grading;
-use crate::report::summary::Summary;
+use crate::report::summary::RunSummary;
 use crate::report::summary_files;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
-use crate::run_dir::manifest::Manifest;
+use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::writer::RunWriter;
 
 /// An evaluation that can start: its tasks fit their scenes. Copies share tasks and scenes.
 #[derive(Clone)]
 pub struct Evaluation {
     plan: EvaluationPlan,
-    manifest: Manifest,
+    manifest: RunManifest,
 }
 
 /// How far an evaluation is.
@@ -64,8 +64,8 @@ impl Evaluation {
         tasks.truncate(options.limit.unwrap_or(usize::MAX));
         check(&tasks, options)?;
         let scenes_hash = scenes.check(&tasks)?;
-        let manifest = Manifest {
-            format_version: Manifest::FORMAT,
+        let manifest = RunManifest {
+            format_version: RunManifest::FORMAT,
             sprint_version: env!("CARGO_PKG_VERSION").into(),
             task_set: set.value.name.clone(),
             task_set_hash: set.digest.clone(),
@@ -87,7 +87,7 @@ impl Evaluation {
     }
 
     /// What identifies this run.
-    pub fn manifest(&self) -> &Manifest {
+    pub fn manifest(&self) -> &RunManifest {
         &self.manifest
     }
 
@@ -109,7 +109,7 @@ impl Evaluation {
     }
 
     /// What tells an episode apart from the others.
-    pub fn key(&self, spec: &EpisodeSpec) -> Key {
+    pub fn key(&self, spec: &EpisodeSpec) -> EpisodeKey {
         spec.key(&self.plan.tasks)
     }
 
@@ -166,9 +166,9 @@ pub fn evaluate(
     folder: &mut RunWriter,
     stop: &Arc<AtomicBool>,
     progress: &mut dyn FnMut(Progress),
-) -> anyhow::Result<Summary> {
+) -> anyhow::Result<RunSummary> {
     let all = evaluation.all();
-    let mut episodes: BTreeMap<Key, Episode> =
+    let mut episodes: BTreeMap<EpisodeKey, Episode> =
         std::mem::take(&mut folder.earlier).into_iter().map(|episode| (episode.key(), episode)).collect();
     let mut wanted = Vec::new();
     for spec in &all {
@@ -182,7 +182,7 @@ pub fn evaluate(
         }
     }
     let mut state = Progress { of: all.len(), ..Progress::default() };
-    let again: Vec<Key> = wanted.iter().map(|spec| evaluation.key(spec)).collect();
+    let again: Vec<EpisodeKey> = wanted.iter().map(|spec| evaluation.key(spec)).collect();
     for key in &again {
         episodes.remove(key);
     }
@@ -205,14 +205,14 @@ pub fn evaluate(
 /// # Errors
 /// When the folder cannot be read or written to.
 pub fn finish(
-    manifest: &Manifest,
+    manifest: &RunManifest,
     tasks: &[Task],
     all: &[EpisodeSpec],
     folder: &mut RunWriter,
-) -> anyhow::Result<Summary> {
-    let order: Vec<Key> = all.iter().map(|spec| spec.key(tasks)).collect();
+) -> anyhow::Result<RunSummary> {
+    let order: Vec<EpisodeKey> = all.iter().map(|spec| spec.key(tasks)).collect();
     let (episodes, hash) = folder.result(&order)?;
-    let mut summary = Summary::of(manifest, tasks, &episodes, episodes.len() < all.len());
+    let mut summary = RunSummary::of(manifest, tasks, &episodes, episodes.len() < all.len());
     summary.episodes_hash = hash;
     summary_files::write(&summary, folder.path())?;
     Ok(summary)
@@ -324,7 +324,7 @@ pub(crate) mod tests {
     }
 
     pub(crate) struct Ran {
-        pub(crate) summary: Summary,
+        pub(crate) summary: RunSummary,
         pub(crate) lines: String,
     }
 

@@ -7,11 +7,11 @@ use anyhow::{Context, bail, ensure};
 
 use super::evaluation::finish;
 use super::tasks::sample;
-use crate::episode::record::Key;
-use crate::report::summary::Summary;
+use crate::episode::record::EpisodeKey;
+use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::episode_specs;
 use crate::run_dir::layout::TASKS;
-use crate::run_dir::manifest::Manifest;
+use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::reader::RecordedRun;
 use crate::run_dir::shard::Shard;
 use crate::run_dir::writer::RunWriter;
@@ -34,7 +34,7 @@ pub fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// When a share is missing, there twice, not of the same run, or not complete; or when the folder holds another run.
-pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
+pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummary> {
     let mut runs = BTreeMap::new();
     for path in shares {
         let run = RecordedRun::open_evaluated(path)?;
@@ -44,10 +44,10 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
         }
     }
     let (_, first) = runs.first_key_value().context("there are no shares to merge")?;
-    let manifest = Manifest { shard: None, ..first.manifest.clone() };
+    let manifest = RunManifest { shard: None, ..first.manifest.clone() };
     let of = first.manifest.shard.map_or(1, |shard| shard.of);
     for run in runs.values() {
-        let whole = Manifest { shard: None, ..run.manifest.clone() };
+        let whole = RunManifest { shard: None, ..run.manifest.clone() };
         let differences = manifest.differences(&whole);
         if !differences.is_empty() {
             bail!(
@@ -82,10 +82,10 @@ pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<Summary> {
     ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
     let mut folder = RunWriter::open(into, &manifest)?;
     folder.write_tasks(&sample::as_seen_from(&set, &set.tasks, &file, into)?)?;
-    let there: std::collections::BTreeSet<Key> =
+    let there: std::collections::BTreeSet<EpisodeKey> =
         folder.earlier.iter().map(crate::episode::record::Episode::key).collect();
     for run in runs.values() {
-        let mut by_key: BTreeMap<Key, _> = run.episodes.iter().map(|episode| (episode.key(), episode)).collect();
+        let mut by_key: BTreeMap<EpisodeKey, _> = run.episodes.iter().map(|episode| (episode.key(), episode)).collect();
         for spec in run.episode_specs() {
             let key = spec.key(&set.tasks);
             let episode =

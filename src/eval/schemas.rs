@@ -7,8 +7,8 @@ use super::progress_event::ProgressEvent;
 use crate::domain::TaskSet;
 use crate::episode::record::Episode;
 use crate::report::compare::Comparison;
-use crate::report::summary::Summary;
-use crate::run_dir::manifest::Manifest;
+use crate::report::summary::RunSummary;
+use crate::run_dir::manifest::RunManifest;
 
 /// The files and lines that have a schema, as `sprint schema` names them.
 pub const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
@@ -17,9 +17,9 @@ pub const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "compar
 pub fn schema(name: &str) -> Option<Schema> {
     Some(match name {
         "tasks" => schemars::schema_for!(TaskSet),
-        "manifest" => written::<Manifest>(),
+        "manifest" => written::<RunManifest>(),
         "episode" => written::<Episode>(),
-        "summary" => written::<Summary>(),
+        "summary" => written::<RunSummary>(),
         "comparison" => written::<Comparison>(),
         "progress" => written::<ProgressEvent>(),
         _ => return None,
@@ -37,7 +37,7 @@ mod tests {
     use crate::data::schema;
     use crate::data::taskset::tests::sample_set;
     use crate::domain::{ActionType, Class, Instance};
-    use crate::episode::record::{Author, Step};
+    use crate::episode::record::{Author, TraceStep};
     use crate::eval::evaluation::Progress;
     use crate::house::{Outcome, Reason};
     use crate::report::compare::paired::tests::run;
@@ -52,8 +52,8 @@ mod tests {
     #[test]
     fn what_the_program_writes_satisfies_its_schema() {
         let (tasks, episodes) = sample();
-        let all = Manifest { instruction_variants: true, all_start_subtasks: true, ..manifest() };
-        let step = Step {
+        let all = RunManifest { instruction_variants: true, all_start_subtasks: true, ..manifest() };
+        let step = TraceStep {
             kind: ActionType::Pickup,
             target: Some(Instance::Object(3)),
             class: Class::named("Mug"),
@@ -68,7 +68,7 @@ mod tests {
         assert_eq!(faults("tasks", &sample_set()), []);
         assert_eq!(faults("manifest", &all), []);
         assert_eq!(faults("episode", &explored), []);
-        assert_eq!(faults("summary", &Summary::of(&all, &tasks, &episodes, false)), []);
+        assert_eq!(faults("summary", &RunSummary::of(&all, &tasks, &episodes, false)), []);
         assert_eq!(faults("comparison", &comparison), []);
         assert_eq!(faults("progress", &ProgressEvent::Progress { progress, seconds: 0.5 }), []);
     }

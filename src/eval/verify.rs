@@ -16,16 +16,16 @@ use crate::agent::{Decision, Policy, PolicyState};
 use crate::data::json;
 use crate::domain::Task;
 use crate::episode::branches::{FRAMES, Moment, look_back};
-use crate::episode::record::{Author, Episode, Key, Step};
+use crate::episode::record::{Author, Episode, EpisodeKey, TraceStep};
 use crate::episode::rollout::Rollout;
 use crate::episode::scenes::Setting;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
-use crate::report::summary::Summary;
+use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
 use crate::run_dir::layout::SUMMARY;
-use crate::run_dir::manifest::Manifest;
+use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::reader::RecordedRun;
 
 /// What came of verifying.
@@ -74,7 +74,7 @@ pub struct Difference {
 /// How many episodes the summary of a run tells of, where there is one.
 fn summarised(run: &Path) -> anyhow::Result<Option<usize>> {
     let path = run.join(SUMMARY);
-    let summary = path.exists().then(|| json::read::<Summary>(&path, Summary::FORMAT)).transpose()?;
+    let summary = path.exists().then(|| json::read::<RunSummary>(&path, RunSummary::FORMAT)).transpose()?;
     Ok(summary.map(|summary| summary.value.episodes))
 }
 
@@ -123,9 +123,9 @@ fn evaluated_again(
     find: &mut FindPolicy<'_>,
     jobs: usize,
     progress: &mut dyn FnMut(usize),
-) -> anyhow::Result<BTreeMap<Key, Episode>> {
+) -> anyhow::Result<BTreeMap<EpisodeKey, Episode>> {
     let specs = episode_specs(&run.manifest, &run.set.tasks);
-    let recorded: BTreeSet<Key> =
+    let recorded: BTreeSet<EpisodeKey> =
         run.episodes.iter().filter(|episode| !is_explored(episode)).map(Episode::key).collect();
     let wanted: Vec<EpisodeSpec> =
         specs.into_iter().filter(|spec| recorded.contains(&spec.key(&run.set.tasks))).collect();
@@ -133,7 +133,7 @@ fn evaluated_again(
     if wanted.is_empty() {
         return Ok(again);
     }
-    let Manifest { policy, checkpoint_hash, sampling, .. } = run.manifest.clone();
+    let RunManifest { policy, checkpoint_hash, sampling, .. } = run.manifest.clone();
     let author = Author { policy, checkpoint: checkpoint_hash, seed: 0, sampling };
     let Some(source) = find(&author)? else { return Ok(again) };
     let plan = EvaluationPlan {
@@ -205,13 +205,13 @@ fn result_of(episode: &Episode) -> String {
 }
 
 /// The difference between a recorded step and the same taken again, where there is one.
-fn differs(number: u32, recorded: &Step, found: &Step) -> Option<Found> {
+fn differs(number: u32, recorded: &TraceStep, found: &TraceStep) -> Option<Found> {
     let field = match () {
         () if found.outcome != recorded.outcome => "outcome",
         () if found.subtask != recorded.subtask || found.class != recorded.class => "subtask",
         () => return None,
     };
-    let text = |step: &Step| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
+    let text = |step: &TraceStep| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
     Some((number, field, text(recorded), text(found)))
 }
 
@@ -245,7 +245,7 @@ struct Again<'a> {
     episode: &'a Episode,
 }
 
-/// Step, field, recorded, found.
+/// The step, the field, what was recorded, what was found.
 type Found = (u32, &'static str, String, String);
 
 impl Again<'_> {
@@ -328,9 +328,9 @@ impl Again<'_> {
     }
 
     /// Takes a recorded step; what it comes to now, where that is something else.
-    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &Step) -> anyhow::Result<Option<Found>> {
+    fn act(&mut self, rollout: &mut Rollout, number: u32, recorded: &TraceStep) -> anyhow::Result<Option<Found>> {
         let tick = rollout.carry_out(Decision::of(recorded.action()))?;
-        let difference = differs(number, recorded, &Step::of(&tick, rollout));
+        let difference = differs(number, recorded, &TraceStep::of(&tick, rollout));
         self.verdict.steps += usize::from(difference.is_none());
         Ok(difference)
     }
@@ -379,7 +379,7 @@ mod tests {
             let tick = rollout.carry_out(decision.clone()).unwrap();
             let taken = Taken {
                 decision,
-                step: Step::of(&tick, &rollout),
+                step: TraceStep::of(&tick, &rollout),
                 instruction: rollout.instruction.as_str().into(),
                 author: if by_hand { Author::hand() } else { random.clone() },
                 values: None,

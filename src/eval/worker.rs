@@ -10,7 +10,7 @@ use super::executor::{Executor, Message};
 use super::in_flight::{InFlight, Watchdog, guarded};
 use crate::agent::{Decision, ExpertPolicy, Policy};
 use crate::env::{Environment, HouseEnvironment};
-use crate::episode::record::{Episode, Step};
+use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::{AfterEach, Rollout, decide_all};
 use crate::house::House;
 use crate::run_dir::episode_spec::{EpisodeSpec, policy_seed};
@@ -178,7 +178,7 @@ impl Worker {
         let Some(rollout) = self.rollouts[slot].as_mut() else { return Ok(()) };
         let taken = guarded(|| {
             let tick = rollout.carry_out(decision?)?;
-            Ok(Step::of(&tick, rollout))
+            Ok(TraceStep::of(&tick, rollout))
         });
         let (limit, goes_on) = (self.executor.evaluation.options.timeout, rollout.end().is_none());
         self.record(|slots| {
@@ -220,7 +220,7 @@ fn lead(rollout: &mut AnyRollout, from: u32, episode: &mut Episode) -> anyhow::R
     expert.reset(0, 0);
     let reached = |rollout: &AnyRollout| rollout.env.grading().is_none_or(|(completed, _)| completed >= from as usize);
     let mut record = AfterEach(|rollout: &mut AnyRollout, tick: &_| {
-        episode.trace.push(Step::of(tick, rollout));
+        episode.trace.push(TraceStep::of(tick, rollout));
         episode.prefix_steps += 1;
         Ok(if reached(rollout) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     });

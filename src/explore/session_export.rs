@@ -16,10 +16,10 @@ use crate::episode::rollout::{End, Rollout};
 use crate::episode::scenes::Scenes;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
-use crate::report::summary::Summary;
+use crate::report::summary::RunSummary;
 use crate::report::summary_files;
 use crate::run_dir::layout::{MANIFEST, TASKS};
-use crate::run_dir::manifest::Manifest;
+use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::writer::RunWriter;
 
 /// The tasks and episodes of an exploration, a branch each.
@@ -55,8 +55,8 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     bytes.push(b'\n');
     let mut scenes_digest = Sha256::new();
     scenes_digest.update(serde_json::to_vec(&*explored.scene)?);
-    let manifest = Manifest {
-        format_version: Manifest::FORMAT,
+    let manifest = RunManifest {
+        format_version: RunManifest::FORMAT,
         sprint_version: env!("CARGO_PKG_VERSION").into(),
         task_set: set.name.clone(),
         task_set_hash: json::hex(&Sha256::digest(&bytes)),
@@ -80,7 +80,7 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     for episode in &explored.episodes {
         folder.append(episode)?;
     }
-    summary_files::write(&Summary::of(&manifest, &set.tasks, &explored.episodes, false), folder.path())
+    summary_files::write(&RunSummary::of(&manifest, &set.tasks, &explored.episodes, false), folder.path())
 }
 
 /// A task without subtasks: nobody grades what a person made up.

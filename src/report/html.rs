@@ -12,9 +12,9 @@ use serde_json::json;
 
 use super::charts::drawing::escape;
 use super::charts::progress_by_length;
-use super::summary::Summary;
+use super::summary::RunSummary;
 use crate::domain::Task;
-use crate::episode::record::{Episode, Step};
+use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::{AfterEach, Rollout, Tick};
 use crate::house::House;
 use crate::house::grading::describe;
@@ -29,7 +29,7 @@ const TEMPLATE: &str = include_str!("../../assets/report.html");
 ///
 /// # Errors
 /// When a scene is missing, or a frame cannot be encoded.
-pub fn run_page(run: &RecordedRun, summary: &Summary, frames: usize) -> anyhow::Result<String> {
+pub fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -> anyhow::Result<String> {
     let row = |(number, episode): (usize, &Episode)| -> anyhow::Result<serde_json::Value> {
         let task = run.set.tasks.iter().find(|task| task.id == episode.task).context("an episode of no task")?;
         let outcome = match (&episode.error, episode.failure) {
@@ -99,7 +99,7 @@ fn frames_of(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> 
         show(rollout, tick.step as usize)?;
         Ok(ControlFlow::Continue(()))
     });
-    rollout.replay(episode.trace.iter().map(Step::action), &mut after_each)?;
+    rollout.replay(episode.trace.iter().map(TraceStep::action), &mut after_each)?;
     Ok(shown)
 }
 

@@ -7,7 +7,7 @@ pub mod export;
 pub mod groups;
 pub mod html;
 pub mod markdown_table;
-pub mod raster;
+pub mod pixmap;
 pub mod stats;
 pub mod summary;
 pub mod summary_files;

@@ -14,11 +14,11 @@ use image::{ExtendedColorType, ImageEncoder};
 use crate::house::view::Frame;
 
 /// A colour: red, green, blue.
-pub type Rgb = [u8; 3];
+pub type RgbColour = [u8; 3];
 
 /// A picture of three bytes a pixel, row by row. Whatever `embedded-graphics` has can be drawn on it; what lies outside is cut.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Raster {
+pub struct Pixmap {
     /// Pixels in a row.
     pub width: usize,
     /// Rows of pixels.
@@ -28,14 +28,14 @@ pub struct Raster {
 }
 
 /// A colour as `embedded-graphics` names it.
-pub fn rgb888([red, green, blue]: Rgb) -> Rgb888 {
+pub fn rgb888([red, green, blue]: RgbColour) -> Rgb888 {
     Rgb888::new(red, green, blue)
 }
 
-impl Raster {
+impl Pixmap {
     /// A picture of one colour.
-    pub fn new(width: usize, height: usize, colour: Rgb) -> Raster {
-        Raster { width, height, rgb: colour.repeat(width * height) }
+    pub fn new(width: usize, height: usize, colour: RgbColour) -> Pixmap {
+        Pixmap { width, height, rgb: colour.repeat(width * height) }
     }
 
     /// Draws a shape or a text of `embedded-graphics`.
@@ -44,7 +44,7 @@ impl Raster {
     }
 
     /// Writes a line of text with its upper left corner at (x, y).
-    pub fn text(&mut self, x: usize, y: usize, text: &str, font: &MonoFont<'_>, colour: Rgb) {
+    pub fn text(&mut self, x: usize, y: usize, text: &str, font: &MonoFont<'_>, colour: RgbColour) {
         let style = TextStyleBuilder::new().alignment(Alignment::Left).baseline(Baseline::Top).build();
         let at = Point::new(x as i32, y as i32);
         self.draw(&Text::with_text_style(text, at, MonoTextStyle::new(font, rgb888(colour)), style));
@@ -60,7 +60,7 @@ impl Raster {
         }
     }
 
-    fn set(&mut self, x: usize, y: usize, colour: Rgb) {
+    fn set(&mut self, x: usize, y: usize, colour: RgbColour) {
         if x < self.width && y < self.height {
             let at = 3 * (y * self.width + x);
             self.rgb[at..at + 3].copy_from_slice(&colour);
@@ -81,13 +81,13 @@ impl Raster {
     }
 }
 
-impl OriginDimensions for Raster {
+impl OriginDimensions for Pixmap {
     fn size(&self) -> Size {
         Size::new(self.width as u32, self.height as u32)
     }
 }
 
-impl DrawTarget for Raster {
+impl DrawTarget for Pixmap {
     type Color = Rgb888;
     type Error = Infallible;
 

@@ -14,7 +14,7 @@ use crate::episode::failure::Failure;
 use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
 use crate::house::grading::Grading;
-use crate::run_dir::manifest::Manifest;
+use crate::run_dir::manifest::RunManifest;
 
 /// How the intervals were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -30,9 +30,9 @@ pub struct IntervalMethods {
 /// from later subtasks have tables of their own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Summary {
+pub struct RunSummary {
     /// Version of the format of `summary.json`.
-    #[schemars(extend("const" = Summary::FORMAT))]
+    #[schemars(extend("const" = RunSummary::FORMAT))]
     pub format_version: u32,
     /// The name that the task file gives itself.
     pub task_set: String,
@@ -93,12 +93,12 @@ pub struct Summary {
     pub interval_methods: IntervalMethods,
 }
 
-impl Summary {
+impl RunSummary {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 2;
 
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
-    pub fn of(manifest: &Manifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> Summary {
+    pub fn of(manifest: &RunManifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> RunSummary {
         let every = EpisodesByTask::new(tasks, episodes);
         let plain = every.filter(|episode| episode.is_plain());
         let all = plain.iter();
@@ -109,8 +109,8 @@ impl Summary {
         };
         let count = |length| all.iter().filter(|(_, episode)| episode.of == length).count();
         let interval = |length: u32| Mean::of(&plain.filter(|e| e.of == length).values(Episode::progress)).interval;
-        Summary {
-            format_version: Summary::FORMAT,
+        RunSummary {
+            format_version: RunSummary::FORMAT,
             task_set: manifest.task_set.clone(),
             policy: manifest.policy.clone(),
             grader: manifest.grader,
@@ -185,7 +185,7 @@ pub(crate) mod tests {
     #[test]
     fn a_summary_counts_by_hand() {
         let (tasks, episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
+        let summary = RunSummary::of(&manifest(), &tasks, &episodes, false);
         assert_eq!((summary.tasks, summary.episodes, summary.errors), (2, 4, 1));
         assert_eq!(summary.errored_episodes.len(), 1);
         assert_eq!(summary.steps_over_expert.unwrap().mean, 1.5);
@@ -205,14 +205,14 @@ pub(crate) mod tests {
     #[test]
     fn the_order_of_the_episodes_does_not_matter() {
         let (tasks, mut episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
+        let summary = RunSummary::of(&manifest(), &tasks, &episodes, false);
         episodes.reverse();
-        assert_eq!(Summary::of(&manifest(), &tasks, &episodes, false), summary);
+        assert_eq!(RunSummary::of(&manifest(), &tasks, &episodes, false), summary);
     }
 
     #[test]
     fn a_run_without_episodes_still_has_a_summary() {
-        let summary = Summary::of(&manifest(), &sample().0, &[], true);
+        let summary = RunSummary::of(&manifest(), &sample().0, &[], true);
         assert_eq!((summary.episodes, summary.success, summary.success_interval), (0, 0.0, [0.0, 1.0]));
         assert_eq!(summary.steps_over_expert, None);
     }
@@ -220,7 +220,7 @@ pub(crate) mod tests {
     #[test]
     fn the_names_that_scripts_read_are_there() {
         let (tasks, episodes) = sample();
-        let summary = serde_json::to_value(Summary::of(&manifest(), &tasks, &episodes, false)).unwrap();
+        let summary = serde_json::to_value(RunSummary::of(&manifest(), &tasks, &episodes, false)).unwrap();
         for name in ["/episodes", "/errors", "/success", "/success_interval/1", "/completed_subtasks/mean"] {
             assert!(summary.pointer(name).is_some_and(serde_json::Value::is_number), "{name}");
         }

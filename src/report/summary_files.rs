@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::charts::progress_by_length;
-use super::summary::Summary;
+use super::summary::RunSummary;
 use crate::data::{atomic_file, json};
 use crate::run_dir::layout::SUMMARY;
 
@@ -11,7 +11,7 @@ use crate::run_dir::layout::SUMMARY;
 ///
 /// # Errors
 /// When the folder cannot be written to.
-pub fn write(summary: &Summary, folder: &Path) -> anyhow::Result<()> {
+pub fn write(summary: &RunSummary, folder: &Path) -> anyhow::Result<()> {
     atomic_file::write(&folder.join("summary.md"), summary.markdown().as_bytes())?;
     atomic_file::write(&folder.join("summary.csv"), &summary.csv()?)?;
     progress_by_length::draw(&[summary]).write(folder, progress_by_length::FILE_STEM)?;

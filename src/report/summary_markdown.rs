@@ -6,10 +6,10 @@ use super::estimates::SkillRate;
 use super::groups::GroupFigures;
 use super::markdown_table::{aligned_table, between, percent, table};
 use super::stats::Interval;
-use super::summary::Summary;
+use super::summary::RunSummary;
 use crate::domain::SkillKind;
 
-impl Summary {
+impl RunSummary {
     /// The page that people read.
     pub fn markdown(&self) -> String {
         let partial =
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn the_page_and_the_table_look_as_agreed() {
         let (tasks, episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, true);
+        let summary = RunSummary::of(&manifest(), &tasks, &episodes, true);
         insta::assert_snapshot!("page", summary.markdown());
         insta::assert_snapshot!("table", String::from_utf8(summary.csv().unwrap()).unwrap());
     }

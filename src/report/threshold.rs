@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::summary::Summary;
+use super::summary::RunSummary;
 
 /// A figure that a run must reach, as `METRIC=X`.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ impl Threshold {
     ///
     /// # Errors
     /// When no episode has that many subtasks.
-    pub fn missed_by(&self, summary: &Summary) -> anyhow::Result<Option<f64>> {
+    pub fn missed_by(&self, summary: &RunSummary) -> anyhow::Result<Option<f64>> {
         let of_length =
             |map: &BTreeMap<u32, f64>, length: &str| length.parse().ok().and_then(|n: u32| map.get(&n).copied());
         let measured = match self.metric.split_once('.') {
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn a_threshold_is_missed_only_below_it() {
         let (tasks, episodes) = sample();
-        let summary = Summary::of(&manifest(), &tasks, &episodes, false);
+        let summary = RunSummary::of(&manifest(), &tasks, &episodes, false);
         let missed = |text: &str| text.parse::<Threshold>().unwrap().missed_by(&summary);
         assert_eq!(missed("success=0.5").unwrap(), None);
         assert_eq!(missed("success=0.51").unwrap(), Some(0.5));

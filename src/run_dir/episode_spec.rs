@@ -1,9 +1,9 @@
 //! The episodes of a run, in its order.
 
-use super::manifest::Manifest;
+use super::manifest::RunManifest;
 use crate::domain::Task;
 use crate::episode::instruction_variant::InstructionVariant;
-use crate::episode::record::Key;
+use crate::episode::record::EpisodeKey;
 use crate::episode::seed;
 
 /// An episode that is to be played.
@@ -31,8 +31,8 @@ impl EpisodeSpec {
     }
 
     /// What tells it apart from the other episodes of the run.
-    pub fn key(&self, tasks: &[Task]) -> Key {
-        Key {
+    pub fn key(&self, tasks: &[Task]) -> EpisodeKey {
+        EpisodeKey {
             task: tasks[self.task].id.clone(),
             seed: self.seed,
             variant: self.variant,
@@ -47,7 +47,7 @@ pub fn policy_seed(task: usize, seed: u64) -> u64 {
 }
 
 /// Every episode of a run in its order: by task, then seed, then instruction variant, then start subtask.
-pub fn episode_specs(manifest: &Manifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
+pub fn episode_specs(manifest: &RunManifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
     let variants: &[InstructionVariant] =
         if manifest.instruction_variants { &InstructionVariant::ALL } else { &InstructionVariant::ALL[..1] };
     let mut all = Vec::new();

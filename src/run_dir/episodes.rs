@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
-use crate::episode::record::{Episode, Key};
+use crate::episode::record::{Episode, EpisodeKey};
 
 /// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out; where an episode was
 /// begun anew after an error, its last record counts.
@@ -18,7 +18,7 @@ pub fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
     let name = path.display();
     let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
     let mut reader = BufReader::new(file);
-    let (mut episodes, mut places) = (Vec::<Episode>::new(), BTreeMap::<Key, (usize, usize)>::new());
+    let (mut episodes, mut places) = (Vec::<Episode>::new(), BTreeMap::<EpisodeKey, (usize, usize)>::new());
     let (mut line, mut whole) = (Vec::new(), 0);
     for number in 1.. {
         line.clear();
@@ -48,7 +48,7 @@ pub fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
 pub(crate) mod tests {
     use super::*;
     use crate::data::json;
-    use crate::run_dir::manifest::Manifest;
+    use crate::run_dir::manifest::RunManifest;
     use crate::run_dir::manifest::tests::manifest;
 
     pub(crate) fn episode(task: &str) -> Episode {
@@ -105,7 +105,7 @@ pub(crate) mod tests {
                 proptest::prop_assert!(episodes.len() <= 11);
             }
             let text = serde_json::to_string_pretty(&manifest()).unwrap();
-            let _ = json::parse::<Manifest>(&damaged(text), Manifest::FORMAT);
+            let _ = json::parse::<RunManifest>(&damaged(text), RunManifest::FORMAT);
         }
     }
 }

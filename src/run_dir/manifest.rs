@@ -11,9 +11,9 @@ use crate::house::grading::Grading;
 /// What a run was made from; two runs with equal manifests measure the same thing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Manifest {
+pub struct RunManifest {
     /// Version of the format of the whole folder.
-    #[schemars(extend("const" = Manifest::FORMAT))]
+    #[schemars(extend("const" = RunManifest::FORMAT))]
     pub format_version: u32,
     /// The version of the program.
     pub sprint_version: String,
@@ -49,7 +49,7 @@ pub struct Manifest {
     pub shard: Option<Shard>,
 }
 
-impl Manifest {
+impl RunManifest {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 2;
     /// The most episodes, other words and starts apart, that a run may have: its episodes are listed in memory.
@@ -59,8 +59,8 @@ impl Manifest {
     ///
     /// # Errors
     /// When it cannot be read, or an older or newer program wrote it; names the file and the field.
-    pub fn read(path: &Path) -> anyhow::Result<Manifest> {
-        Ok(json::read(path, Manifest::FORMAT)?.value)
+    pub fn read(path: &Path) -> anyhow::Result<RunManifest> {
+        Ok(json::read(path, RunManifest::FORMAT)?.value)
     }
 
     /// Checks that a run of this size fits into memory.
@@ -70,17 +70,17 @@ impl Manifest {
     pub fn check(&self) -> anyhow::Result<()> {
         let episodes = self.seeds.saturating_mul(self.tasks as u64);
         anyhow::ensure!(
-            episodes <= Manifest::MOST,
+            episodes <= RunManifest::MOST,
             "seeds: {} with {} tasks are {episodes} episodes, but a run has at most {}",
             self.seeds,
             self.tasks,
-            Manifest::MOST
+            RunManifest::MOST
         );
         Ok(())
     }
 
     /// The fields in which `other` differs, each as `field: this, not that`.
-    pub fn differences(&self, other: &Manifest) -> Vec<String> {
+    pub fn differences(&self, other: &RunManifest) -> Vec<String> {
         let fields = |manifest| match serde_json::to_value(manifest) {
             Ok(serde_json::Value::Object(fields)) => fields,
             _ => serde_json::Map::new(),
@@ -98,9 +98,9 @@ impl Manifest {
 pub(crate) mod tests {
     use super::*;
 
-    pub(crate) fn manifest() -> Manifest {
-        Manifest {
-            format_version: Manifest::FORMAT,
+    pub(crate) fn manifest() -> RunManifest {
+        RunManifest {
+            format_version: RunManifest::FORMAT,
             sprint_version: "0".into(),
             task_set: "set".into(),
             task_set_hash: "aa".into(),
@@ -123,7 +123,7 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("manifest.json");
         std::fs::write(&path, r#"{"format_version":1,"sprint":"0.1.0","language":false}"#).unwrap();
-        let error = format!("{:#}", Manifest::read(&path).unwrap_err());
+        let error = format!("{:#}", RunManifest::read(&path).unwrap_err());
         let told = "format_version: 1, but this program reads 2; use the version of sprint that wrote it";
         assert_eq!(error, format!("{}: {told}", path.display()));
     }

@@ -8,11 +8,11 @@ use anyhow::{Context, ensure};
 use super::episode_spec::{EpisodeSpec, episode_specs, policy_seed};
 use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
-use super::manifest::Manifest;
+use super::manifest::RunManifest;
 use crate::data::json::Document;
 use crate::data::{json, taskset};
 use crate::domain::{Task, TaskSet};
-use crate::episode::record::{Author, Episode, Key};
+use crate::episode::record::{Author, Episode, EpisodeKey};
 use crate::episode::scenes::{Scenes, Setting};
 
 /// A run as it lies on the disk.
@@ -22,7 +22,7 @@ pub struct RecordedRun {
     /// The folders that its episodes lie in, with the number of them in each, in the order of the episodes.
     pub sources: Vec<(PathBuf, usize)>,
     /// What it was made from.
-    pub manifest: Manifest,
+    pub manifest: RunManifest,
     /// The tasks that it plays.
     pub set: TaskSet,
     /// The scenes that its tasks play in.
@@ -42,7 +42,7 @@ impl RecordedRun {
         ensure!(path.is_dir(), "{name} is not a folder");
         let manifest_path = path.join(MANIFEST);
         ensure!(manifest_path.exists(), "{name} holds no run: there is no {MANIFEST}");
-        let manifest = Manifest::read(&manifest_path)?;
+        let manifest = RunManifest::read(&manifest_path)?;
         manifest.check().with_context(|| manifest_path.display().to_string())?;
         let (set, scenes) = tasks_of(path, &manifest, tasks)?;
         let (episodes, _) = read_episodes(&path.join(EPISODES))?;
@@ -74,8 +74,8 @@ impl RecordedRun {
         let mut all = runs.next().context("name the runs to join")?;
         let (seeds, own) = (all.manifest.seeds, all.manifest.clone());
         for run in runs {
-            let Manifest { policy, checkpoint_hash, .. } = own.clone();
-            let differences = own.differences(&Manifest { policy, checkpoint_hash, ..run.manifest.clone() });
+            let RunManifest { policy, checkpoint_hash, .. } = own.clone();
+            let differences = own.differences(&RunManifest { policy, checkpoint_hash, ..run.manifest.clone() });
             let names = format!("{} and {}", all.path.display(), run.path.display());
             ensure!(differences.is_empty(), "{names} cannot be taken for one: {}", differences.join("; "));
             ensure!(own.shard.is_none(), "{names} are shares of runs; `sprint merge` makes whole ones of them");
@@ -130,7 +130,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// When the run has no such episode.
-    pub fn reference(&self, key: &Key) -> anyhow::Result<String> {
+    pub fn reference(&self, key: &EpisodeKey) -> anyhow::Result<String> {
         let place = |episodes: &[Episode]| episodes.iter().position(|episode| episode.key() == *key);
         let found = self.by_folder().find_map(|(folder, episodes)| Some((folder, place(episodes)?)));
         let (folder, place) = found.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
@@ -149,7 +149,7 @@ impl RecordedRun {
 }
 
 /// The tasks of a run: those in its folder, which are what it played of the file that it was made from, or of that file.
-fn tasks_of(run: &Path, manifest: &Manifest, file: Option<&Path>) -> anyhow::Result<(TaskSet, Scenes)> {
+fn tasks_of(run: &Path, manifest: &RunManifest, file: Option<&Path>) -> anyhow::Result<(TaskSet, Scenes)> {
     let own = run.join(TASKS);
     ensure!(
         file.is_some() || own.exists(),

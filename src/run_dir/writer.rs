@@ -10,11 +10,11 @@ use sha2::{Digest, Sha256};
 
 use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
-use super::manifest::Manifest;
+use super::manifest::RunManifest;
 use super::shard::Shard;
 use crate::data::json;
 use crate::domain::TaskSet;
-use crate::episode::record::{Episode, Key};
+use crate::episode::record::{Episode, EpisodeKey};
 
 /// An open run folder, which no other process writes to.
 pub struct RunWriter {
@@ -32,7 +32,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// When it holds something else (naming what differs), is being written to by another process, or cannot be written to.
-    pub fn open(path: &Path, manifest: &Manifest) -> anyhow::Result<RunWriter> {
+    pub fn open(path: &Path, manifest: &RunManifest) -> anyhow::Result<RunWriter> {
         let name = path.display();
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the run folder {name}"))?;
         own_files_only(path)?;
@@ -51,7 +51,7 @@ impl RunWriter {
             Err(TryLockError::Error(_)) => {}
         }
         if manifest_path.exists() {
-            let found = Manifest::read(&manifest_path)?;
+            let found = RunManifest::read(&manifest_path)?;
             let differences = found.differences(manifest);
             if !differences.is_empty() {
                 bail!("{name} holds another run ({}); choose another folder with --out", differences.join("; "));
@@ -99,9 +99,9 @@ impl RunWriter {
     ///
     /// # Errors
     /// When the file cannot be read any more.
-    pub fn result(&self, order: &[Key]) -> anyhow::Result<(Vec<Episode>, String)> {
+    pub fn result(&self, order: &[EpisodeKey]) -> anyhow::Result<(Vec<Episode>, String)> {
         let (episodes, _) = read_episodes(&self.path.join(EPISODES))?;
-        let mut by_key: BTreeMap<Key, Episode> = episodes.into_iter().map(|e| (e.key(), e)).collect();
+        let mut by_key: BTreeMap<EpisodeKey, Episode> = episodes.into_iter().map(|e| (e.key(), e)).collect();
         let mut digest = Sha256::new();
         let mut ordered = Vec::new();
         for key in order {
@@ -176,7 +176,7 @@ mod tests {
     fn a_folder_of_another_run_is_refused_and_the_difference_named() {
         let folder = tempfile::tempdir().unwrap();
         RunWriter::open(folder.path(), &manifest()).unwrap();
-        let other = Manifest { seeds: 3, policy: "expert".into(), ..manifest() };
+        let other = RunManifest { seeds: 3, policy: "expert".into(), ..manifest() };
         let error = RunWriter::open(folder.path(), &other).err().unwrap().to_string();
         assert!(error.contains("seeds: 1, not 3") && error.contains("policy: \"random\", not \"expert\""), "{error}");
         assert!(!error.contains("grader"));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::agent::{Decision, Values};
-use crate::episode::record::{Author, Step};
+use crate::episode::record::{Author, TraceStep};
 
 /// A step that was taken.
 #[derive(Clone, Debug)]
@@ -11,7 +11,7 @@ pub struct Taken {
     /// What was decided, and the mind behind it.
     pub decision: Decision,
     /// What was recorded of it; `told` and `by` are left out, they follow from the neighbours.
-    pub step: Step,
+    pub step: TraceStep,
     /// What the agent was told.
     pub instruction: Arc<str>,
     /// Who chose.

@@ -241,7 +241,7 @@ mod tests {
     use super::*;
     use crate::agent::Decision;
     use crate::domain::{Action, ActionType, World};
-    use crate::episode::record::{Author, Step};
+    use crate::episode::record::{Author, TraceStep};
     use crate::house::Outcome;
 
     fn moment(x: i16) -> Moment {
@@ -258,7 +258,7 @@ mod tests {
     }
 
     fn taken(kind: ActionType, told: &str) -> Taken {
-        let step = Step {
+        let step = TraceStep {
             kind,
             target: None,
             class: None,

@@ -5,7 +5,7 @@ use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
 use crate::domain::Action;
 use crate::episode::branches::{Growth, Taken};
-use crate::episode::record::{Author, Step};
+use crate::episode::record::{Author, TraceStep};
 use crate::episode::rollout::Tick;
 use crate::house::Outcome;
 use crate::house::grading::describe;
@@ -75,7 +75,7 @@ impl Session {
                 distribution: decision.distribution.or(thought.and_then(|thought| thought.distribution)),
                 ..decision
             },
-            step: Step::of(&tick, &self.rollout),
+            step: TraceStep::of(&tick, &self.rollout),
             instruction: self.rollout.instruction.as_str().into(),
             author,
             values,

@@ -10,7 +10,7 @@ use embedded_graphics::primitives::{Circle, Polyline, PrimitiveStyle};
 use embedded_graphics::text::{Alignment, Text};
 
 use crate::data::atomic_file;
-use crate::report::raster::{Raster, Rgb, rgb888};
+use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 
 /// How a text lies about its point.
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +24,10 @@ pub enum Anchor {
 }
 
 #[derive(Clone, Debug)]
-enum Shape {
-    Line { points: Vec<(f64, f64)>, colour: Rgb, width: f64 },
-    Dot { at: (f64, f64), colour: Rgb },
-    Text { at: (f64, f64), text: String, anchor: Anchor, colour: Rgb },
+enum Element {
+    Line { points: Vec<(f64, f64)>, colour: RgbColour, width: f64 },
+    Dot { at: (f64, f64), colour: RgbColour },
+    Text { at: (f64, f64), text: String, anchor: Anchor, colour: RgbColour },
 }
 
 /// Pixels of the picture to a unit of the drawing.
@@ -42,28 +42,28 @@ const RADIUS: f64 = 3.5;
 pub struct Drawing {
     size: (f64, f64),
     title: String,
-    shapes: Vec<Shape>,
+    elements: Vec<Element>,
 }
 
 impl Drawing {
     /// An empty drawing; the title is for those who cannot see it.
     pub fn new(width: f64, height: f64, title: &str) -> Drawing {
-        Drawing { size: (width, height), title: title.to_owned(), shapes: Vec::new() }
+        Drawing { size: (width, height), title: title.to_owned(), elements: Vec::new() }
     }
 
     /// Adds a line through points.
-    pub fn line(&mut self, points: &[(f64, f64)], colour: Rgb, width: f64) {
-        self.shapes.push(Shape::Line { points: points.to_vec(), colour, width });
+    pub fn line(&mut self, points: &[(f64, f64)], colour: RgbColour, width: f64) {
+        self.elements.push(Element::Line { points: points.to_vec(), colour, width });
     }
 
     /// Adds a dot, which marks a point of a line.
-    pub fn dot(&mut self, at: (f64, f64), colour: Rgb) {
-        self.shapes.push(Shape::Dot { at, colour });
+    pub fn dot(&mut self, at: (f64, f64), colour: RgbColour) {
+        self.elements.push(Element::Dot { at, colour });
     }
 
     /// Adds a text in one line, its baseline at `at`.
-    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: Rgb) {
-        self.shapes.push(Shape::Text { at, text: text.to_owned(), anchor, colour });
+    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: RgbColour) {
+        self.elements.push(Element::Text { at, text: text.to_owned(), anchor, colour });
     }
 
     /// The drawing as an SVG document, or as a part of a page.
@@ -75,11 +75,11 @@ impl Drawing {
              <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
             escape(&self.title)
         );
-        let hex = |[r, g, b]: &Rgb| format!("#{r:02x}{g:02x}{b:02x}");
-        for shape in &self.shapes {
+        let hex = |[r, g, b]: &RgbColour| format!("#{r:02x}{g:02x}{b:02x}");
+        for element in &self.elements {
             // Writing to a string cannot fail.
-            let _ = match shape {
-                Shape::Line { points, colour, width } => {
+            let _ = match element {
+                Element::Line { points, colour, width } => {
                     let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
                     let (points, colour) = (points.join(" "), hex(colour));
                     writeln!(
@@ -87,10 +87,10 @@ impl Drawing {
                         r#"<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}"/>"#
                     )
                 }
-                Shape::Dot { at: (x, y), colour } => {
+                Element::Dot { at: (x, y), colour } => {
                     writeln!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{RADIUS}" fill="{}"/>"#, hex(colour))
                 }
-                Shape::Text { at: (x, y), text, anchor, colour } => {
+                Element::Text { at: (x, y), text, anchor, colour } => {
                     let anchor = match anchor {
                         Anchor::Start => "start",
                         Anchor::Middle => "middle",
@@ -120,25 +120,25 @@ impl Drawing {
     pub fn png(&self) -> anyhow::Result<Vec<u8>> {
         let pixel = |(x, y): (f64, f64)| Point::new((SCALE * x).round() as i32, (SCALE * y).round() as i32);
         let (width, height) = (SCALE * self.size.0, SCALE * self.size.1);
-        let mut raster = Raster::new(width.ceil() as usize, height.ceil() as usize, [255; 3]);
-        for shape in &self.shapes {
-            match shape {
-                Shape::Line { points, colour, width } => {
+        let mut pixmap = Pixmap::new(width.ceil() as usize, height.ceil() as usize, [255; 3]);
+        for element in &self.elements {
+            match element {
+                Element::Line { points, colour, width } => {
                     let points: Vec<Point> = points.iter().copied().map(pixel).collect();
                     let style = PrimitiveStyle::with_stroke(rgb888(*colour), (SCALE * width).round() as u32);
-                    raster.draw(&Polyline::new(&points).into_styled(style));
+                    pixmap.draw(&Polyline::new(&points).into_styled(style));
                 }
-                Shape::Dot { at, colour } => {
+                Element::Dot { at, colour } => {
                     let circle = Circle::with_center(pixel(*at), (2.0 * SCALE * RADIUS).round() as u32);
-                    raster.draw(&circle.into_styled(PrimitiveStyle::with_fill(rgb888(*colour))));
+                    pixmap.draw(&circle.into_styled(PrimitiveStyle::with_fill(rgb888(*colour))));
                 }
-                Shape::Text { at, text, anchor, colour } => {
+                Element::Text { at, text, anchor, colour } => {
                     let style = MonoTextStyle::new(&FONT, rgb888(*colour));
-                    raster.draw(&Text::with_alignment(text, pixel(*at), style, (*anchor).into()));
+                    pixmap.draw(&Text::with_alignment(text, pixel(*at), style, (*anchor).into()));
                 }
             }
         }
-        raster.png()
+        pixmap.png()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Charts of lines: axes, lines with their intervals, and their names.
 
 use super::drawing::{Anchor, Drawing};
-use crate::report::raster::Rgb;
+use crate::report::pixmap::RgbColour;
 use crate::report::stats::Interval;
 
 /// Lines in a plane with labelled axes.
@@ -29,11 +29,11 @@ pub struct Series {
 }
 
 /// Told apart by people who see few colours, too (Okabe and Ito, 2008).
-pub const COLOURS: [Rgb; 7] =
+pub const COLOURS: [RgbColour; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [90, 90, 90]];
 /// The colour of titles and labels.
-pub const INK: Rgb = [34, 34, 34];
-const FAINT: Rgb = [221, 221, 221];
+pub const INK: RgbColour = [34, 34, 34];
+const FAINT: RgbColour = [221, 221, 221];
 /// What lies around the plane: left, above, right, below.
 const MARGINS: [f64; 4] = [64.0, 34.0, 18.0, 40.0];
 /// From the plane's sides to the first and the last point.

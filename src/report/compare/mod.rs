@@ -11,7 +11,7 @@ use self::paired::PairedComparison;
 use super::estimates::Mean;
 use super::stats;
 use super::stats::Interval;
-use super::summary::Summary;
+use super::summary::RunSummary;
 use crate::episode::record::Episode;
 use crate::run_dir::reader::RecordedRun;
 
@@ -65,15 +65,15 @@ impl Comparison {
     ///
     /// # Errors
     /// When there are fewer than two, or two have no episode in common.
-    pub fn of(runs: &[RecordedRun]) -> anyhow::Result<(Comparison, Vec<Summary>)> {
+    pub fn of(runs: &[RecordedRun]) -> anyhow::Result<(Comparison, Vec<RunSummary>)> {
         let [first, others @ ..] = runs else { anyhow::bail!("name the runs to compare") };
         anyhow::ensure!(!others.is_empty(), "name a second run to compare with {}", first.path.display());
         let summary = |run: &RecordedRun| {
             let partial = run.episodes.len() < run.episode_specs().len();
-            Summary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
+            RunSummary::of(&run.manifest, &run.set.tasks, &run.episodes, partial)
         };
-        let summaries: Vec<Summary> = runs.iter().map(summary).collect();
-        let figures = |(run, summary): (&RecordedRun, &Summary)| RunFigures {
+        let summaries: Vec<RunSummary> = runs.iter().map(summary).collect();
+        let figures = |(run, summary): (&RecordedRun, &RunSummary)| RunFigures {
             run: run.path.display().to_string(),
             task_set: summary.task_set.clone(),
             policy: summary.policy.clone(),

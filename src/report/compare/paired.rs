@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::episode::record::{Episode, Key};
+use crate::episode::record::{Episode, EpisodeKey};
 use crate::report::estimates::BOOTSTRAP_SEED;
 use crate::report::stats;
 use crate::report::stats::Interval;
@@ -81,7 +81,7 @@ impl PairedComparison {
     /// # Errors
     /// When they have no episode in common.
     pub fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<PairedComparison> {
-        let mut others: BTreeMap<Key, &Episode> = second
+        let mut others: BTreeMap<EpisodeKey, &Episode> = second
             .episodes
             .iter()
             .filter(|episode| episode.is_plain())
@@ -171,7 +171,7 @@ pub(crate) mod tests {
     use crate::episode::instruction_variant::InstructionVariant;
     use crate::episode::scenes::Scenes;
     use crate::run_dir::episodes::tests::episode;
-    use crate::run_dir::manifest::Manifest;
+    use crate::run_dir::manifest::RunManifest;
     use crate::run_dir::manifest::tests::manifest;
 
     /// A run of the sample set in which these seeds of the first task succeeded.
@@ -186,7 +186,7 @@ pub(crate) mod tests {
         RecordedRun {
             path: name.into(),
             sources: vec![(name.into(), outcomes.len())],
-            manifest: Manifest { seeds: outcomes.len() as u64, ..manifest() },
+            manifest: RunManifest { seeds: outcomes.len() as u64, ..manifest() },
             scenes: Scenes::in_folder(None),
             set,
             episodes: (0..).zip(outcomes).map(outcome).collect(),

@@ -5,12 +5,12 @@ use gif::{Encoder, Frame, Repeat};
 
 use super::captions::{FONT, LINE, wrap};
 use crate::episode::frames::{FrameSequence, Shot};
-use crate::report::raster::{Raster, Rgb};
+use crate::report::pixmap::{Pixmap, RgbColour};
 
-const PAPER: Rgb = [20, 20, 24];
-const INK: Rgb = [230, 230, 230];
-const DONE: Rgb = [90, 220, 130];
-const BAD: Rgb = [255, 120, 110];
+const PAPER: RgbColour = [20, 20, 24];
+const INK: RgbColour = [230, 230, 230];
+const DONE: RgbColour = [90, 220, 130];
+const BAD: RgbColour = [255, 120, 110];
 /// Lines under the frame: two for the instruction, one for the step.
 const LINES: usize = 3;
 /// Hundredths of a second that a step is shown, and the last one.
@@ -29,11 +29,11 @@ pub fn draw(recording: &FrameSequence) -> anyhow::Result<Vec<u8>> {
         let mut encoder = Encoder::new(&mut data, width as u16, height as u16, &[]).context("the film cannot begin")?;
         encoder.set_repeat(Repeat::Infinite)?;
         for (at, shot) in recording.shots.iter().enumerate() {
-            let mut raster = Raster::new(width, height, PAPER);
-            raster.frame(&camera.draw(shot), 0, 0, 1);
-            caption(&mut raster, shot, side + 4);
+            let mut pixmap = Pixmap::new(width, height, PAPER);
+            pixmap.frame(&camera.draw(shot), 0, 0, 1);
+            caption(&mut pixmap, shot, side + 4);
             // The fastest quantiser: house frames have few colours.
-            let mut frame = Frame::from_rgb_speed(width as u16, height as u16, &raster.rgb, 30);
+            let mut frame = Frame::from_rgb_speed(width as u16, height as u16, &pixmap.rgb, 30);
             frame.delay = if at + 1 == recording.shots.len() { SHOWN.1 } else { SHOWN.0 };
             encoder.write_frame(&frame).context("the film cannot be encoded")?;
         }
@@ -41,15 +41,15 @@ pub fn draw(recording: &FrameSequence) -> anyhow::Result<Vec<u8>> {
     Ok(data)
 }
 
-fn caption(raster: &mut Raster, shot: &Shot, top: usize) {
-    let width = raster.width - 8;
+fn caption(pixmap: &mut Pixmap, shot: &Shot, top: usize) {
+    let width = pixmap.width - 8;
     for (row, line) in wrap(&shot.told, width).iter().take(LINES - 1).enumerate() {
-        raster.text(4, top + row * LINE, line, &FONT, INK);
+        pixmap.text(4, top + row * LINE, line, &FONT, INK);
     }
     let (text, colour) = match (&shot.done, shot.possible) {
         (Some(done), _) => (format!("{} {} · done: {done}", shot.step, shot.words()), DONE),
         (None, true) => (format!("{} {}", shot.step, shot.words()), INK),
         (None, false) => (format!("{} {}", shot.step, shot.words()), BAD),
     };
-    raster.text(4, top + (LINES - 1) * LINE, &text, &FONT, colour);
+    pixmap.text(4, top + (LINES - 1) * LINE, &text, &FONT, colour);
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::episode::frames::FrameSequence;
 use crate::report::html::in_script;
-use crate::report::raster::Raster;
+use crate::report::pixmap::Pixmap;
 
 #[derive(Serialize)]
 struct ReplayPage<'a> {
@@ -34,14 +34,14 @@ pub fn write(recording: &FrameSequence) -> anyhow::Result<String> {
     let mut steps = Vec::with_capacity(recording.shots.len());
     for shot in &recording.shots {
         let frame = camera.draw(shot);
-        let raster = Raster { width: frame.width, height: frame.height, rgb: frame.rgb };
+        let pixmap = Pixmap { width: frame.width, height: frame.height, rgb: frame.rgb };
         steps.push(ReplayStep {
             step: shot.step,
             told: &shot.told,
             words: shot.words(),
             possible: shot.possible,
             done: shot.done.as_deref(),
-            frame: format!("data:image/png;base64,{}", STANDARD.encode(raster.png()?)),
+            frame: format!("data:image/png;base64,{}", STANDARD.encode(pixmap.png()?)),
         });
     }
     let page = ReplayPage { title: &recording.title, subtasks: &recording.subtasks, steps };

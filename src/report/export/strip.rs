@@ -4,11 +4,11 @@ use anyhow::Context;
 
 use super::captions::{FONT, LINE, wrap};
 use crate::episode::frames::{FrameSequence, Shot};
-use crate::report::raster::{Raster, Rgb};
+use crate::report::pixmap::{Pixmap, RgbColour};
 
-const PAPER: Rgb = [255, 255, 255];
-const INK: Rgb = [20, 20, 24];
-const DONE: Rgb = [20, 120, 60];
+const PAPER: RgbColour = [255, 255, 255];
+const INK: RgbColour = [20, 20, 24];
+const DONE: RgbColour = [20, 120, 60];
 /// Space around frames, in pixels.
 const MARGIN: usize = 8;
 /// Frames of a strip where no subtask was done.
@@ -20,35 +20,35 @@ const SIDE: usize = 150;
 ///
 /// # Errors
 /// When there is no such step.
-pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Raster> {
+pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Pixmap> {
     let shot = recording.shots.get(at as usize).with_context(|| format!("there is no step {at}"))?;
     let frame = recording.camera().draw(shot);
-    Ok(Raster { width: frame.width, height: frame.height, rgb: frame.rgb })
+    Ok(Pixmap { width: frame.width, height: frame.height, rgb: frame.rgb })
 }
 
 /// The first frame, those at which a subtask was done, and the last one, each over its words.
-pub fn draw(recording: &FrameSequence) -> Raster {
+pub fn draw(recording: &FrameSequence) -> Pixmap {
     let shots = chosen(recording);
     let words: Vec<Vec<String>> = shots.iter().map(|shot| wrap(&caption(shot), SIDE)).collect();
     let lines = words.iter().map(Vec::len).max().unwrap_or(1);
     let width = MARGIN + shots.len() * (SIDE + MARGIN);
     let title = wrap(&recording.told(), width - 2 * MARGIN);
     let top = MARGIN + title.len() * LINE;
-    let mut raster = Raster::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
+    let mut pixmap = Pixmap::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
     for (row, line) in title.iter().enumerate() {
-        raster.text(MARGIN, MARGIN / 2 + row * LINE, line, &FONT, INK);
+        pixmap.text(MARGIN, MARGIN / 2 + row * LINE, line, &FONT, INK);
     }
     let mut camera = recording.camera();
     for (place, (shot, words)) in shots.iter().zip(words).enumerate() {
         let left = MARGIN + place * (SIDE + MARGIN);
         let frame = camera.draw(shot);
-        raster.frame(&frame, left, top, (frame.width / SIDE).max(1));
+        pixmap.frame(&frame, left, top, (frame.width / SIDE).max(1));
         let colour = if shot.done.is_some() { DONE } else { INK };
         for (row, line) in words.iter().enumerate() {
-            raster.text(left, top + SIDE + MARGIN / 2 + row * LINE, line, &FONT, colour);
+            pixmap.text(left, top + SIDE + MARGIN / 2 + row * LINE, line, &FONT, colour);
         }
     }
-    raster
+    pixmap
 }
 
 fn caption(shot: &Shot) -> String {

@@ -6,7 +6,7 @@ use embedded_graphics::primitives::{PrimitiveStyle, PrimitiveStyleBuilder, Recta
 use ratatui::style::{Color, Modifier, Style};
 
 use super::Job;
-use crate::report::raster::{Raster, Rgb, rgb888};
+use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 
 /// A numbered thing in the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,11 +19,11 @@ pub struct Label {
     pub chosen: bool,
 }
 
-const PLAIN: Rgb = [255, 255, 255];
-const CHOSEN: Rgb = [255, 214, 0];
-const INK: Rgb = [0, 0, 0];
+const PLAIN: RgbColour = [255, 255, 255];
+const CHOSEN: RgbColour = [255, 214, 0];
+const INK: RgbColour = [0, 0, 0];
 
-fn colour(label: &Label) -> Rgb {
+fn colour(label: &Label) -> RgbColour {
     if label.chosen { CHOSEN } else { PLAIN }
 }
 
@@ -50,7 +50,7 @@ pub fn over_cells(job: &Job, cells: &mut [(char, Style)]) {
 
 /// Draws the labels into a copy of the frame's pixels: an outline for each thing, and its numbers on a plate.
 pub fn over_pixels(job: &Job) -> Vec<u8> {
-    let mut raster = Raster { rgb: job.frame.rgb.clone(), width: job.frame.width, height: job.frame.height };
+    let mut pixmap = Pixmap { rgb: job.frame.rgb.clone(), width: job.frame.width, height: job.frame.height };
     for label in &job.labels {
         let [left, top, right, bottom] = label.bounds.map(i32::from);
         let outline = Rectangle::with_corners(Point::new(left, top), Point::new(right, bottom));
@@ -59,24 +59,24 @@ pub fn over_pixels(job: &Job) -> Vec<u8> {
             .stroke_width(if label.chosen { 2 } else { 1 })
             .stroke_alignment(StrokeAlignment::Inside)
             .build();
-        raster.draw(&outline.into_styled(style));
+        pixmap.draw(&outline.into_styled(style));
     }
     for label in &job.labels {
-        plate(&mut raster, label);
+        plate(&mut pixmap, label);
     }
-    raster.rgb
+    pixmap.rgb
 }
 
 /// Writes a label's text on a plate in the middle of its thing.
-fn plate(raster: &mut Raster, label: &Label) {
+fn plate(pixmap: &mut Pixmap, label: &Label) {
     let (font, margin) = if label.text.len() <= 3 { (&FONT_9X15_BOLD, 2) } else { (&FONT_6X10, 1) };
     let letter = font.character_size;
     let width = label.text.chars().count() as i32 * letter.width as i32 + 2 * margin;
     let height = letter.height as i32;
     let [left, top, right, bottom] = label.bounds.map(i32::from);
-    let x = ((left + right - width) / 2).clamp(0, (raster.width as i32 - width).max(0));
-    let y = ((top + bottom - height) / 2).clamp(0, (raster.height as i32 - height).max(0));
+    let x = ((left + right - width) / 2).clamp(0, (pixmap.width as i32 - width).max(0));
+    let y = ((top + bottom - height) / 2).clamp(0, (pixmap.height as i32 - height).max(0));
     let plate = Rectangle::new(Point::new(x, y), Size::new(width as u32, height as u32));
-    raster.draw(&plate.into_styled(PrimitiveStyle::with_fill(rgb888(colour(label)))));
-    raster.text((x + margin) as usize, y as usize, &label.text, font, INK);
+    pixmap.draw(&plate.into_styled(PrimitiveStyle::with_fill(rgb888(colour(label)))));
+    pixmap.text((x + margin) as usize, y as usize, &label.text, font, INK);
 }
