@@ -1,6 +1,9 @@
 //! The floors: imports point down only, and each outside library stays on the floors that need it. Read from the sources' text.
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::imports::{Source, sources};
 
 /// Ground floor first.
 const FLOORS: [&str; 16] = [
@@ -9,59 +12,20 @@ const FLOORS: [&str; 16] = [
 ];
 
 /// Libraries, and the floors that may use them.
-const LIBRARIES: [(&str, &[&str]); 4] =
-    [("tch", &["nets", "algo", "agent", "train"]), ("ratatui", &["tui"]), ("crossterm", &["tui"]), ("clap", &["cli"])];
+const LIBRARIES: [(&str, &[&str]); 9] = [
+    ("tch", &["nets", "algo", "agent", "train"]),
+    ("ratatui", &["tui"]),
+    ("ratatui_textarea", &["tui"]),
+    ("crossterm", &["tui"]),
+    ("termprofile", &["tui"]),
+    ("clap", &["cli"]),
+    ("clap_complete", &["cli"]),
+    ("clap_mangen", &["cli"]),
+    ("indicatif", &["cli"]),
+];
 
-/// A source file: its floor and its lines that are code.
-struct Source {
-    path: PathBuf,
-    floor: &'static str,
-    code: Vec<(usize, String)>,
-}
-
-fn sources() -> Vec<Source> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut found = Vec::new();
-    for floor in FLOORS {
-        let mut folders = vec![root.join(floor)];
-        while let Some(folder) = folders.pop() {
-            for entry in std::fs::read_dir(&folder).unwrap() {
-                let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else if path.extension().is_some_and(|extension| extension == "rs") {
-                    // Tests may look up: what they build is not part of the floor.
-                    let text = std::fs::read_to_string(&path).unwrap();
-                    let text = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
-                    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.to_owned()));
-                    let code = numbered.filter(|(_, line)| !line.trim_start().starts_with("//")).collect();
-                    found.push(Source { path, floor, code });
-                }
-            }
-        }
-    }
-    assert!(found.len() > 20, "the sources were not found");
-    found
-}
-
-/// The modules that a line names behind `crate::`, a braced list of them included.
-fn crate_paths(line: &str) -> Vec<&str> {
-    let mut named = Vec::new();
-    for (at, _) in line.match_indices("crate::") {
-        // `some_crate::` is another word.
-        if line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
-            continue;
-        }
-        let rest = &line[at + "crate::".len()..];
-        let parts = match rest.strip_prefix('{') {
-            Some(list) => list.split(',').map(str::trim).collect(),
-            None => vec![rest],
-        };
-        let word = |part: &'_ str| part.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(part.len());
-        named.extend(parts.into_iter().map(|part| &part[..word(part)]));
-    }
-    named
-}
+/// The commands that use the explorer's screen: the one that opens it, and the one that says what the terminal can draw.
+const COMMANDS_WITH_A_SCREEN: [&str; 2] = ["cli::explore", "cli::doctor"];
 
 fn rank(floor: &str) -> Option<usize> {
     FLOORS.iter().position(|&known| known == floor)
@@ -71,11 +35,13 @@ fn rank(floor: &str) -> Option<usize> {
 fn imports_point_down_only() {
     let mut upward = Vec::new();
     for source in sources() {
-        for (number, line) in &source.code {
-            for target in crate_paths(line) {
-                if rank(target) > rank(source.floor) {
-                    upward.push(format!("{}:{number}: {} imports {target}", source.path.display(), source.floor));
-                }
+        for named in &source.named {
+            let Some(target) = source.below_crate(&named.segments).and_then(|path| path.first().cloned()) else {
+                continue;
+            };
+            if rank(source.floor()).is_some() && rank(&target) > rank(source.floor()) {
+                let (path, line) = (source.path.display(), named.line);
+                upward.push(format!("{path}:{line}: {} imports {target}", source.floor()));
             }
         }
     }
@@ -83,20 +49,24 @@ fn imports_point_down_only() {
 }
 
 #[test]
+fn every_folder_of_the_sources_is_a_floor() {
+    let floors: BTreeSet<String> = sources().iter().map(|source| source.floor().to_owned()).collect();
+    let known = FLOORS.iter().copied().chain(["lib", "main"]).map(str::to_owned).collect();
+    assert_eq!(floors, known);
+    assert!(rank("cli") > rank("domain") && rank("serde").is_none());
+}
+
+#[test]
 fn each_library_stays_on_its_floors() {
     let mut strays = Vec::new();
     for source in sources() {
         for (library, floors) in LIBRARIES {
-            if floors.contains(&source.floor) {
+            if floors.contains(&source.floor()) {
                 continue;
             }
-            let uses = |line: &str| {
-                let path = format!("{library}::");
-                line.match_indices(&path)
-                    .any(|(at, _)| !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_'))
-            };
-            for (number, line) in source.code.iter().filter(|(_, line)| uses(line)) {
-                strays.push(format!("{}:{number}: {library} in {}: {line}", source.path.display(), source.floor));
+            for named in source.named.iter().filter(|named| named.segments[0] == library) {
+                let (path, line) = (source.path.display(), named.line);
+                strays.push(format!("{path}:{line}: {} in {}", named.segments.join("::"), source.floor()));
             }
         }
     }
@@ -104,12 +74,17 @@ fn each_library_stays_on_its_floors() {
 }
 
 #[test]
-fn the_reader_of_imports_sees_them() {
-    assert_eq!(crate_paths("use crate::house::{Outcome, House};"), ["house"]);
-    assert_eq!(crate_paths("use crate::{agent, run::stats};"), ["agent", "run"]);
-    assert_eq!(crate_paths("    crate::language::instruction::normalise(crate::domain::x)"), ["language", "domain"]);
-    assert!(crate_paths("other_crate::tui::x").is_empty());
-    assert!(rank("cli") > rank("domain") && rank("serde").is_none());
+fn only_the_explorers_commands_use_its_screen() {
+    let uses_screen = |source: &Source| {
+        let mut paths = source.named.iter().filter_map(|named| source.below_crate(&named.segments));
+        paths.any(|path| path.first().is_some_and(|floor| floor == "tui"))
+    };
+    let users: BTreeSet<String> = sources()
+        .iter()
+        .filter(|source| source.floor() == "cli" && uses_screen(source))
+        .map(|source| source.module.clone())
+        .collect();
+    assert_eq!(users, COMMANDS_WITH_A_SCREEN.map(str::to_owned).into());
 }
 
 #[test]

@@ -4,9 +4,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
 mod alfred;
+mod circles;
 mod explore;
 mod eval;
 mod floors;
+mod imports;
 mod fuzz;
 mod command_line;
 mod generated;
