@@ -39,3 +39,7 @@ pub mod analysis;
 pub mod explore;
 pub mod tui;
 pub mod cli;
+
+#[cfg(test)]
+#[path = "../tests/needed.rs"]
+mod needed;

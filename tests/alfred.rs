@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use rayon::prelude::*;
 use sprint_explorer::data::alfred::import::parse_recording;
@@ -13,28 +12,11 @@ use sprint_explorer::data::summaries::Summaries;
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Action, ActionType, SkillKind, Subtask, Trajectory, World};
 
-/// The train split as published: unpacked beside the shared archive, or from it once into the target folder.
+use super::needed;
+
+/// The train split as published.
 fn train() -> Option<PathBuf> {
-    let shared = std::env::var("SPRINT_SHARED")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_string());
-    let shared = Path::new(&shared).join("alfred");
-    let unpacked = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alfred");
-    let archive = shared.join("alfred.tar.xz");
-    if !unpacked.is_dir() && archive.is_file() {
-        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-        let mut tar = Command::new("tar");
-        tar.arg("-xJf").arg(archive).arg("-C").arg(folder.path()).args(["--wildcards", "*/traj_data.json"]);
-        if !tar.status().unwrap().success() || std::fs::rename(folder.path().join("alfred"), &unpacked).is_err() {
-            eprintln!("skipped: the shared archive of ALFRED could not be unpacked");
-            return None;
-        }
-    }
-    let found = [shared.join("alfred"), shared, unpacked].map(|folder| folder.join("data/json_2.1.0/train"));
-    let found = found.into_iter().find(|folder| folder.is_dir());
-    if found.is_none() {
-        eprintln!("skipped: ALFRED's counts need the shared data");
-    }
-    found
+    needed::alfred().map(|folder| folder.join("data/json_2.1.0/train"))
 }
 
 fn folders(folder: &Path) -> Vec<PathBuf> {

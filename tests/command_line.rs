@@ -12,14 +12,7 @@ fn sprint(home: &Path) -> Command {
 }
 
 fn tiny_encoder() -> Option<PathBuf> {
-    let shared = std::env::var("SPRINT_SHARED")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_string());
-    let folder = Path::new(&shared).join("fixtures/tiny-mpnet");
-    if !folder.exists() {
-        eprintln!("skipped: {} needs the shared data", folder.display());
-        return None;
-    }
-    Some(folder)
+    super::needed::shared("fixtures/tiny-mpnet")
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! `sprint tasks` and `sprint eval` from the command line: what they write, and how they end.
 
-use std::path::Path;
-
 use serde_json::Value;
 
-use crate::faults::encoders;
-use crate::program::Sprint;
+use crate::needed;
+use crate::program::{Sprint, encoder_home};
 
 #[test]
 fn the_expert_completes_every_sampled_task() {
@@ -104,7 +102,7 @@ fn every_kind_of_run_is_verified_opened_by_its_number_and_exported() {
         let exported = sprint.run(&format!("export {run}#{last} {run}.txt"));
         assert_eq!(exported.code, Some(0), "{options}: {}", exported.stderr);
     }
-    if let Some(home) = encoders() {
+    if let Some(home) = encoder_home() {
         let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
         for line in [
             format!("eval --tasks typed.json --checkpoint {shipped} --sample --limit 1 --out drawn"),
@@ -245,16 +243,12 @@ fn the_readmes_task_by_hand_is_sound_and_the_expert_solves_it() {
 
 #[test]
 fn the_expert_completes_alfreds_official_sets() {
-    // Importing takes a minute; whoever has a dataset names it.
-    let Ok(data) = std::env::var("SPRINT_DATA") else {
-        eprintln!("skipped: the official task sets need an imported dataset, named by SPRINT_DATA");
-        return;
-    };
+    let Some(source) = needed::alfred() else { return };
     let sprint = Sprint::new();
+    let imported = sprint.run(&format!("import alfred {} D", source.display()));
+    assert_eq!(imported.code, Some(0), "{}", imported.stderr);
     for set in ["eval_100", "eval_chain"] {
-        let tasks = Path::new(&data).join(format!("tasks/{set}.json"));
-        let line = format!("eval --tasks {} --policy expert --out {set} --json", tasks.display());
-        let ended = sprint.run(&line);
+        let ended = sprint.run(&format!("eval --tasks D/tasks/{set}.json --policy expert --out {set} --json"));
         let summary: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
         assert!(summary["success"].as_f64().unwrap() >= 0.95, "{set}: {summary}");
     }

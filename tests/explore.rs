@@ -1,6 +1,7 @@
 //! The explorer in a pseudo-terminal: typing, time travel, signals, and a terminal that is left as it was found.
 
 use super::terminal::Session;
+use crate::program::encoder_home;
 
 #[test]
 fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() {
@@ -31,8 +32,7 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
 
 #[test]
 fn without_options_the_shipped_agent_with_a_critic_acts() {
-    if super::faults::encoders().is_none() {
-        eprintln!("skipped: the shipped agent needs its sentence encoder");
+    if encoder_home().is_none() {
         return;
     }
     let mut session = Session::start(&[]);

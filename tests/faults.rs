@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::program::{Sprint, wait_for};
+use crate::program::{Sprint, encoder_home, wait_for};
 
 #[test]
 fn a_full_disk_is_one_clear_error_and_the_run_goes_on_when_there_is_room() {
@@ -177,10 +177,7 @@ fn sigterm_ends_with_130_and_a_valid_partial_result_that_is_continued() {
 fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
     let sprint = Sprint::new();
     let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
-    let Some(home) = encoders() else {
-        eprintln!("skipped: the shipped agent needs its sentence encoder");
-        return;
-    };
+    let Some(home) = encoder_home() else { return };
     sprint.sample("tasks.json", 1, 4);
     std::fs::create_dir(sprint.path("agent")).unwrap();
     for file in ["config.json", "model.safetensors"] {
@@ -188,7 +185,7 @@ fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
     }
     let line = "eval --tasks tasks.json --checkpoint agent --out run --jobs 1";
     let child =
-        sprint.command(line).env("SPRINT_HOME", home).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        sprint.command(line).env("SPRINT_HOME", &home).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     // The manifest is written once the agent is loaded.
     wait_for(|| sprint.path("run/tasks.json").exists());
     let config = sprint.read("agent/config.json");
@@ -197,14 +194,6 @@ fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
     let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(1), "{said}");
     assert!(said.contains("the checkpoint was replaced while the run was under way"), "{said}");
-    let again = sprint.command(line).env("SPRINT_HOME", encoders().unwrap()).output().unwrap();
+    let again = sprint.command(line).env("SPRINT_HOME", &home).output().unwrap();
     assert!(String::from_utf8_lossy(&again.stderr).contains("checkpoint_hash"), "the other one does not continue it");
-}
-
-/// The folder with the sentence encoder, where it is installed.
-pub fn encoders() -> Option<std::path::PathBuf> {
-    let cache = std::env::var_os("XDG_CACHE_HOME").map(Into::into);
-    let home = std::env::var_os("HOME").map(|home| std::path::PathBuf::from(home).join(".cache"));
-    let found = std::env::var_os("SPRINT_HOME").map(Into::into).or_else(|| Some(cache.or(home)?.join("sprint")))?;
-    found.join("encoders").is_dir().then_some(found)
 }

@@ -9,6 +9,7 @@ mod explore;
 mod eval;
 mod floors;
 mod imports;
+mod needed;
 mod fuzz;
 mod command_line;
 mod generated;

@@ -5,7 +5,16 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use serde_json::Value;
+use sprint_explorer::nets::sentence::default_folder;
 use tempfile::TempDir;
+
+use crate::needed;
+
+/// A home for the program that holds the sentence encoder.
+pub fn encoder_home() -> Option<PathBuf> {
+    let encoder = needed::sentence_encoder(&default_folder())?;
+    Some(encoder.ancestors().nth(2).unwrap().to_owned())
+}
 
 /// The program, in an empty folder of its own.
 pub struct Sprint {

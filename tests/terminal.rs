@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 
+use crate::program::encoder_home;
+
 /// How long anything may take on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -55,7 +57,7 @@ impl Session {
         line.env("LANG", "en_US.UTF-8");
         line.env("XDG_STATE_HOME", state);
         line.env("XDG_CONFIG_HOME", state);
-        if let Some(home) = super::faults::encoders() {
+        if let Some(home) = encoder_home() {
             line.env("SPRINT_HOME", home);
         }
         let child = pair.slave.spawn_command(line).unwrap();

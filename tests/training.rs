@@ -8,6 +8,7 @@ use sprint_explorer::nets::sentence::default_folder;
 use sprint_explorer::nets::weights::{self, Tensors};
 use tch::{Device, Tensor};
 
+use crate::needed;
 use crate::program::{Sprint, wait_for};
 
 /// SPRINT in miniature: every part of it, in seconds.
@@ -67,11 +68,7 @@ swaps = 0
 /// A folder with a few labelled demonstrations; nothing where the sentence encoder is not there.
 fn demonstrations() -> Option<Sprint> {
     let sprint = Sprint::new();
-    let encoder = default_folder();
-    if !encoder.join("model.safetensors").exists() {
-        eprintln!("skipped: training needs the sentence encoder (`make setup` fetches it)");
-        return None;
-    }
+    let encoder = needed::sentence_encoder(&default_folder())?;
     std::fs::create_dir_all(sprint.path("home/encoders")).unwrap();
     std::os::unix::fs::symlink(&encoder, sprint.path("home/encoders/all-MiniLM-L6-v2")).unwrap();
     done(&sprint, "collect D --episodes 6 --seed 5 --lengths 2 --annotations 1");

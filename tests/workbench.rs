@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::terminal::Session;
+use crate::program::encoder_home;
 
 const RANDOM: [&str; 7] = ["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"];
 
@@ -59,8 +60,7 @@ fn another_instruction_seed_and_policy_fork_and_the_tree_says_why() {
 
 #[test]
 fn another_checkpoint_forks_too() {
-    if super::faults::encoders().is_none() {
-        eprintln!("skipped: the shipped agent needs its sentence encoder");
+    if encoder_home().is_none() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -398,29 +398,9 @@ mod tests {
         assert!((iou(unit, [5.0, 0.0, 15.0, 10.0]) - 1.0 / 3.0).abs() < 1e-6);
     }
 
-    /// ALFRED from the shared data, unpacked once under `target/`; `None` where it is absent.
-    fn alfred() -> Option<std::path::PathBuf> {
-        let shared = std::env::var("SPRINT_SHARED").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").into());
-        let archive = std::path::Path::new(&shared).join("alfred/alfred.tar.xz");
-        let target = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/target"));
-        let unpacked = target.join("alfred");
-        if !unpacked.is_dir() && archive.is_file() {
-            std::fs::create_dir_all(target).unwrap();
-            let fresh = tempfile::tempdir_in(target).unwrap();
-            let tar = std::process::Command::new("tar").arg("-xJf").arg(&archive).arg("-C").arg(fresh.path()).status();
-            assert!(tar.unwrap().success(), "tar could not unpack {}", archive.display());
-            // Another test run may have been faster.
-            let _ = std::fs::rename(fresh.path().join("alfred"), &unpacked);
-        }
-        unpacked.is_dir().then_some(unpacked)
-    }
-
     #[test]
     fn alfreds_demonstrations_replay_and_its_counts_and_task_sets_come_out() {
-        let Some(source) = alfred() else {
-            eprintln!("skipped: replaying ALFRED needs the shared data");
-            return;
-        };
+        let Some(source) = crate::needed::alfred() else { return };
         let out = tempfile::tempdir().unwrap();
         let options = crate::data::alfred::Options::default();
         let summary = crate::data::alfred::import(&source, out.path(), &options, &|_| {}).unwrap();
@@ -453,10 +433,7 @@ mod tests {
 
     #[test]
     fn complete_files_with_masks_and_images_say_the_same_as_those_without() {
-        let Some(source) = alfred() else {
-            eprintln!("skipped: complete ALFRED files need the shared data");
-            return;
-        };
+        let Some(source) = crate::needed::alfred() else { return };
         let mut compared = 0;
         for task in std::fs::read_dir(source.join("data/json_2.1.0_originals/train")).unwrap() {
             for trial in std::fs::read_dir(task.unwrap().path()).unwrap() {

@@ -259,6 +259,7 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::needed;
 
     /// The parity cases that sentence-transformers wrote.
     #[derive(Deserialize)]
@@ -269,23 +270,8 @@ mod tests {
         ids: Vec<Vec<u32>>,
     }
 
-    fn shared(path: &str) -> Option<PathBuf> {
-        let shared = std::env::var("SPRINT_SHARED")
-            .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared").to_string());
-        let path = Path::new(&shared).join(path);
-        if !path.exists() {
-            eprintln!("skipped: {} needs the shared data", path.display());
-            return None;
-        }
-        Some(path)
-    }
-
     fn minilm() -> Option<SentenceEncoder> {
-        let folder = default_folder();
-        if !folder.join("model.safetensors").exists() {
-            eprintln!("skipped: needs the sentence encoder (`make setup`)");
-            return None;
-        }
+        let folder = needed::sentence_encoder(&default_folder())?;
         Some(SentenceEncoder::load(&folder, Device::Cpu).unwrap())
     }
 
@@ -310,14 +296,16 @@ mod tests {
 
     #[test]
     fn minilm_embeds_as_its_authors_library_does() {
-        let (Some(expected), Some(encoder)) = (shared("fixtures/minilm/expected.json"), minilm()) else { return };
+        let (Some(expected), Some(encoder)) = (needed::shared("fixtures/minilm/expected.json"), minilm()) else {
+            return;
+        };
         assert_eq!(encoder.width(), 384);
         check(&encoder, &expected);
     }
 
     #[test]
     fn mpnet_embeds_as_its_authors_library_does() {
-        let Some(folder) = shared("fixtures/tiny-mpnet") else { return };
+        let Some(folder) = needed::shared("fixtures/tiny-mpnet") else { return };
         let encoder = SentenceEncoder::load(&folder, Device::Cpu).unwrap();
         check(&encoder, &folder.join("expected.json"));
         assert_eq!(encoder.digest().len(), 64);
@@ -325,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_long_text_is_cut_and_the_count_says_by_how_much() {
-        let Some(folder) = shared("fixtures/tiny-mpnet") else { return };
+        let Some(folder) = needed::shared("fixtures/tiny-mpnet") else { return };
         let encoder = SentenceEncoder::load(&folder, Device::Cpu).unwrap();
         assert_eq!(encoder.tokens("").unwrap(), TokenCount { used: 2, truncated: 0 });
         let long = "put the apple in the bowl ".repeat(400);
@@ -338,7 +326,7 @@ mod tests {
 
     #[test]
     fn control_characters_and_other_scripts_embed_without_fuss() {
-        let Some(folder) = shared("fixtures/tiny-mpnet") else { return };
+        let Some(folder) = needed::shared("fixtures/tiny-mpnet") else { return };
         let encoder = SentenceEncoder::load(&folder, Device::Cpu).unwrap();
         let embedded =
             encoder.encode(&["\u{0}\u{1b}[31m\u{7f}", "拿起杯子 🍎", "\u{202e}mug\u{fffd}", "  \n "]).unwrap();
@@ -347,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_folder_that_does_not_fit_together_is_refused_by_file_and_field() {
-        let Some(good) = shared("fixtures/tiny-mpnet") else { return };
+        let Some(good) = needed::shared("fixtures/tiny-mpnet") else { return };
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("1_Pooling")).unwrap();
         let files = [

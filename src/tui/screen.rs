@@ -383,8 +383,12 @@ mod tests {
     }
 
     #[test]
-    fn the_end_waits_no_longer_than_it_should() {
-        let (_tell, messages) = sync_channel(1);
+    fn the_end_does_not_wait_for_a_worker_past_its_time() {
+        let (tell, messages) = sync_channel(1);
+        let still_working = Gone(tell);
         let_work_end(&messages, Instant::now());
+        assert!(messages.try_recv().is_err(), "the worker is still there, and has said nothing");
+        drop(still_working);
+        assert!(matches!(messages.try_recv(), Ok(Msg::WorkerGone)));
     }
 }

@@ -8,6 +8,7 @@ use crate::domain::{ActionType, Heading, SkillKind};
 use crate::env::{Environment, HouseEnvironment};
 use crate::house::grading::{Grader, Grading};
 use crate::house::testing::{kitchen_house, role, subtask};
+use crate::needed;
 use crate::nets::critic::CriticSpec;
 use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
@@ -17,11 +18,7 @@ use crate::nets::sentence::{SentenceEncoder, default_folder};
 
 /// A fresh agent with a critic; nothing where there is no sentence encoder.
 fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
-    let folder = default_folder();
-    if !folder.join("model.safetensors").exists() {
-        eprintln!("skipped: needs the sentence encoder (`make setup`)");
-        return None;
-    }
+    let folder = needed::sentence_encoder(&default_folder())?;
     let embedder = Embedder::new(SentenceEncoder::load(&folder, Device::Cpu).unwrap(), None);
     let embedding = embedder.encoder().width() as i64;
     let small = small();
@@ -40,7 +37,7 @@ fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
     };
     let networks =
         Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
-    LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
+    Some(LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).unwrap())
 }
 
 /// A fresh agent whose logits are all but equal, so that whatever rounds otherwise decides otherwise; nothing where there is no
@@ -61,12 +58,9 @@ pub(crate) fn undecided() -> Option<LearnedPolicy> {
 
 fn shipped(name: &str) -> Option<LearnedPolicy> {
     device::set_threads(1);
-    let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
-        eprintln!("skipped: the shipped agents need their sentence encoder");
-        return None;
-    };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints").join(name);
-    LearnedPolicy::load(&folder, Arc::new(Mutex::new(sentences)), Device::Cpu).ok()
+    let sentences = Embedder::open(&needed::sentence_encoder(&default_folder())?, Device::Cpu).unwrap();
+    let folder = needed::shipped_agent(name)?;
+    Some(LearnedPolicy::load(&folder, Arc::new(Mutex::new(sentences)), Device::Cpu).unwrap())
 }
 
 fn kitchen(grader: Option<Grader>) -> HouseEnvironment {

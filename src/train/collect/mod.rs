@@ -242,6 +242,7 @@ mod tests {
     use crate::house::House;
     use crate::house::expert::TurnTiming;
     use crate::house::grading::{Grader, Grading};
+    use crate::needed;
     use crate::nets::embedding_cache::Embedder;
     use crate::nets::sentence::default_folder;
 
@@ -332,14 +333,12 @@ mod tests {
     #[test]
     fn a_learner_acts_greedily_in_some_episodes_and_draws_in_others() {
         let _chance = crate::nets::testing::chance();
-        let Ok(sentences) = Embedder::open(&default_folder(), Device::Cpu) else {
-            eprintln!("skipped: needs the sentence encoder (`make setup`)");
-            return;
-        };
+        let Some(encoder) = needed::sentence_encoder(&default_folder()) else { return };
+        let Some(first) = needed::shipped_agent("first") else { return };
+        let sentences = Embedder::open(&encoder, Device::Cpu).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let task = tasks(folder.path()).remove(1);
         let again = |number: usize| Task { id: format!("again-{number}"), ..task.clone() };
-        let first = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
         let collection = Collection {
             out: folder.path().join("D"),
             source: Source::Tasks {
