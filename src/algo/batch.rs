@@ -15,15 +15,15 @@ pub struct Transitions {
     pub next: Option<Tensor>,
     /// z, as the networks take it.
     pub told: Tensor,
-    /// Actions, by index [n].
+    /// Actions, by index `[n]`.
     pub actions: Tensor,
-    /// Object classes, by index [n]; 0 for navigation.
+    /// Object classes, by index `[n]`; 0 for navigation.
     pub objects: Tensor,
-    /// The classes that the policy's object head learns to name, by index [n]; 0 for none.
+    /// The classes that the policy's object head learns to name, by index `[n]`; 0 for none.
     pub named: Tensor,
-    /// 1 on the transition into the span's last state, [n] floats.
+    /// 1 on the transition into the span's last state, `[n]` floats.
     pub terminal: Tensor,
-    /// 1 where the action was taken and led to s′, 0 where it is only what would have been right, [n] floats.
+    /// 1 where the action was taken and led to s′, 0 where it is only what would have been right, `[n]` floats.
     pub taken: Tensor,
 }
 
@@ -32,7 +32,7 @@ pub struct Transitions {
 pub struct Pairs {
     /// A's transitions, told z_B.
     pub first: Transitions,
-    /// 1 where equation 4 ends A, [m].
+    /// 1 where equation 4 ends A, `[m]`.
     pub cut: Tensor,
     /// "A. B." as A is told it, and B's transitions told the same; absent where equation 5 is off.
     pub joint: Option<(Tensor, Transitions)>,

@@ -4,7 +4,7 @@ use tch::{Kind, Tensor};
 
 use crate::nets::policy::Logits;
 
-/// How surprising each item's demonstration is, both [n]; the second is 0 where no class is to be named.
+/// How surprising each item's demonstration is, both `[n]`; the second is 0 where no class is to be named.
 #[derive(Debug)]
 pub struct NegLogLikelihood {
     /// Cross-entropy of the action head.
@@ -13,7 +13,7 @@ pub struct NegLogLikelihood {
     pub object: Tensor,
 }
 
-/// How well `logits` tell the demonstrated `actions` [n] and the `named` classes [n] (indices, 0 for none).
+/// How well `logits` tell the demonstrated `actions` `[n]` and the `named` classes `[n]` (indices, 0 for none).
 pub fn surprise(logits: &Logits, actions: &Tensor, named: &Tensor) -> NegLogLikelihood {
     let of = |logits: &Tensor, labels: &Tensor| {
         -logits.log_softmax(-1, Kind::Float).gather(1, &labels.unsqueeze(1), false).squeeze_dim(1)
@@ -21,7 +21,7 @@ pub fn surprise(logits: &Logits, actions: &Tensor, named: &Tensor) -> NegLogLike
     NegLogLikelihood { action: of(&logits.actions, actions), object: of(&logits.objects, named) * naming(named) }
 }
 
-/// 1 where a class is to be named, [n].
+/// 1 where a class is to be named, `[n]`.
 pub fn naming(named: &Tensor) -> Tensor {
     named.gt(0).to_kind(Kind::Float)
 }

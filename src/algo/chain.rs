@@ -96,7 +96,7 @@ pub enum Bootstrap {
     TargetQ,
 }
 
-/// A transition's reward and whether it ends the episode, both [n].
+/// A transition's reward and whether it ends the episode, both `[n]`.
 #[derive(Debug)]
 pub struct RewardDone {
     /// r.

@@ -1,5 +1,5 @@
 //! Implicit Q-learning (Kostrikov et al., 2022), conditioned on an instruction z: an equation a function. All are over items
-//! [n]; how items are averaged is the caller's.
+//! `[n]`; how items are averaged is the caller's.
 
 use serde::{Deserialize, Serialize};
 use tch::{Kind, Tensor, nn};

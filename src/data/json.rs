@@ -91,7 +91,7 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
 /// Writes a JSON file atomically, indented for people.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
     write_line(path, serde_json::to_vec_pretty(value))
 }

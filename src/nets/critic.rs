@@ -94,11 +94,11 @@ impl QHead {
 /// A critic's opinion of a batch in training.
 #[derive(Debug)]
 pub struct CriticValues {
-    /// Both Q, each [n].
+    /// Both Q, each `[n]`.
     pub q: [Tensor; 2],
-    /// V [n].
+    /// V `[n]`.
     pub value: Tensor,
-    /// V [n] of the same features without dropout and without gradient: what advantages are measured against.
+    /// V `[n]` of the same features without dropout and without gradient: what advantages are measured against.
     pub baseline: Tensor,
 }
 
@@ -138,7 +138,7 @@ impl Critic {
         }
     }
 
-    /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` [n]
+    /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` n each
     /// (class indices, 0 for navigation).
     pub fn evaluate(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> CriticValues {
         let told = self.telling.forward(told, observation.kind(), true);
@@ -152,7 +152,7 @@ impl Critic {
         }
     }
 
-    /// min(Q1, Q2) [n], without dropout and without gradient.
+    /// min(Q1, Q2) `[n]`, without dropout and without gradient.
     pub fn min_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
         tch::no_grad(|| {
             let told = self.telling.forward(told, observation.kind(), false);
@@ -164,7 +164,7 @@ impl Critic {
         })
     }
 
-    /// V [n], without dropout and without gradient.
+    /// V `[n]`, without dropout and without gradient.
     pub fn value(&self, observation: &Tensor, told: &Tensor) -> Tensor {
         tch::no_grad(|| {
             let told = self.telling.forward(told, observation.kind(), false);

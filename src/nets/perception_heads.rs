@@ -39,7 +39,7 @@ pub struct Known {
     pub marks: Tensor,
     /// [n, 1, 7, 7], the logarithm of metres.
     pub depth: Tensor,
-    /// [n], class indices.
+    /// `[n]`, class indices.
     pub held: Tensor,
 }
 

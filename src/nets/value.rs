@@ -20,7 +20,7 @@ impl ValueHead {
         ValueHead { out: nn::linear(path / "out", dense.width(), 1, Default::default()), dense }
     }
 
-    /// `input` [n, from] to [n].
+    /// `input` [n, from] to `[n]`.
     pub fn forward(&self, input: &Tensor, train: bool) -> Tensor {
         precision::answer(&self.out, &self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
     }

@@ -1,6 +1,6 @@
 //! What to do next for a subtask, from whatever state: the interactions that would bring it forward.
 //!
-//! The order follows ALFRED's demonstrations: Pickup is [Open] Pickup [Close]; Put is [Open] Put [Close]; Clean is Put
+//! The order follows ALFRED's demonstrations: Pickup is `[Open] Pickup [Close]`; Put is `[Open] Put [Close]`; Clean is Put
 //! ToggleOn ToggleOff Pickup; Heat is Open Put Close ToggleOn ToggleOff Open Pickup Close; Cool is Open Put Close Open
 //! Pickup Close. Each is read off the state, so that it can be entered anywhere.
 
