@@ -1,6 +1,14 @@
 # `make explore` and `make test` do everything on a fresh machine; `make help` lists the rest.
 .DEFAULT_GOAL := help
-.PHONY: explore test setup build fmt lint bench help
+.PHONY: explore test setup build fmt lint lint-tools typos cargo-machete cargo-deny bench help
+
+TOOLS := $(CURDIR)/target/tools
+export PATH := $(TOOLS)/bin:$(PATH)
+# cargo-deny takes minutes to compile.
+LINT_TOOLS := typos cargo-machete cargo-deny
+# Known vulnerabilities are looked up where `cargo deny fetch` has stored their list.
+DENIED := licenses bans sources $(if $(wildcard $(or $(CARGO_HOME),$(HOME)/.cargo)/advisory-dbs/*/.git),advisories)
+where_installed = if command -v $(1) >/dev/null; then echo "$(2)"; $(2); else echo "skipped: $(1) is not installed (make lint-tools)"; fi
 
 explore: build ## set up, build, and start the explorer (ARGS="--seed 7" passes options on)
 	@target/release/sprint explore $(ARGS)
@@ -23,9 +31,24 @@ fmt: ## format the sources
 lint: setup ## what the checks ask for besides the tests
 	cargo fmt --check
 	cargo clippy --release --locked --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --no-deps
+	@$(call where_installed,typos,typos)
+	@$(call where_installed,cargo-machete,cargo machete)
+	@$(call where_installed,cargo-deny,cargo deny --locked --offline check $(DENIED))
 
-bench: setup ## measure the simulator, the encoder and the explorer
+lint-tools: $(LINT_TOOLS) ## install the tools that lint uses where they are installed
+
+typos:
+	python3 -m pip install --quiet --upgrade --target $(TOOLS) typos==1.52.0
+
+cargo-machete:
+	cargo install --quiet --locked --root $(TOOLS) cargo-machete@0.9.2
+
+cargo-deny:
+	cargo install --quiet --locked --root $(TOOLS) cargo-deny@0.20.2
+
+bench: setup ## measure the simulator, the encoder, training and the explorer
 	cargo bench --locked
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' Makefile | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' Makefile | expand -t 12
