@@ -1,8 +1,11 @@
 //! One instruction through the default sentence encoder, on one core; a cached one; and a batch.
 
+mod baseline;
+
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use baseline::Baselines;
+use criterion::{Criterion, criterion_group};
 use sprint_explorer::nets::device;
 use sprint_explorer::nets::embedding_cache::{Embedder, EmbeddingCache};
 use sprint_explorer::nets::sentence::{SentenceEncoder, default_folder};
@@ -39,4 +42,15 @@ fn encoder(bench: &mut Criterion) {
 }
 
 criterion_group!(benches, encoder);
-criterion_main!(benches);
+
+fn main() -> anyhow::Result<()> {
+    let mut baselines = Baselines::open()?;
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+    baselines.compare_criterion(&[
+        "encoder/one short sentence",
+        "encoder/32 short sentences",
+        "encoder/one cached sentence",
+        "encoder/load",
+    ])
+}

@@ -3,12 +3,15 @@
 //! policy runs at full speed and frames arrive; within 5 ms at p50 and a frame of 60 a second at p99. A figure that misses its
 //! target is named, and fails the bench.
 
+mod baseline;
+
 use std::collections::VecDeque;
 use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
+use baseline::Baselines;
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::{Rect, Size};
@@ -52,7 +55,7 @@ struct Target {
 }
 
 /// The typical cost of a step's picture, in bytes and encoding time, while the expert does a task. Returns what misses its target.
-fn frames() -> anyhow::Result<Vec<String>> {
+fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
     let target = |protocol, cells, kilobytes, encoding| Target { protocol, cells, kilobytes, encoding };
     // Half-blocks at 40 x 20 cells; sixels at 300 x 300 pixels; kitty and iTerm2 get the frame at its own 300 x 300.
     let targets = [
@@ -110,6 +113,7 @@ fn frames() -> anyhow::Result<Vec<String>> {
             times[middle],
             times[STEPS - 1]
         )?;
+        baselines.compare(&format!("explorer/encoding for {name}"), times[0])?;
         if most.is_some_and(|most| kilobytes(middle) > most) {
             missed.push(format!("{name}: a typical step is {:.1} kB", kilobytes(middle)));
         }
@@ -121,7 +125,7 @@ fn frames() -> anyhow::Result<Vec<String>> {
 }
 
 fn main() -> anyhow::Result<()> {
-    let mut missed = frames()?;
+    let mut missed = frames(&mut Baselines::open()?)?;
     let (tell, messages) = sync_channel(64);
     let reports = tell.clone();
     let open = || {

@@ -1,9 +1,11 @@
 //! House on one core: frames per second, steps per second, and resets. `cargo bench --bench house`
 
+mod baseline;
+
 use std::hint::black_box;
 use std::sync::Arc;
 
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sprint_explorer::domain::world::Instance;
@@ -11,6 +13,8 @@ use sprint_explorer::domain::{Action, ActionType, Heading, Room, Scene, World};
 use sprint_explorer::house::render::Renderer;
 use sprint_explorer::house::view::View;
 use sprint_explorer::house::{House, generate, rules};
+
+use baseline::Baselines;
 
 /// Houses of all kinds.
 fn houses() -> Vec<(Scene, World)> {
@@ -111,4 +115,16 @@ fn resets(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, frames, steps, resets);
-criterion_main!(benches);
+
+fn main() -> anyhow::Result<()> {
+    let mut baselines = Baselines::open()?;
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+    baselines.compare_criterion(&[
+        "frames/draw",
+        "frames/draw and view",
+        "steps/random, not drawn",
+        "resets/restore",
+        "resets/new house",
+    ])
+}

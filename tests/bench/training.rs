@@ -4,10 +4,13 @@
 
 #![allow(clippy::print_stdout)]
 
+mod baseline;
+
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use baseline::Baselines;
 use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::algo::chain::Pairs;
 use sprint_explorer::data::features::{Features, Header, Writer};
@@ -35,10 +38,11 @@ fn main() -> anyhow::Result<()> {
         asked = Preset::names().into_iter().map(String::from).collect();
     }
     let device = best_device();
+    let mut baselines = Baselines::open()?;
     println!("{device:?}, {} threads; milliseconds, medians of {STEPS} and the least", tch::get_num_threads());
     println!("{:<18} {:>6} {:>7} {:>8} {:>8} {:>9}", "preset", "batch", "pairs", "update", "least", "gathering");
     for name in asked {
-        measure(&warm(Preset::named(&name)?), device)?;
+        measure(&warm(Preset::named(&name)?), device, &mut baselines)?;
     }
     Ok(())
 }
@@ -51,7 +55,7 @@ fn warm(mut preset: Preset) -> Preset {
     preset
 }
 
-fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
+fn measure(preset: &Preset, device: Device, baselines: &mut Baselines) -> anyhow::Result<()> {
     let (features, items) = (features(preset)?, items());
     let width = preset.policy.embedding;
     let embed = |texts: &[&str]| -> anyhow::Result<Tensor> {
@@ -96,8 +100,17 @@ fn measure(preset: &Preset, device: Device) -> anyhow::Result<()> {
     }
     let pairs = preset.chaining.as_ref().map_or(0, |chaining| chaining.batch);
     let least = updating.iter().copied().fold(f64::INFINITY, f64::min);
+    let least_gathering = gathering.iter().copied().fold(f64::INFINITY, f64::min);
     let (update, gather) = (median(updating), median(gathering));
     println!("{:<18} {batch:>6} {pairs:>7} {update:>8.1} {least:>8.1} {gather:>9.1}", preset.name);
+    // Baselines are of the CPU.
+    if device == Device::Cpu {
+        let threads = tch::get_num_threads();
+        for (part, milliseconds) in [("update", least), ("gathering", least_gathering)] {
+            let name = format!("training/{}/{part} on {threads} threads", preset.name);
+            baselines.compare(&name, Duration::from_secs_f64(milliseconds / 1e3))?;
+        }
+    }
     Ok(())
 }
 
