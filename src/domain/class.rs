@@ -21,6 +21,18 @@ pub enum Shape {
     Cylinder,
 }
 
+/// What a fixture does to things.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Effect {
+    /// Its contents are hot once it is switched on.
+    Heat,
+    /// Its contents are cold once it is closed.
+    Cool,
+    /// What lies in the basin nearest to it is clean once it is switched on.
+    Rinse,
+}
+
 /// What `assets/objects.toml` says of a class. Lengths in millimetres.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -37,6 +49,22 @@ pub struct ClassInfo {
     pub openable: bool,
     /// Has a switch.
     pub toggleable: bool,
+    /// What it does to things: a toggled machine or tap when it is switched on, a fridge when it is closed.
+    pub effect: Option<Effect>,
+    /// Has a door that swings out when it is opened.
+    pub door: bool,
+    /// Slides out when it is opened, and its contents with it.
+    pub slides: bool,
+    /// Has a lid that stands at its back edge when it is opened.
+    pub lid: bool,
+    /// Is open above, and its contents lie inside.
+    pub open_top: bool,
+    /// Is what the nearest tap runs into.
+    pub basin: bool,
+    /// Takes things on top of those that already lie in it.
+    pub heaps: bool,
+    /// Slices what can be sliced while it is held.
+    pub cuts: bool,
     /// How many slices it falls into; 0 when it cannot be sliced.
     pub slices: u8,
     /// The shape of a movable object.
@@ -57,7 +85,7 @@ pub struct ClassInfo {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct ObjectTable {
     class: Vec<ClassInfo>,
 }
 
@@ -65,7 +93,7 @@ fn table() -> &'static [ClassInfo] {
     static TABLE: OnceLock<Vec<ClassInfo>> = OnceLock::new();
     TABLE.get_or_init(|| {
         let none = ClassInfo { name: "None".into(), spoken: "nothing".into(), ..ClassInfo::default() };
-        let parsed = toml::from_str::<Table>(include_str!("../../assets/objects.toml"));
+        let parsed = toml::from_str::<ObjectTable>(include_str!("../../assets/objects.toml"));
         // The table is part of the program: a test parses it, so this arm cannot be reached in a build that passed.
         let classes = parsed.map(|table| table.class).unwrap_or_default();
         std::iter::once(none).chain(classes).collect()
@@ -118,9 +146,9 @@ impl Class {
         &self.info().spoken
     }
 
-    /// Whether a knife: what slicing needs in the hand.
+    /// Whether slicing can be done with it in the hand.
     pub fn is_knife(self) -> bool {
-        matches!(self.name(), "Knife" | "ButterKnife")
+        self.info().cuts
     }
 
     /// "in" or "on", as one says it of a receptacle.
@@ -196,7 +224,7 @@ mod tests {
 
     #[test]
     fn the_object_table_holds_alfreds_81_classes_in_the_order_of_the_object_head() {
-        let parsed: Table = toml::from_str(include_str!("../../assets/objects.toml")).unwrap();
+        let parsed: ObjectTable = toml::from_str(include_str!("../../assets/objects.toml")).unwrap();
         assert!(parsed.class.len() >= 81);
         let named: Vec<_> = parsed.class[..81].iter().map(|info| info.name.as_str()).collect();
         assert!(named.is_sorted(), "the vocabulary is in ASCII order");

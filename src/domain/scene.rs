@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::class::{Class, Shape};
 use super::place::{Cell, Cuboid, Heading, Point, Pose, Rect};
-use super::world::Object;
 
 /// The kind of a room; ALFRED numbers its floor plans by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
@@ -133,7 +132,6 @@ pub struct Scene {
 impl Scene {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 1;
-    const THINNEST_SLICE: i32 = 15;
 
     /// World height of the floor in millimetres.
     pub fn floor(&self) -> i32 {
@@ -153,22 +151,5 @@ impl Scene {
     /// The fixture of that number.
     pub fn fixture(&self, index: u16) -> Option<&Fixture> {
         self.fixtures.get(usize::from(index))
-    }
-
-    /// Shape, size and offset of a movable object, in millimetres in its own frame. A slice is a disc of what it was cut from.
-    pub fn shape_of(&self, object: &Object) -> (Shape, [i32; 3], [i32; 3]) {
-        let info = object.class.info();
-        let whole = match object.mesh.and_then(|index| self.meshes.get(usize::from(index))) {
-            Some(mesh) => (mesh.shape, mesh.size, mesh.offset),
-            None => (info.shape, info.size, info.offset),
-        };
-        match object.slice_of {
-            None => whole,
-            Some(_) => {
-                let (shape, [width, height, depth], _) = whole;
-                let thickness = (width / i32::from(info.slices.max(1))).max(Self::THINNEST_SLICE);
-                (shape, [thickness, height * 9 / 10, depth * 9 / 10], [0, 0, 0])
-            }
-        }
     }
 }

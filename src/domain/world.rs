@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::class::Class;
+use super::class::{Class, Shape};
 use super::place::{Point, Pose};
 use super::scene::Scene;
 
@@ -67,6 +67,28 @@ pub struct Object {
     pub cold: bool,
 }
 
+impl Object {
+    /// No slice is thinner than this, in millimetres.
+    const THINNEST_SLICE: i32 = 15;
+
+    /// Shape, size and offset in millimetres in the object's own frame. A slice is a disc of what it was cut from.
+    pub fn shape_in(&self, scene: &Scene) -> (Shape, [i32; 3], [i32; 3]) {
+        let info = self.class.info();
+        let whole = match self.mesh.and_then(|index| scene.meshes.get(usize::from(index))) {
+            Some(mesh) => (mesh.shape, mesh.size, mesh.offset),
+            None => (info.shape, info.size, info.offset),
+        };
+        match self.slice_of {
+            None => whole,
+            Some(_) => {
+                let (shape, [width, height, depth], _) = whole;
+                let thickness = (width / i32::from(info.slices.max(1))).max(Self::THINNEST_SLICE);
+                (shape, [thickness, height * 9 / 10, depth * 9 / 10], [0, 0, 0])
+            }
+        }
+    }
+}
+
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -115,6 +137,12 @@ impl World {
     /// The movable object of that number.
     pub fn object(&self, index: u16) -> Option<&Object> {
         self.objects.get(usize::from(index))
+    }
+
+    /// Every instance: objects first, then fixtures.
+    pub fn instances(&self, scene: &Scene) -> impl Iterator<Item = Instance> + use<> {
+        let objects = (0..self.objects.len() as u16).map(Instance::Object);
+        objects.chain((0..scene.fixtures.len() as u16).map(Instance::Fixture))
     }
 
     /// What directly holds an instance; `None` for fixtures and for objects on the floor or in the hand.

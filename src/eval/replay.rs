@@ -16,7 +16,7 @@ use crate::domain::world::Instance;
 use crate::domain::{ActionType, Scene, Task, Trajectory, World};
 use crate::env::HouseEnvironment;
 use crate::episode::rollout::{Observer, Rollout, Tick};
-use crate::house::camera::projected_bounds;
+use crate::house::bounds::projected_bounds;
 use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
 use crate::house::{House, Outcome, Replay};

@@ -2,7 +2,6 @@
 
 use glam::{Mat3, Vec3};
 
-pub use super::bounds::projected_bounds;
 use crate::domain::place::{Heading, Pose};
 use crate::domain::{Point, Scene};
 

@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::bounds::Extent;
+use super::extent::Extent;
 use crate::domain::class::Shape;
 use crate::domain::place::{Cuboid, Heading};
 use crate::domain::scene::Fixture;
@@ -35,7 +35,7 @@ pub fn half_sides(facing: Heading, cuboid: &Cuboid) -> Vec3 {
 /// The open door of a fixture, hinged at its left edge. Its own x axis runs along the panel, its z axis out of the panel's
 /// face. `None` for what has no door.
 pub fn open_door(fixture: &Fixture) -> Option<Extent> {
-    if !matches!(fixture.class.name(), "Fridge" | "Microwave" | "Cabinet" | "Safe") {
+    if !fixture.class.info().door {
         return None;
     }
     let cuboid = fixture.body.first()?;
@@ -54,10 +54,10 @@ pub fn open_door(fixture: &Fixture) -> Option<Extent> {
 
 /// The open lid of a laptop, standing at its back edge. `None` for objects without one, or closed.
 pub fn open_lid(scene: &Scene, object: &Object) -> Option<Extent> {
-    if !object.open || object.class.name() != "Laptop" {
+    if !object.open || !object.class.info().lid {
         return None;
     }
-    let (_, size, _) = scene.shape_of(object);
+    let (_, size, _) = object.shape_in(scene);
     let half = Point::from(size).metres() / 2.0;
     let base = Extent::of_object(scene, object);
     let unit = Mat3::from_cols(

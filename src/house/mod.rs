@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod camera;
 pub mod doors;
 pub mod expert;
+pub mod extent;
 pub mod generate;
 pub mod goals;
 pub mod grading;

@@ -1,6 +1,5 @@
 //! Whether boards or rims of a receptacle itself hide a point in it from an eye. Cheap: what Put asks of every point it tries.
 
-use super::placing::is_tub;
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Fixture, Point};
 
@@ -10,11 +9,12 @@ const EDGE: i32 = 25;
 /// Whether the eye sees past the receptacle's own boards (shelves, top) or over its own rim to the point.
 pub fn in_sight(fixture: &Fixture, eye: Point, point: Point) -> bool {
     let Some(body) = fixture.body.first() else { return true };
-    if is_tub(fixture) {
+    let class = fixture.class.info();
+    if class.open_top {
         let opening = body.footprint().grown(-EDGE);
         return crossing(eye, point, body.max.y).is_none_or(|[x, z]| opening.contains(x, z));
     }
-    if !fixture.class.info().openable || fixture.class.name() == "Drawer" {
+    if !class.openable || class.slides {
         return true;
     }
     let board = board(body, fixture);

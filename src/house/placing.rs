@@ -12,7 +12,7 @@ pub const DRAWER_TRAVEL: i32 = 170;
 
 /// The outline that an object covers on the floor plan when its pivot is at `at`, turned by whole quarter turns.
 pub fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
-    let (_, size, offset) = scene.shape_of(object);
+    let (_, size, offset) = object.shape_in(scene);
     let yaw = i32::from(object.turn[1]);
     let (width, depth) = if (yaw + 450).rem_euclid(1800) >= 900 { (size[2], size[0]) } else { (size[0], size[2]) };
     let (right, ahead) = match (yaw + 450).rem_euclid(3600) / 900 {
@@ -73,47 +73,47 @@ pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance)
             let eye = world.agent.cell.centre(scene.camera_y());
             let middle = object_height(scene, object) / 2 - object.class.info().rest;
             let seen = |at: Point| in_sight(fixture, eye, Point::new(at.x - shift.x, at.y + middle, at.z - shift.z));
-            let fits = |level: usize, at: Point, pass: Pass, wants_sight: bool| {
+            let fits = |level: usize, at: Point, demand: Demand, wants_sight: bool| {
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
                 let same_level = |y: i32| (y - surface.height).abs() < 250 || fixture.surfaces.len() == 1;
                 let (x, z) = (at.x - shift.x, at.z - shift.z);
-                let on = |area: &Rect| match pass {
-                    Pass::Inside => away_from_walls(fixture, area).contains(x, z),
-                    Pass::Whole => area.grown(RASTER).contains(x, z),
-                    Pass::Pivot | Pass::Heap => true,
+                let on = |area: &Rect| match demand {
+                    Demand::Inside => away_from_walls(fixture, area).contains(x, z),
+                    Demand::Whole => area.grown(RASTER).contains(x, z),
+                    Demand::Pivot | Demand::Heap => true,
                 };
-                let free = |other: &Rect| match pass {
-                    Pass::Heap => true,
-                    Pass::Pivot => !other.contains(at.x, at.z),
-                    Pass::Inside | Pass::Whole => !overlap(&ground, other),
+                let free = |other: &Rect| match demand {
+                    Demand::Heap => true,
+                    Demand::Pivot => !other.contains(at.x, at.z),
+                    Demand::Inside | Demand::Whole => !overlap(&ground, other),
                 };
                 surface.areas.iter().any(on)
                     && taken.iter().filter(|(y, _)| same_level(*y)).all(|(_, other)| free(other))
                     && (!wants_sight || seen(at))
             };
-            let passes = [
-                (Pass::Inside, true),
-                (Pass::Whole, true),
-                (Pass::Inside, false),
-                (Pass::Whole, false),
-                (Pass::Pivot, false),
-                (Pass::Heap, false),
+            let demands = [
+                (Demand::Inside, true),
+                (Demand::Whole, true),
+                (Demand::Inside, false),
+                (Demand::Whole, false),
+                (Demand::Pivot, false),
+                (Demand::Heap, false),
             ];
             let walled = has_walls(fixture);
             // Without walls nothing hides a place, and no place is away from them.
-            let passes = passes.into_iter().filter(|&(pass, sight)| walled || !sight && pass != Pass::Inside);
-            let heaps = fixture.class.name() == "GarbageCan";
-            let passes = passes.filter(|&(pass, _)| heaps || pass != Pass::Heap);
-            let first = |(pass, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, pass, sight));
-            passes.filter_map(first).map(|&(_, _, at)| at).next()
+            let demands = demands.into_iter().filter(|&(demand, sight)| walled || !sight && demand != Demand::Inside);
+            let heaps = fixture.class.info().heaps;
+            let demands = demands.filter(|&(demand, _)| heaps || demand != Demand::Heap);
+            let first = |(demand, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, demand, sight));
+            demands.filter_map(first).map(|&(_, _, at)| at).next()
         }
     }
 }
 
-/// How hard a place is to please, hardest first.
+/// What is asked of a free place, most first.
 #[derive(Clone, Copy, PartialEq)]
-enum Pass {
+enum Demand {
     /// Away from the walls, and all of the object free.
     Inside,
     /// All of the object free.
@@ -126,12 +126,7 @@ enum Pass {
 
 /// Whether walls stand around what lies in it.
 fn has_walls(fixture: &Fixture) -> bool {
-    fixture.class.info().openable || is_tub(fixture)
-}
-
-/// Whether it is open above and its contents lie inside.
-pub fn is_tub(fixture: &Fixture) -> bool {
-    matches!(fixture.class.name(), "Sink" | "Bathtub" | "GarbageCan")
+    fixture.class.info().openable || fixture.class.info().open_top
 }
 
 /// The middle third of a surface; behind a door all of its depth.
@@ -139,7 +134,7 @@ fn away_from_walls(fixture: &Fixture, area: &Rect) -> Rect {
     let across_x = fixture.facing.step().0 == 0;
     let mut middle = *area;
     for (axis, across) in [(0, across_x), (1, !across_x)] {
-        if across || is_tub(fixture) {
+        if across || fixture.class.info().open_top {
             let third = (area.max[axis] - area.min[axis]) / 3;
             middle.min[axis] += third;
             middle.max[axis] -= third;
@@ -149,7 +144,7 @@ fn away_from_walls(fixture: &Fixture, area: &Rect) -> Rect {
 }
 
 fn object_height(scene: &Scene, object: &Object) -> i32 {
-    scene.shape_of(object).1[1]
+    object.shape_in(scene).1[1]
 }
 
 /// The points of the 5 cm raster in a rectangle; its middle when it is smaller than that.
@@ -166,7 +161,7 @@ fn raster(area: &Rect) -> impl Iterator<Item = (i32, i32)> + use<> {
 /// How far a fixture's contents move when it is opened: drawers slide, doors do not.
 pub fn drawer_shift(scene: &Scene, fixture: u16) -> Point {
     match scene.fixture(fixture) {
-        Some(fixture) if fixture.class.name() == "Drawer" => {
+        Some(fixture) if fixture.class.info().slides => {
             let (dx, dz) = fixture.facing.step();
             Point::new(i32::from(dx) * DRAWER_TRAVEL, 0, i32::from(dz) * DRAWER_TRAVEL)
         }

@@ -2,6 +2,7 @@
 
 use super::outcome::{Outcome, Reason};
 use super::placing;
+use crate::domain::class::Effect;
 use crate::domain::place::Pose;
 use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Action, ActionType, Class, Point, Scene};
@@ -124,7 +125,7 @@ fn interact(scene: &Scene, world: &mut World, kind: ActionType, target: Instance
         (ActionType::Open, _) => set_open(scene, world, target, true),
         (ActionType::Close, _) => {
             set_open(scene, world, target, false);
-            if class.name() == "Fridge" {
+            if class.info().effect == Some(Effect::Cool) {
                 change_contents(world, target, |object| object.cold = true);
             }
         }
@@ -158,20 +159,20 @@ fn set_open(scene: &Scene, world: &mut World, target: Instance, open: bool) {
 
 fn toggle_on(scene: &Scene, world: &mut World, index: u16, class: Class) {
     world.fixtures[usize::from(index)].on = true;
-    match class.name() {
-        "Microwave" => change_contents(world, Instance::Fixture(index), |object| object.hot = true),
-        "Faucet" => {
+    match class.info().effect {
+        Some(Effect::Heat) => change_contents(world, Instance::Fixture(index), |object| object.hot = true),
+        Some(Effect::Rinse) => {
             if let Some(basin) = nearest_basin(scene, scene.fixtures[usize::from(index)].pivot) {
                 change_contents(world, basin, |object| object.clean = true);
             }
         }
-        _ => {}
+        Some(Effect::Cool) | None => {}
     }
 }
 
 /// The sink basin that a faucet at `pivot` runs into.
 pub fn nearest_basin(scene: &Scene, pivot: Point) -> Option<Instance> {
-    let basins = (0u16..).zip(&scene.fixtures).filter(|(_, fixture)| fixture.class.name() == "Sink");
+    let basins = (0u16..).zip(&scene.fixtures).filter(|(_, fixture)| fixture.class.info().basin);
     let nearest = basins.min_by(|(_, a), (_, b)| a.pivot.distance(pivot).total_cmp(&b.pivot.distance(pivot)));
     nearest.map(|(index, _)| Instance::Fixture(index))
 }
@@ -190,7 +191,7 @@ fn slice(scene: &Scene, world: &mut World, index: u16, class: Class) {
     let mut slices = Vec::with_capacity(usize::from(count));
     for part in 1..=count {
         let mut slice = Object { slice_of: Some((index, part)), ..whole.clone() };
-        let [thickness, height, _] = scene.shape_of(&slice).1;
+        let [thickness, height, _] = slice.shape_in(scene).1;
         // Twice the signed place in the row, so that an even count stays centred in whole numbers.
         let along = (2 * i32::from(part) - i32::from(count) - 1) * thickness / 2;
         let (dx, dz) = match (i32::from(whole.turn[1]) + 450).rem_euclid(3600) / 900 {

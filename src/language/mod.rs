@@ -6,7 +6,9 @@ pub mod nouns;
 pub mod passage;
 pub mod phrases;
 pub mod rules;
+pub mod story;
 pub mod summary;
 pub mod vocabulary;
 
 mod outcome;
+mod place_slots;

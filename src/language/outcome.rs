@@ -1,6 +1,6 @@
 //! Outcomes: what a chain of subtasks comes to.
 
-use super::phrases::Story;
+use super::story::Story;
 use crate::domain::skill::SkillKind;
 
 /// What is different in the end.

@@ -4,20 +4,11 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::grammar::{Slots, grammar, with_article};
+use super::place_slots::{destination_slots, origin_slots};
+use super::story::Story;
 use super::summary;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::{Class, Instance, Parent, Scene, World};
-
-/// What is known of a task when it is put into words.
-#[derive(Clone, Copy, Debug)]
-pub struct Story<'a> {
-    /// The parts that instances play.
-    pub roles: &'a [Role],
-    /// The steps, in order.
-    pub subtasks: &'a [Subtask],
-    /// For each role, the class of the receptacle in which its instance lies at the start; may be shorter than the roles.
-    pub origins: &'a [Option<Class>],
-}
 
 /// An instruction for a whole chain.
 pub fn instruction(roles: &[Role], subtasks: &[Subtask], rng: &mut ChaCha8Rng) -> String {
@@ -81,48 +72,6 @@ impl Story<'_> {
         text
     }
 
-    /// The role's class.
-    pub(super) fn class(&self, role: u8) -> Class {
-        self.roles.get(usize::from(role)).map_or(Class::NONE, |role| role.class)
-    }
-
-    /// Whether two roles ask for the same: one class, whole or sliced.
-    pub(super) fn alike(&self, a: u8, b: u8) -> bool {
-        let asked = |role: u8| self.roles.get(usize::from(role)).map(|role| (role.class, role.slice));
-        asked(a) == asked(b)
-    }
-
-    /// Whether the role is a slice.
-    pub(super) fn is_slice(&self, role: u8) -> bool {
-        self.roles.get(usize::from(role)).is_some_and(|role| role.slice)
-    }
-
-    /// The thing with an article, as one speaks of it at a step: "the mug", "a slice of bread", "another potato".
-    pub(super) fn thing(&self, role: u8, step: usize, rng: &mut ChaCha8Rng) -> String {
-        let class = self.class(role);
-        let before = &self.subtasks[..step.min(self.subtasks.len())];
-        let mut named = before.iter().flat_map(|subtask| std::iter::once(subtask.object).chain(subtask.receptacle));
-        let is_known = named.clone().any(|other| other == role);
-        let is_second = !is_known && named.any(|other| self.alike(other, role));
-        let noun = match (self.is_slice(role), rng.random_range(0..4)) {
-            (true, 0) => format!("{} slice", class.spoken()),
-            (true, 1) => format!("piece of {}", class.spoken()),
-            (true, _) => format!("slice of {}", class.spoken()),
-            (false, _) => grammar().name(class, rng).to_string(),
-        };
-        if is_second {
-            let which = ["another", "another", "the other", "a second", "one more"][rng.random_range(0..5u32) as usize];
-            return format!("{which} {noun}");
-        }
-        // Only what can be carried comes in such numbers that any one will do.
-        let any_will_do = class.info().pickupable && !is_known && rng.random_bool(0.3);
-        match (any_will_do, self.is_slice(role)) {
-            (true, true) => with_article(&noun),
-            (true, false) => grammar().one(class),
-            (false, _) => format!("the {noun}"),
-        }
-    }
-
     /// A clause for one step, without a capital or a full stop.
     fn clause(&self, step: usize, as_it: bool, rng: &mut ChaCha8Rng) -> String {
         let subtask = &self.subtasks[step];
@@ -164,12 +113,6 @@ impl Story<'_> {
             if rng.random_bool(0.4) { with_article(name) } else { format!("the {name}") }
         })
     }
-
-    /// Whether the step before leaves its object in the hand.
-    pub(super) fn holds_before(&self, step: usize) -> bool {
-        let holding = [SkillKind::Pickup, SkillKind::Clean, SkillKind::Heat, SkillKind::Cool];
-        step > 0 && holding.contains(&self.subtasks[step - 1].skill)
-    }
 }
 
 fn rule(skill: SkillKind) -> &'static str {
@@ -182,35 +125,6 @@ fn rule(skill: SkillKind) -> &'static str {
         SkillKind::Heat => "heat",
         SkillKind::Cool => "cool",
     }
-}
-
-/// "the counter" and what goes with it, for where a thing is.
-fn origin_slots(origin: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, String)> {
-    let place = format!("the {}", grammar().name(origin, rng));
-    let at = origin.preposition();
-    let from = match (at, rng.random_bool(0.5)) {
-        ("in", true) => "out of",
-        ("on", true) => "off",
-        _ => "from",
-    };
-    let mut slots = vec![("from", format!("{from} {place}")), ("at", format!("{at} {place}"))];
-    if origin.info().openable {
-        slots.push(("shut", place.clone()));
-    }
-    slots.push(("place", place));
-    slots
-}
-
-/// "the counter" and what goes with it, for where a thing goes.
-pub(super) fn destination_slots(class: Class, rng: &mut ChaCha8Rng) -> Vec<(&'static str, String)> {
-    let name = grammar().name(class, rng);
-    let dest = if class.info().pickupable && rng.random_bool(0.3) { with_article(name) } else { format!("the {name}") };
-    let mut slots = vec![("to", format!("{} {dest}", class.preposition()))];
-    if class.info().openable && !class.info().pickupable {
-        slots.push(("inside", dest.clone()));
-    }
-    slots.push(("dest", dest));
-    slots
 }
 
 /// Manners, capitals and full stops as people type them.

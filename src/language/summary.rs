@@ -5,7 +5,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::grammar::{Slots, grammar, with_article};
 use super::outcome::{Outcome, outcomes};
-use super::phrases::{Story, destination_slots};
+use super::place_slots::destination_slots;
+use super::story::Story;
 use crate::domain::skill::SkillKind;
 
 /// The chain's outcomes, told together.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
 
 use super::encoder_stack::{LayerNames, Norm, Shelf, Stack, padding_bias};
-use super::transformer::TransformerConfig;
+use super::transformer_config::TransformerConfig;
 use super::weights::Form;
 
 const NAMES: LayerNames = LayerNames {

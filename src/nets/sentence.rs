@@ -11,7 +11,8 @@ use tokenizers::{Encoding, Tokenizer};
 
 use super::home;
 use super::pooling::Pooling;
-use super::transformer::{Transformer, TransformerConfig};
+use super::transformer::Transformer;
+use super::transformer_config::TransformerConfig;
 
 /// The files of the default encoder whose contents set-up vouches for, with their sha256.
 const DEFAULT_FILES: [(&str, &str); 2] = [

@@ -6,7 +6,7 @@ use crate::domain::place::{Cuboid, Pose};
 use crate::domain::scene::Surface;
 use crate::domain::world::{FixtureState, Instance};
 use crate::domain::{Cell, Fixture, Point, Scene, World};
-use crate::house::camera::projected_bounds;
+use crate::house::bounds::projected_bounds;
 
 /// How far a side moves at a time, in millimetres, from coarse to fine.
 const STEPS: [i32; 5] = [160, 80, 40, 20, 10];

@@ -8,7 +8,7 @@ use crate::domain::place::Pose;
 use crate::domain::scene::Mesh;
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Class, Object, Room, Scene, World};
-use crate::house::camera::projected_bounds;
+use crate::house::bounds::projected_bounds;
 
 /// How much a length changes at a time, as a share of it, from coarse to fine.
 const STEPS: [f32; 4] = [0.3, 0.15, 0.07, 0.03];

@@ -1,6 +1,7 @@
 //! The expert: shortest paths and interactions for any task in any scene, from any state.
 
 pub mod demonstrate;
+pub mod no_way;
 pub mod paths;
 pub mod plan;
 pub mod stands;
@@ -14,35 +15,13 @@ use super::session::House;
 use super::view;
 use crate::domain::{Action, ActionType, Pose, Scene, World};
 pub use demonstrate::{ExpertStep, Unfinished, demonstrate};
+use no_way::NoWay;
 use paths::{Floor, Paths, Turning};
 use plan::Intent;
 use stands::{Scout, Stand, WELL_SEEN};
 
 /// How far the expert goes out of its way to shut what stands open, in steps.
 const TIDY_STEPS: u32 = 3;
-
-/// Why the expert cannot go on.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoWay {
-    /// There is nothing left to do.
-    #[error("every subtask is done")]
-    Finished,
-    /// The strict grader will not credit anything any more.
-    #[error("the whole goal is met: strict grading credits nothing more")]
-    CutShort,
-    /// No thing would serve, or none would take what is held.
-    #[error("there is no way to {subtask}: nothing here would serve for it")]
-    Nothing {
-        /// What was to be done, in words.
-        subtask: String,
-    },
-    /// The things are there, but cannot be used from anywhere.
-    #[error("there is no way to {subtask}: no place from which the agent sees and reaches what it needs")]
-    NoStand {
-        /// What was to be done, in words.
-        subtask: String,
-    },
-}
 
 /// How an expert goes about what can be done in several equally good ways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@
 
 use super::super::grading::{Grader, describe};
 use super::super::rules;
-use super::NoWay;
-use super::stands::all_instances;
+use super::no_way::NoWay;
+use crate::domain::class::Effect;
 use crate::domain::skill::{SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Scene, World};
@@ -63,7 +63,7 @@ pub fn left_open(scene: &Scene, world: &World, intent: &Intent) -> Vec<Aim> {
         if world.is_open(fixture) {
             return Some(Aim::new(ActionType::Close, fixture, 0));
         }
-        let runs = world.is_on(fixture) && matches!(class.name(), "Faucet" | "Microwave");
+        let runs = world.is_on(fixture) && matches!(class.info().effect, Some(Effect::Heat | Effect::Rinse));
         runs.then_some(Aim::new(ActionType::ToggleOff, fixture, 0))
     })
     .collect()
@@ -117,10 +117,12 @@ impl Plan<'_> {
         self.held().filter(|&held| self.fits(held))
     }
 
-    fn of_class(&self, name: &str) -> Vec<Instance> {
+    fn with_effect(&self, effect: Effect) -> Vec<Instance> {
         let fixtures = (0..self.scene.fixtures.len() as u16).map(Instance::Fixture);
         fixtures
-            .filter(|&fixture| self.world.class_of(self.scene, fixture).is_some_and(|class| class.name() == name))
+            .filter(|&fixture| {
+                self.world.class_of(self.scene, fixture).is_some_and(|class| class.info().effect == Some(effect))
+            })
             .collect()
     }
 
@@ -140,7 +142,7 @@ impl Plan<'_> {
             let kind = if self.world.is_open(shut) { ActionType::Close } else { ActionType::Open };
             return self.any(vec![Aim::new(kind, shut, 0)]);
         }
-        let open = all_instances(self.scene, self.world).filter(|&instance| self.allowed(ActionType::Close, instance));
+        let open = self.world.instances(self.scene).filter(|&instance| self.allowed(ActionType::Close, instance));
         self.any(open.map(|instance| Aim::new(ActionType::Close, instance, 0)).collect())
     }
 
@@ -190,7 +192,7 @@ impl Plan<'_> {
     /// Frees the hand at whatever takes the thing, where people keep such things if it is no detour.
     fn put_down(&self, held: Instance) -> Result<Intent, NoWay> {
         let content = self.world.class_of(self.scene, held).unwrap_or_default();
-        let aims = all_instances(self.scene, self.world).filter_map(|receptacle| {
+        let aims = self.world.instances(self.scene).filter_map(|receptacle| {
             let class = self.world.class_of(self.scene, receptacle)?;
             if !class.info().receptacle || !self.is_named(receptacle) {
                 return None;
@@ -228,7 +230,9 @@ impl Plan<'_> {
             return self.fetch(&self.fitting_objects(), 1);
         }
         let role = self.subtask.receptacle.ok_or_else(|| self.no_way())?;
-        let fitting: Vec<Instance> = all_instances(self.scene, self.world)
+        let fitting: Vec<Instance> = self
+            .world
+            .instances(self.scene)
             .filter(|&instance| self.grader.fits(self.scene, self.world, role, instance))
             .filter(|&instance| !matches!(instance, Instance::Object(index) if self.world.in_hand(index)))
             .collect();
@@ -260,7 +264,7 @@ impl Plan<'_> {
     }
 
     fn toggle(&self) -> Result<Intent, NoWay> {
-        let lamps: Vec<Instance> = all_instances(self.scene, self.world).filter(|&lamp| self.fits(lamp)).collect();
+        let lamps: Vec<Instance> = self.world.instances(self.scene).filter(|&lamp| self.fits(lamp)).collect();
         if lamps.iter().any(|&lamp| self.world.is_on(lamp)) {
             return Ok(Intent::default());
         }
@@ -268,7 +272,7 @@ impl Plan<'_> {
     }
 
     fn clean(&self) -> Result<Intent, NoWay> {
-        let faucets = self.of_class("Faucet");
+        let faucets = self.with_effect(Effect::Rinse);
         let basin = |faucet: Instance| match faucet {
             Instance::Fixture(index) => {
                 self.scene.fixture(index).and_then(|fixture| rules::nearest_basin(self.scene, fixture.pivot))
@@ -317,7 +321,7 @@ impl Plan<'_> {
 
     fn heat(&self) -> Result<Intent, NoWay> {
         self.change_in(
-            "Microwave",
+            Effect::Heat,
             |object| object.hot,
             |plan, oven, object, hot| {
                 let (open, on) = (plan.world.is_open(oven), plan.world.is_on(oven));
@@ -335,7 +339,7 @@ impl Plan<'_> {
 
     fn cool(&self) -> Result<Intent, NoWay> {
         self.change_in(
-            "Fridge",
+            Effect::Cool,
             |object| object.cold,
             |plan, fridge, object, cold| match (cold, plan.world.is_open(fridge)) {
                 (true, true) => Aim::new(ActionType::Pickup, object, 1),
@@ -349,12 +353,12 @@ impl Plan<'_> {
     /// Heating and cooling: into the machine, out of it again when it has worked, and its door closed.
     fn change_in(
         &self,
-        machine: &str,
+        effect: Effect,
         is_changed: impl Fn(&crate::domain::Object) -> bool,
         inside: impl Fn(&Self, Instance, Instance, bool) -> Aim,
     ) -> Result<Intent, NoWay> {
         let changed = |instance: Instance| matches!(instance, Instance::Object(index) if self.world.object(index).is_some_and(&is_changed));
-        let machines = self.of_class(machine);
+        let machines = self.with_effect(effect);
         let intent = match self.held_fits() {
             Some(held) if changed(held) => {
                 let open: Vec<Instance> = machines.iter().copied().filter(|&it| self.world.is_open(it)).collect();

@@ -4,8 +4,9 @@ use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
 
-use super::super::bounds::Extent;
-use super::super::camera::{Camera, projected_bounds};
+use super::super::bounds::projected_bounds;
+use super::super::camera::Camera;
+use super::super::extent::Extent;
 use super::super::render::Renderer;
 use super::super::session::House;
 use super::super::view::{self, REACH, View};
@@ -190,7 +191,8 @@ fn propose(
     stands: &mut Vec<Stand>,
 ) {
     let class = world.class_of(scene, aim.target);
-    let rivals: Vec<Instance> = all_instances(scene, world)
+    let rivals: Vec<Instance> = world
+        .instances(scene)
         .filter(|&other| other != aim.target && world.class_of(scene, other) == class)
         .filter(|&other| rules::check(scene, world, Action::interact(aim.kind, other)).is_ok())
         .collect();
@@ -264,12 +266,6 @@ fn every_pose(
             }
         }
     }
-}
-
-/// Every instance of a world.
-pub fn all_instances(scene: &Scene, world: &World) -> impl Iterator<Item = Instance> {
-    let objects = (0..world.objects.len() as u16).map(Instance::Object);
-    objects.chain((0..scene.fixtures.len() as u16).map(Instance::Fixture))
 }
 
 fn places_in_reach(scene: &Scene, world: &World, instance: Instance, cell: Cell) -> Vec<Vec3> {

@@ -167,7 +167,7 @@ fn lay(scene: &Scene, space: &mut Space, object: &Object, holder: usize, rng: &m
         parent: Parent::In(Instance::Fixture(holder as u16)),
         ..object.clone()
     };
-    let (_, size, offset) = scene.shape_of(&object);
+    let (_, size, offset) = object.shape_in(scene);
     let ground = outline(scene, &object, at);
     let (low, high) = (at.y + offset[1] - size[1] / 2, at.y + offset[1] + size[1] / 2);
     let ceiling = space.ceilings[holder][level];
@@ -224,7 +224,7 @@ fn on_floor(floor: &Floor, scene: &Scene, space: &mut Space, object: Object, rng
         let deep = (shape.max[across] - shape.min[across]) / 2 + 5;
         let at = wall.site.point(rng.random_range(half..=wall.length - half), object.class.info().rest, deep);
         let ground = outline(scene, &object, at);
-        let (_, size, offset) = scene.shape_of(&object);
+        let (_, size, offset) = object.shape_in(scene);
         let (low, high) = (at.y + offset[1] - size[1] / 2, at.y + offset[1] + size[1] / 2);
         let walked = floor.cells().iter().any(|cell| {
             let centre = cell.centre(0);

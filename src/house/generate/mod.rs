@@ -100,7 +100,7 @@ mod tests {
 
     /// (low, high) of an object.
     fn extent(scene: &Scene, object: &Object) -> (i32, i32) {
-        let (_, size, offset) = scene.shape_of(object);
+        let (_, size, offset) = object.shape_in(scene);
         (object.at.y + offset[1] - size[1] / 2, object.at.y + offset[1] + size[1] / 2)
     }
 

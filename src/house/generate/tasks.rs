@@ -14,7 +14,8 @@ use crate::domain::{ActionType, Heading, Pose, Scene, Task, World};
 use crate::house::House;
 use crate::house::expert::Expert;
 use crate::house::grading::{Grader, Grading};
-use crate::language::phrases::{Story, origins};
+use crate::language::phrases::origins;
+use crate::language::story::Story;
 
 /// How many chains are drawn before a house is given up for a length.
 const DRAWS: usize = 60;

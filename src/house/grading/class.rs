@@ -1,6 +1,7 @@
 //! Grading by class: a subtask asks for classes, and what the agent chose is bound to the role it plays.
 
-use super::{Grader, Pending, Step, Verdict};
+use super::grader::{GradedStep, Grader, Pending, SubtaskVerdict};
+use crate::domain::class::Effect;
 use crate::domain::skill::{SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Scene, World};
@@ -42,7 +43,7 @@ fn may_be_cut_from(grader: &Grader, class: crate::domain::Class, whole: Instance
 }
 
 /// Grades one step of the current subtask.
-pub(super) fn grade(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
+pub(super) fn grade(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
     if let Some(pending) = grader.pending {
         return second_half(grader, subtask, pending, step);
     }
@@ -57,7 +58,7 @@ pub(super) fn grade(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> V
         {
             holds_changed(grader, subtask, step)
         }
-        SkillKind::Clean | SkillKind::Heat | SkillKind::Cool => Verdict::Unchanged,
+        SkillKind::Clean | SkillKind::Heat | SkillKind::Cool => SubtaskVerdict::Unchanged,
     }
 }
 
@@ -68,29 +69,29 @@ fn bind(grader: &mut Grader, role: u8, instance: Instance) {
 }
 
 /// The object in the hand, if it may play the role.
-fn held(grader: &Grader, role: u8, step: Step<'_>) -> Option<Instance> {
+fn held(grader: &Grader, role: u8, step: GradedStep<'_>) -> Option<Instance> {
     let held = Instance::Object(step.world.held?);
     fits(grader, step.scene, step.world, role, held).then_some(held)
 }
 
 /// Complete, or half done while something still has to be closed.
-fn complete_or_close(subtask: &Subtask, shut: Option<Instance>, step: Step<'_>) -> Verdict {
+fn complete_or_close(subtask: &Subtask, shut: Option<Instance>, step: GradedStep<'_>) -> SubtaskVerdict {
     match shut.filter(|&shut| subtask.closes && step.world.is_open(shut)) {
-        Some(shut) => Verdict::Half(Pending { shut: Some(shut) }),
-        None => Verdict::Complete,
+        Some(shut) => SubtaskVerdict::Half(Pending { shut: Some(shut) }),
+        None => SubtaskVerdict::Complete,
     }
 }
 
-fn pickup(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
+fn pickup(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
     let may = step.did(ActionType::Pickup) || subtask.closes && step.did(ActionType::Close);
-    let Some(held) = held(grader, subtask.object, step).filter(|_| may) else { return Verdict::Unchanged };
+    let Some(held) = held(grader, subtask.object, step).filter(|_| may) else { return SubtaskVerdict::Unchanged };
     bind(grader, subtask.object, held);
     let shut = step.did(ActionType::Pickup).then(|| came_from(grader, held, step)).flatten();
     complete_or_close(subtask, shut, step)
 }
 
 /// The openable fixture out of which an object was just taken.
-fn came_from(grader: &Grader, taken: Instance, step: Step<'_>) -> Option<Instance> {
+fn came_from(grader: &Grader, taken: Instance, step: GradedStep<'_>) -> Option<Instance> {
     let Instance::Object(index) = taken else { return None };
     if let Some(before) = &grader.before {
         return before.inside.get(usize::from(index)).copied().flatten();
@@ -105,14 +106,14 @@ fn came_from(grader: &Grader, taken: Instance, step: Step<'_>) -> Option<Instanc
     })
 }
 
-fn put(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
+fn put(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
     let Some(receptacle_role) = subtask.receptacle.filter(|_| step.did(ActionType::Put)) else {
-        return Verdict::Unchanged;
+        return SubtaskVerdict::Unchanged;
     };
-    let Some(object) = put_object(grader, subtask.object, step) else { return Verdict::Unchanged };
+    let Some(object) = put_object(grader, subtask.object, step) else { return SubtaskVerdict::Unchanged };
     let mut holders = step.world.containers_of(object);
     let Some(holder) = holders.find(|&holder| fits(grader, step.scene, step.world, receptacle_role, holder)) else {
-        return Verdict::Unchanged;
+        return SubtaskVerdict::Unchanged;
     };
     bind(grader, subtask.object, object);
     bind(grader, receptacle_role, holder);
@@ -120,7 +121,7 @@ fn put(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
 }
 
 /// The openable fixture that a receptacle is, or is in.
-fn shell_or_self(step: Step<'_>, receptacle: Instance) -> Option<Instance> {
+fn shell_or_self(step: GradedStep<'_>, receptacle: Instance) -> Option<Instance> {
     if openable_fixture(step.scene, receptacle) {
         return Some(receptacle);
     }
@@ -128,7 +129,7 @@ fn shell_or_self(step: Step<'_>, receptacle: Instance) -> Option<Instance> {
 }
 
 /// What plays the role of the thing put down: the bound object, else what the hand has just let go.
-fn put_object(grader: &Grader, role: u8, step: Step<'_>) -> Option<Instance> {
+fn put_object(grader: &Grader, role: u8, step: GradedStep<'_>) -> Option<Instance> {
     if let Some(bound) = grader.binding(role) {
         return Some(bound);
     }
@@ -143,52 +144,54 @@ fn put_object(grader: &Grader, role: u8, step: Step<'_>) -> Option<Instance> {
     }
 }
 
-fn slice(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
+fn slice(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
     let is_cut = |instance: &Instance| {
         matches!(instance, Instance::Object(index) if step.world.object(*index).is_some_and(|object| object.sliced))
             && fits(grader, step.scene, step.world, subtask.object, *instance)
     };
     let just_cut = step.action.target.filter(|_| step.did(ActionType::Slice));
     let all = (0..step.world.objects.len() as u16).map(Instance::Object);
-    let Some(cut) = just_cut.into_iter().chain(all).find(is_cut) else { return Verdict::Unchanged };
+    let Some(cut) = just_cut.into_iter().chain(all).find(is_cut) else { return SubtaskVerdict::Unchanged };
     bind(grader, subtask.object, cut);
     let shut = shell(step.scene, step.world, cut);
     complete_or_close(subtask, shut, step)
 }
 
-fn toggle(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
+fn toggle(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
     let shines =
         |lamp: &Instance| step.world.is_on(*lamp) && fits(grader, step.scene, step.world, subtask.object, *lamp);
     let just_lit = step.action.target.filter(|_| step.did(ActionType::ToggleOn));
     let all = (0..step.scene.fixtures.len() as u16).map(Instance::Fixture);
-    let Some(lamp) = just_lit.into_iter().chain(all).find(shines) else { return Verdict::Unchanged };
+    let Some(lamp) = just_lit.into_iter().chain(all).find(shines) else { return SubtaskVerdict::Unchanged };
     bind(grader, subtask.object, lamp);
-    Verdict::Complete
+    SubtaskVerdict::Complete
 }
 
-fn holds_changed(grader: &mut Grader, subtask: &Subtask, step: Step<'_>) -> Verdict {
-    let Some(held) = held(grader, subtask.object, step) else { return Verdict::Unchanged };
-    let Some(object) = step.world.held.and_then(|index| step.world.object(index)) else { return Verdict::Unchanged };
+fn holds_changed(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
+    let Some(held) = held(grader, subtask.object, step) else { return SubtaskVerdict::Unchanged };
+    let Some(object) = step.world.held.and_then(|index| step.world.object(index)) else {
+        return SubtaskVerdict::Unchanged;
+    };
     let changed = match subtask.skill {
         SkillKind::Clean => object.clean,
         SkillKind::Heat => object.hot,
         _ => object.cold && !(subtask.closes && a_fridge_is_open(step)),
     };
     if !changed {
-        return Verdict::Unchanged;
+        return SubtaskVerdict::Unchanged;
     }
     bind(grader, subtask.object, held);
-    Verdict::Complete
+    SubtaskVerdict::Complete
 }
 
-fn a_fridge_is_open(step: Step<'_>) -> bool {
+fn a_fridge_is_open(step: GradedStep<'_>) -> bool {
     let fixtures = (0u16..).zip(&step.scene.fixtures);
-    let mut fridges = fixtures.filter(|(_, fixture)| fixture.class.name() == "Fridge");
+    let mut fridges = fixtures.filter(|(_, fixture)| fixture.class.info().effect == Some(Effect::Cool));
     fridges.any(|(index, _)| step.world.is_open(Instance::Fixture(index)))
 }
 
 /// After the first half: still so, and now closed.
-fn second_half(grader: &Grader, subtask: &Subtask, pending: Pending, step: Step<'_>) -> Verdict {
+fn second_half(grader: &Grader, subtask: &Subtask, pending: Pending, step: GradedStep<'_>) -> SubtaskVerdict {
     let (world, object) = (step.world, grader.binding(subtask.object));
     let still = match subtask.skill {
         SkillKind::Pickup => object.is_some() && world.held.map(Instance::Object) == object,
@@ -199,8 +202,8 @@ fn second_half(grader: &Grader, subtask: &Subtask, pending: Pending, step: Step<
         _ => true,
     };
     if !still {
-        return Verdict::Undone;
+        return SubtaskVerdict::Undone;
     }
     let closed = pending.shut.is_none_or(|shut| !world.is_open(shut));
-    if step.did(ActionType::Close) && closed { Verdict::Complete } else { Verdict::Unchanged }
+    if step.did(ActionType::Close) && closed { SubtaskVerdict::Complete } else { SubtaskVerdict::Unchanged }
 }

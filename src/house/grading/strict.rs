@@ -1,6 +1,7 @@
 //! Strict grading: the released reward code taken literally, for comparison with published numbers.
 
-use super::{Grader, Pending, Step, Verdict};
+use super::grader::{GradedStep, Grader, Pending, SubtaskVerdict};
+use crate::domain::class::Effect;
 use crate::domain::skill::{Literal, Original, SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, World};
@@ -33,10 +34,10 @@ fn own_interactions(skill: SkillKind) -> &'static [ActionType] {
 }
 
 /// Grades one step of the current subtask.
-pub(super) fn grade(grader: &Grader, subtask: &Subtask, literal: &Literal, step: Step<'_>) -> Verdict {
+pub(super) fn grade(grader: &Grader, subtask: &Subtask, literal: &Literal, step: GradedStep<'_>) -> SubtaskVerdict {
     let kind = step.action.kind;
     if kind.is_interaction() && !own_interactions(subtask.skill).contains(&kind) {
-        return Verdict::Unchanged;
+        return SubtaskVerdict::Unchanged;
     }
     let world = step.world;
     let object = resolve(world, literal.object);
@@ -61,13 +62,15 @@ pub(super) fn grade(grader: &Grader, subtask: &Subtask, literal: &Literal, step:
     };
     let two_halves = matches!(subtask.skill, SkillKind::Pickup | SkillKind::Put | SkillKind::Slice);
     if !met || !literal.needs_close || !two_halves {
-        return if met { Verdict::Complete } else { Verdict::Unchanged };
+        return if met { SubtaskVerdict::Complete } else { SubtaskVerdict::Unchanged };
     }
     let shut = literal.last_target.and_then(|target| resolve(world, target));
     match grader.pending {
-        None => Verdict::Half(Pending { shut }),
-        Some(_) if step.did(ActionType::Close) && shut.is_none_or(|shut| !world.is_open(shut)) => Verdict::Complete,
-        Some(_) => Verdict::Unchanged,
+        None => SubtaskVerdict::Half(Pending { shut }),
+        Some(_) if step.did(ActionType::Close) && shut.is_none_or(|shut| !world.is_open(shut)) => {
+            SubtaskVerdict::Complete
+        }
+        Some(_) => SubtaskVerdict::Unchanged,
     }
 }
 
@@ -86,7 +89,7 @@ fn any_part_clean(world: &World, whole: Instance) -> bool {
     (0u16..).zip(&world.objects).any(|(index, object)| object.clean && Instance::Object(root(world, index)) == whole)
 }
 
-fn first_fridge_closed(step: Step<'_>) -> bool {
-    let fridge = step.scene.fixtures.iter().position(|fixture| fixture.class.name() == "Fridge");
+fn first_fridge_closed(step: GradedStep<'_>) -> bool {
+    let fridge = step.scene.fixtures.iter().position(|fixture| fixture.class.info().effect == Some(Effect::Cool));
     fridge.is_none_or(|index| !step.world.is_open(Instance::Fixture(index as u16)))
 }

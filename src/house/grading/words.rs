@@ -1,6 +1,7 @@
 //! What graders say: a subtask in words, and what it still waits for.
 
-use super::{Grader, Grading};
+use super::grader::{Grader, Grading};
+use super::role_fit;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{Scene, World};
@@ -57,7 +58,8 @@ fn remaining(grader: &Grader, subtask: &Subtask, scene: &Scene, world: &World) -
     let strict = subtask.literal.filter(|_| grader.grading == Grading::Strict);
     let closes = strict.map_or(subtask.closes, |literal| literal.needs_close);
     let object = thing(&grader.roles, subtask.object);
-    let held = world.held.is_some_and(|held| grader.fits(scene, world, subtask.object, Instance::Object(held)));
+    let held =
+        world.held.is_some_and(|held| role_fit::fits(grader, scene, world, subtask.object, Instance::Object(held)));
     let state = world.held.filter(|_| held).and_then(|index| world.object(index));
     let machine = |machine: &str, changed: String| {
         let last = closes.then(|| format!("the {machine} closed"));

@@ -9,7 +9,7 @@ use crate::domain::place::Cuboid;
 use crate::domain::scene::{Fixture, Mesh, Scene};
 use crate::domain::world::{FixtureState, Instance, Object, Parent, World};
 use crate::domain::{Point, Room};
-use crate::house::bounds::Extent;
+use crate::house::extent::Extent;
 
 /// How high the strip along the foot of walls is, in millimetres.
 const SKIRTING: i32 = 90;

@@ -129,7 +129,7 @@ fn pieces(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Cuboid> {
         return pieces;
     }
     for (number, other) in scene.fixtures.iter().enumerate().filter(|(_, other)| is_built_in(other)) {
-        let open = states.get(number).is_some_and(|state| state.open) && other.class.name() != "Drawer";
+        let open = states.get(number).is_some_and(|state| state.open) && !other.class.info().slides;
         for hole in &other.body {
             let (dx, dz) = other.facing.step();
             let out = Point::new(i32::from(dx) * 200, 0, i32::from(dz) * 200);

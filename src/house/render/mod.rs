@@ -117,7 +117,7 @@ mod tests {
     use crate::domain::scene::{Fixture, Surface};
     use crate::domain::world::{Object, Parent};
     use crate::domain::{Class, Heading, Pose, Room};
-    use crate::house::camera::projected_bounds;
+    use crate::house::bounds::projected_bounds;
     use crate::house::generate;
     use crate::house::view::View;
 

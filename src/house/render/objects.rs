@@ -8,8 +8,8 @@ use super::solid::{CYLINDER, Kind, Solid};
 use crate::domain::Scene;
 use crate::domain::class::Shape;
 use crate::domain::world::Object;
-use crate::house::bounds::Extent;
 use crate::house::doors;
+use crate::house::extent::Extent;
 
 /// The bodies of a movable object where it lies. `index` is its number in the world.
 pub fn build(scene: &Scene, index: u16, object: &Object) -> Vec<Solid> {

@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use crate::domain::class::Shape;
-use crate::house::bounds::Extent;
+use crate::house::extent::Extent;
 
 /// A colour before lighting: red, green, blue from 0 to 1.
 pub type Colour = [f32; 3];

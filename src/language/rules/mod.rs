@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::nouns::Noun;
 use super::outcome::{Outcome, outcomes};
 use super::passage::{Passage, Summarizer};
-use super::phrases::Story;
+use super::story::Story;
 use crate::domain::skill::SkillKind;
 
 /// No summary has more words.

@@ -19,6 +19,7 @@ use crate::house::expert::TurnTiming;
 use crate::house::grading::Grading;
 use crate::house::view::Candidate;
 use crate::language::phrases;
+use crate::language::story::Story;
 
 /// The longest disturbance, in steps.
 const LONGEST: u32 = 4;
@@ -72,7 +73,7 @@ pub(crate) fn phrasings(
 ) -> Vec<Annotation> {
     let Task { roles, subtasks, .. } = task;
     let origins = phrases::origins(scene, start, roles);
-    let story = phrases::Story { roles, subtasks, origins: &origins };
+    let story = Story { roles, subtasks, origins: &origins };
     let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
     (0..times.max(1)).map(annotate).collect()
 }
