@@ -45,7 +45,8 @@ impl Networks {
     pub fn new(eyes: VisualEncoder, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
         let policy_store = nn::VarStore::new(device);
         let features = eyes.features();
-        let senses = CriticInputs { channels: policy.history * features, told: policy.embedding, goal: policy.goal };
+        let senses =
+            CriticInputs { channels: policy.history * features, conditioning: policy.embedding, goal: policy.goal };
         Networks {
             eyes,
             policy: PolicyNet::new(&policy_store.root(), policy, features),

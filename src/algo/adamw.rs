@@ -19,7 +19,7 @@ pub struct AdamWConfig {
     pub weight_decay: f64,
 }
 
-struct Slot {
+struct Parameter {
     weight: Tensor,
     mean: Tensor,
     square: Tensor,
@@ -28,7 +28,7 @@ struct Slot {
 /// AdamW over every trainable tensor of a store.
 pub struct AdamW {
     config: AdamWConfig,
-    slots: BTreeMap<String, Slot>,
+    parameters: BTreeMap<String, Parameter>,
     steps: u64,
 }
 
@@ -36,9 +36,12 @@ impl AdamW {
     /// An optimiser at its start: no step taken, moments zero.
     pub fn new(store: &nn::VarStore, config: AdamWConfig) -> AdamW {
         let trainable = store.variables().into_iter().filter(|(_, tensor)| tensor.requires_grad());
-        let slot =
-            |weight: Tensor| Slot { mean: weight.zeros_like().detach(), square: weight.zeros_like().detach(), weight };
-        AdamW { config, slots: trainable.map(|(name, weight)| (name, slot(weight))).collect(), steps: 0 }
+        let parameter = |weight: Tensor| Parameter {
+            mean: weight.zeros_like().detach(),
+            square: weight.zeros_like().detach(),
+            weight,
+        };
+        AdamW { config, parameters: trainable.map(|(name, weight)| (name, parameter(weight))).collect(), steps: 0 }
     }
 
     /// How many steps were taken.
@@ -48,7 +51,7 @@ impl AdamW {
 
     /// Takes one step against the gradients of `loss`.
     pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
-        let weights: Vec<&Tensor> = self.slots.values().map(|slot| &slot.weight).collect();
+        let weights: Vec<&Tensor> = self.parameters.values().map(|parameter| &parameter.weight).collect();
         // Not added to what the weights hold: nothing has to be zeroed, and no sum is read and written once more.
         let gradients = Tensor::run_backward(&[loss], &weights, false, false);
         self.steps += 1;
@@ -57,7 +60,7 @@ impl AdamW {
         let (rest1, root2) = (1.0 - beta1.powf(steps), (1.0 - beta2.powf(steps)).sqrt());
         let rate = learning_rate / rest1 * root2;
         tch::no_grad(|| {
-            for (Slot { weight, mean, square }, gradient) in self.slots.values_mut().zip(gradients) {
+            for (Parameter { weight, mean, square }, gradient) in self.parameters.values_mut().zip(gradients) {
                 if !gradient.defined() {
                     continue;
                 }
@@ -79,13 +82,13 @@ impl AdamW {
 
     /// Both moments of every tensor, as `mean.NAME` and `square.NAME`.
     pub fn moments(&self) -> BTreeMap<String, Tensor> {
-        let both = |(name, slot): (&String, &Slot)| {
+        let both = |(name, parameter): (&String, &Parameter)| {
             [
-                (format!("mean.{name}"), slot.mean.shallow_clone()),
-                (format!("square.{name}"), slot.square.shallow_clone()),
+                (format!("mean.{name}"), parameter.mean.shallow_clone()),
+                (format!("square.{name}"), parameter.square.shallow_clone()),
             ]
         };
-        self.slots.iter().flat_map(both).collect()
+        self.parameters.iter().flat_map(both).collect()
     }
 
     /// Puts back the moments and the count of steps of an earlier training.
@@ -104,13 +107,14 @@ impl AdamW {
             Ok(found.to_device(like.device()).to_kind(Kind::Float).copy())
         };
         let mut found = BTreeMap::new();
-        for (name, slot) in &self.slots {
-            let pair = (find(format!("mean.{name}"), &slot.mean)?, find(format!("square.{name}"), &slot.square)?);
+        for (name, parameter) in &self.parameters {
+            let pair =
+                (find(format!("mean.{name}"), &parameter.mean)?, find(format!("square.{name}"), &parameter.square)?);
             found.insert(name.clone(), pair);
         }
         for (name, (mean, square)) in found {
-            if let Some(slot) = self.slots.get_mut(&name) {
-                (slot.mean, slot.square) = (mean, square);
+            if let Some(parameter) = self.parameters.get_mut(&name) {
+                (parameter.mean, parameter.square) = (mean, square);
             }
         }
         self.steps = steps;

@@ -1,5 +1,5 @@
-//! Cross-trajectory chaining: what the end of one skill is worth to whoever goes on with another (the paper's equations 4
-//! and 5). Pairs (A, B) of items; z_A and z_B are their instructions. No trajectory is joined: each part is trained on alone.
+//! Cross-trajectory chaining: the value of one skill's end for another skill (the paper's equations 4 and 5). Pairs (A, B) of
+//! items; z_A and z_B are their instructions. No trajectory is joined: each part is trained on alone.
 
 use serde::{Deserialize, Serialize};
 use tch::Tensor;
@@ -9,15 +9,12 @@ use tch::Tensor;
 #[serde(deny_unknown_fields)]
 pub struct Chaining {
     /// Where pairs come from.
-    pub pairs: Pairs,
+    pub pairs: PairSource,
     /// Pairs in a step; the paper's is the batch.
     pub batch: usize,
-    /// Which transitions of A equation 4 ends at.
-    pub cut: Cut,
-    /// What stands for the worth of a state to B.
-    pub worth: Bootstrap,
-    /// Whether the worth is clipped to 0..1, where every return lies.
-    pub clip: bool,
+    /// What A's reward at the cut is bootstrapped from.
+    #[serde(rename = "worth")]
+    pub bootstrap: Bootstrap,
     /// What the policy learns from; the critic learns from both equations.
     pub extracted: Extracted,
     /// Whose statistics normalise chained items while the policy learns from them.
@@ -37,7 +34,7 @@ pub enum Extracted {
     /// Both, as in the paper.
     Both,
     /// Equation 5 alone. Where neither of two skills serves the other, no action is better than another for equation 4, so that
-    /// it weighs as much as a demonstration and clones A while the policy is told of B.
+    /// it weighs as much as a demonstration and clones A under B's instruction.
     Joint,
 }
 
@@ -54,44 +51,25 @@ pub enum Normalised {
 /// Where pairs of skills come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Pairs {
+pub enum PairSource {
     /// The batch and a permutation of it; the joint sentences are embedded at every step.
     InBatch,
     /// So many pairs of texts, drawn once; their joint sentences are embedded once.
     Pool(usize),
 }
 
-/// Where equation 4 ends A.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Cut {
-    /// At a step uniformly between the drawn one and the span's last.
-    Uniform,
-    /// At the drawn step.
-    Always,
-    /// At the span's last step.
-    End,
+/// How likely equation 4 ends A at a transition, `left` steps (itself included) before its span's end: the cut is a step drawn
+/// uniformly between the drawn one and the span's last.
+pub fn cut_chance(left: u32) -> f64 {
+    1.0 / f64::from(left.max(1))
 }
 
-impl Cut {
-    /// How likely a transition is the cut, `left` steps (itself included) before its span's end.
-    pub fn chance(self, left: u32) -> f64 {
-        match self {
-            Cut::Uniform => 1.0 / f64::from(left.max(1)),
-            Cut::Always => 1.0,
-            Cut::End => f64::from(u8::from(left <= 1)),
-        }
-    }
-}
-
-/// What stands for the worth of the state that A ends in.
+/// The estimate of what B can make of the state that A ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bootstrap {
     /// V(s′, z_B): of the state after A's last action. The paper's implementation.
     NextValue,
-    /// V(s, z_B): of the state before it.
-    PresentValue,
     /// min Q̄(s, a, z_B) of the last action itself. The paper's equations, and Actionable Models.
     TargetQ,
 }
@@ -111,16 +89,16 @@ impl RewardDone {
         RewardDone { reward: terminal.shallow_clone(), terminal: terminal.shallow_clone() }
     }
 
-    /// Equation 4: A told z_B, cut where `cut` is 1; the cut is worth what B can make of it. Equation 5's A, told "A. B.": the
+    /// Equation 4: A under z_B, cut where `cut` is 1; the reward there is the `bootstrap`. Equation 5's A, under "A. B.": the
     /// cut is the span's own end.
-    pub fn chained(cut: &Tensor, worth: &Tensor) -> RewardDone {
-        RewardDone { reward: cut * worth, terminal: cut.shallow_clone() }
+    pub fn chained(cut: &Tensor, bootstrap: &Tensor) -> RewardDone {
+        RewardDone { reward: cut * bootstrap, terminal: cut.shallow_clone() }
     }
 }
 
-/// The worth of states as a reward: without gradient, and where `clip` says so within 0..1.
-pub fn as_reward(worth: &Tensor, clip: bool) -> Tensor {
-    if clip { worth.detach().clamp(0.0, 1.0) } else { worth.detach() }
+/// A bootstrapped value as a reward: without gradient, and within 0..1, where every return lies.
+pub fn as_reward(bootstrap: &Tensor) -> Tensor {
+    bootstrap.detach().clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
@@ -132,22 +110,19 @@ mod tests {
 
     #[test]
     fn rewards_by_hand() {
-        let (d, worth) = (Tensor::from_slice(&[0.0f32, 1.0, 1.0]), Tensor::from_slice(&[0.7f32, 1.3, 0.4]));
+        let (d, bootstrap) = (Tensor::from_slice(&[0.0f32, 1.0, 1.0]), Tensor::from_slice(&[0.7f32, 1.3, 0.4]));
         let base = RewardDone::of_skill(&d);
         assert_eq!(Vec::<f32>::try_from(base.reward).unwrap(), [0.0, 1.0, 1.0]);
-        let chained = RewardDone::chained(&d, &as_reward(&worth, true));
+        let chained = RewardDone::chained(&d, &as_reward(&bootstrap));
         assert_eq!(Vec::<f32>::try_from(chained.reward).unwrap(), [0.0, 1.0, 0.4]);
-        assert_eq!(Vec::<f32>::try_from(as_reward(&worth, false)).unwrap(), [0.7, 1.3, 0.4]);
     }
 
     #[test]
     fn each_transition_left_is_as_likely_a_cut() {
-        assert_eq!([1, 2, 4].map(|left| Cut::Uniform.chance(left)), [1.0, 0.5, 0.25]);
-        assert_eq!([1, 2].map(|left| Cut::End.chance(left)), [1.0, 0.0]);
-        assert_eq!(Cut::Always.chance(9), 1.0);
+        assert_eq!([1, 2, 4].map(cut_chance), [1.0, 0.5, 0.25]);
     }
 
-    /// V by tables: two demonstrations, states 0 to 2 told A and 2 to 4 told B, and "A. B." from state 0. Rows are texts (A, B,
+    /// V by tables: two demonstrations, states 0 to 2 under A and 2 to 4 under B, and "A. B." from state 0. Rows are texts (A, B,
     /// "A. B."), columns states.
     fn values(chaining: bool) -> Vec<Vec<f64>> {
         const DISCOUNT: f64 = 0.9;
@@ -164,12 +139,12 @@ mod tests {
         let (first, second) = ([0, 1], [2, 3]);
         let mut optimiser = nn::OptimizerConfig::build(nn::Sgd::default(), &store, 1.0).unwrap();
         for _ in 0..200 {
-            let worth = as_reward(&at(&value, &row(first, 1), 1), true);
+            let bootstrap = as_reward(&at(&value, &row(first, 1), 1));
             let mut parts =
                 vec![(row(first, 0), RewardDone::of_skill(&ends)), (row(second, 1), RewardDone::of_skill(&ends))];
             if chaining {
-                parts.push((row(first, 1), RewardDone::chained(&ends, &worth)));
-                parts.push((row(first, 2), RewardDone::chained(&ends, &worth)));
+                parts.push((row(first, 1), RewardDone::chained(&ends, &bootstrap)));
+                parts.push((row(first, 2), RewardDone::chained(&ends, &bootstrap)));
                 parts.push((row(second, 2), RewardDone::of_skill(&ends)));
             }
             let mut loss = Tensor::from(0.0f32);
@@ -187,10 +162,10 @@ mod tests {
     fn only_chaining_stitches_two_trajectories() {
         // A step towards the end of either skill is worth 0.9 of what it leads to; the joint itself costs nothing.
         let with = values(true);
-        let told_b_at_the_start = with[1][0];
-        let told_both_at_the_start = with[2][0];
-        assert!((told_b_at_the_start - 0.81).abs() < 0.01, "{with:?}");
-        assert!((told_both_at_the_start - 0.81).abs() < 0.01, "{with:?}");
+        let b_from_the_start = with[1][0];
+        let both_from_the_start = with[2][0];
+        assert!((b_from_the_start - 0.81).abs() < 0.01, "{with:?}");
+        assert!((both_from_the_start - 0.81).abs() < 0.01, "{with:?}");
         assert!((with[2][2] - 0.9).abs() < 0.01, "half way it is B that is left: {with:?}");
         let without = values(false);
         assert!(without[1][0].abs() < 0.01 && without[2][0].abs() < 0.01, "{without:?}");

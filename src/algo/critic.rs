@@ -1,4 +1,4 @@
-//! The critic under training: what it makes of a batch, and what it learns from that.
+//! The critic under training: its values of a batch, and what it learns from them.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::batch::{AGG_A, CHAIN, Segment, Transitions};
 use super::chain::{self, Bootstrap, Chaining, RewardDone};
 use super::iql::{self, Iql, PolyakTarget};
 use super::learner::{Learner, Optimisation};
-use super::terms::Terms;
+use super::loss_terms::LossTerms;
 use crate::nets::critic::{Critic, CriticValues};
 use crate::nets::weights::{self, Tensors};
 
@@ -18,12 +18,12 @@ pub struct CriticLearner<'a> {
     target: &'a Critic,
     target_store: &'a nn::VarStore,
     learner: Learner<'a>,
-    tracking: PolyakTarget,
+    polyak: PolyakTarget,
     iql: Iql,
 }
 
 impl<'a> CriticLearner<'a> {
-    /// A critic with its optimiser, and the target that follows it; both at step 0.
+    /// A critic at step 0; the target begins as its copy.
     pub fn new(
         (online, store): (&'a Critic, &'a nn::VarStore),
         (target, target_store): (&'a Critic, &'a nn::VarStore),
@@ -31,20 +31,24 @@ impl<'a> CriticLearner<'a> {
         iql: Iql,
         seed: u64,
     ) -> CriticLearner<'a> {
-        let mut tracking = PolyakTarget::new(store, target_store);
-        tracking.follow(1.0);
-        CriticLearner { online, target, target_store, learner: Learner::new(store, optimisation, seed), tracking, iql }
+        let mut polyak = PolyakTarget::new(store, target_store);
+        polyak.update(1.0);
+        CriticLearner { online, target, target_store, learner: Learner::new(store, optimisation, seed), polyak, iql }
     }
 
-    /// Whether it knows too little to weigh a policy's surprise.
+    /// Whether it is too young for its advantages to weigh the policy's loss.
     pub(super) fn is_warming_up(&self) -> bool {
         self.learner.share() < self.iql.warmup_share
     }
 
-    /// One step down `loss`; the target follows.
-    pub(super) fn minimise(&mut self, loss: &Tensor) {
+    /// One step of V and both Q, which share an optimiser and may share a trunk.
+    pub(super) fn update_v_and_q(&mut self, loss: &Tensor) {
         self.learner.minimise(loss);
-        self.tracking.follow(self.iql.target_rate);
+    }
+
+    /// Moves the target Q̄ towards Q.
+    pub(super) fn update_target(&mut self) {
+        self.polyak.update(self.iql.target_rate);
     }
 
     /// Every tensor of the training's state, by name.
@@ -54,7 +58,7 @@ impl<'a> CriticLearner<'a> {
         tensors
     }
 
-    /// Takes up a state that was saved after `step` steps.
+    /// Continues from a state that was saved after `step` steps.
     ///
     /// # Errors
     /// When a tensor cannot be taken over.
@@ -63,76 +67,84 @@ impl<'a> CriticLearner<'a> {
         weights::copy(tensors, "target.", self.target_store)
     }
 
-    /// What it makes of them now.
-    pub(super) fn evaluate(&self, all: &Transitions, parts: &[Segment], chaining: Option<&Chaining>) -> Judged {
+    /// Its values of all items, with what V, both Q and the policy learn from them.
+    pub(super) fn evaluate(&self, all: &Transitions, segments: &[Segment], chaining: Option<&Chaining>) -> CriticBatch {
         let next = all.next.as_ref().unwrap_or(&all.observation);
-        let target_q = self.target.min_q(&all.observation, &all.told, &all.actions, &all.objects);
-        let next_value = self.online.value(next, &all.told);
-        let judgement = self.online.evaluate(&all.observation, &all.told, &all.actions, &all.objects);
-        let worth = parts.iter().find(|part| part.name == CHAIN).zip(chaining).map(|(part, chaining)| {
-            let worth = match chaining.worth {
-                Bootstrap::NextValue => part.of(&next_value),
-                Bootstrap::PresentValue => part.of(&judgement.baseline),
-                Bootstrap::TargetQ => part.of(&target_q),
-            };
-            chain::as_reward(&worth, chaining.clip)
-        });
-        let rewards: Vec<Tensor> = parts
-            .iter()
-            .map(|part| match (part.name, &worth) {
-                (CHAIN | AGG_A, Some(worth)) => RewardDone::chained(&part.of(&all.terminal), worth).reward,
-                _ => RewardDone::of_skill(&part.of(&all.terminal)).reward,
+        let target_q = self.target.min_q(&all.observation, &all.conditioning, &all.actions, &all.objects);
+        let next_value = self.online.value(next, &all.conditioning);
+        let values = self.online.evaluate(&all.observation, &all.conditioning, &all.actions, &all.objects);
+        let chained = segments.iter().find(|segment| segment.name == CHAIN).zip(chaining);
+        let bootstrap = chained.map(|(segment, chaining)| {
+            chain::as_reward(&match chaining.bootstrap {
+                Bootstrap::NextValue => segment.of(&next_value),
+                Bootstrap::TargetQ => segment.of(&target_q),
             })
-            .collect();
-        let bootstrap = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
-        let weights = iql::advantage_weights(&target_q, &judgement.baseline, self.iql.temperature, self.iql.weight_cap);
-        let taken = all.taken.shallow_clone();
-        Judged { judgement, target_q, bootstrap, weights, taken, expectile: self.iql.expectile }
+        });
+        let reward = |segment: &Segment| {
+            let terminal = segment.of(&all.terminal);
+            match (segment.name, &bootstrap) {
+                (CHAIN | AGG_A, Some(bootstrap)) => RewardDone::chained(&terminal, bootstrap).reward,
+                _ => RewardDone::of_skill(&terminal).reward,
+            }
+        };
+        let rewards: Vec<Tensor> = segments.iter().map(reward).collect();
+        let q_target = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
+        let weights = iql::advantage_weights(&target_q, &values.baseline, self.iql.temperature, self.iql.weight_cap);
+        let executed = all.executed.shallow_clone();
+        CriticBatch { values, target_q, q_target, weights, executed, expectile: self.iql.expectile }
     }
 }
 
-/// What the critic makes of all items.
-pub(super) struct Judged {
-    judgement: CriticValues,
-    /// min Q̄.
+/// The critic's values of all items of a batch.
+pub(super) struct CriticBatch {
+    values: CriticValues,
+    /// min Q̄(s, a, z).
     target_q: Tensor,
-    /// r + (1 − d) γ V(s′).
-    bootstrap: Tensor,
-    /// exp(β (Q − V)), capped: what a policy's surprise at each item weighs.
+    /// r + (1 − d) γ V(s′, z).
+    q_target: Tensor,
+    /// exp(β (Q̄ − V)), capped: the weights of the policy's loss.
     pub weights: Tensor,
-    taken: Tensor,
+    executed: Tensor,
     expectile: f64,
 }
 
-impl Judged {
-    /// The losses of V and both Q, averaged part by part over what was taken, and weighed: what would have been right led
-    /// nowhere, so the policy alone learns from it.
-    pub fn loss(&self, parts: &[Segment], terms: &mut Terms) -> Tensor {
-        let value = iql::value_loss(&self.judgement.value, &self.target_q, self.expectile);
-        let [one, other] = [0, 1].map(|k| iql::q_loss(&self.judgement.q[k], &self.bootstrap));
-        let q = one + other;
-        let part_loss = |part: &Segment| {
-            let taken = part.of(&self.taken);
-            let count = taken.sum(Kind::Float).clamp_min(1.0);
-            let [value, q] = [&value, &q].map(|loss| (part.of(loss) * &taken).sum(Kind::Float) / &count);
-            terms.add(part.label("value_loss"), &value);
-            terms.add(part.label("q_loss"), &q);
-            (value + q) * part.weight
-        };
-        parts.iter().map(part_loss).sum()
+impl CriticBatch {
+    /// The loss of V.
+    pub fn v_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
+        let loss = iql::value_loss(&self.values.value, &self.target_q, self.expectile);
+        self.averaged("value_loss", &loss, segments, terms)
     }
 
-    /// Weights and values, those of chaining by their parts' names.
-    pub fn describe(&self, parts: &[Segment], numbers: &mut BTreeMap<String, f64>) {
-        let value = &self.judgement.baseline;
-        for part in parts {
+    /// The loss of both Q.
+    pub fn q_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
+        let [one, other] = [0, 1].map(|k| iql::q_loss(&self.values.q[k], &self.q_target));
+        self.averaged("q_loss", &(one + other), segments, terms)
+    }
+
+    /// A loss over items, averaged segment by segment over what was executed, and weighed. A correction led nowhere, so that the
+    /// policy alone learns from it.
+    fn averaged(&self, name: &str, loss: &Tensor, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
+        let segment_loss = |segment: &Segment| {
+            let executed = segment.of(&self.executed);
+            let count = executed.sum(Kind::Float).clamp_min(1.0);
+            let mean = (segment.of(loss) * &executed).sum(Kind::Float) / &count;
+            terms.add(segment.label(name), &mean);
+            mean * segment.weight
+        };
+        segments.iter().map(segment_loss).sum()
+    }
+
+    /// Weights and values, by the names of their segments.
+    pub fn describe(&self, segments: &[Segment], numbers: &mut BTreeMap<String, f64>) {
+        let value = &self.values.baseline;
+        for segment in segments {
             let found = [
-                ("weight_mean", part.of(&self.weights).mean(Kind::Double)),
-                ("weight_max", part.of(&self.weights).max().to_kind(Kind::Double)),
-                ("q_mean", part.of(&self.target_q).mean(Kind::Double)),
-                ("v_mean", part.of(value).mean(Kind::Double)),
+                ("weight_mean", segment.of(&self.weights).mean(Kind::Double)),
+                ("weight_max", segment.of(&self.weights).max().to_kind(Kind::Double)),
+                ("q_mean", segment.of(&self.target_q).mean(Kind::Double)),
+                ("v_mean", segment.of(value).mean(Kind::Double)),
             ];
-            numbers.extend(found.map(|(name, tensor)| (part.label(name), tensor.double_value(&[]))));
+            numbers.extend(found.map(|(name, tensor)| (segment.label(name), tensor.double_value(&[]))));
         }
     }
 }

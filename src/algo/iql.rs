@@ -86,7 +86,7 @@ impl PolyakTarget {
     }
 
     /// Moves the target by `rate` of what separates it from the followed network.
-    pub fn follow(&mut self, rate: f64) {
+    pub fn update(&mut self, rate: f64) {
         tch::no_grad(|| {
             for (online, target) in &mut self.pairs {
                 if online.requires_grad() {
@@ -217,7 +217,7 @@ mod tests {
             let _ = tch::no_grad(|| store.variables()["mean"].shallow_clone().fill_(value));
             store
         });
-        PolyakTarget::new(&online, &target).follow(0.005);
+        PolyakTarget::new(&online, &target).update(0.005);
         assert!((target.variables()["weight"].double_value(&[0]) - 1.005).abs() < 1e-6);
         assert_eq!(target.variables()["mean"].double_value(&[0]), 2.0);
     }

@@ -1,4 +1,4 @@
-//! A learner: weights and their optimiser, as one state that can be saved and taken up again.
+//! A learner: weights and their optimiser, as one state that can be saved and restored.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use crate::nets::weights::{self, Form, Tensors};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Optimisation {
-    /// How many steps.
+    /// Steps of the whole training.
     pub steps: u64,
     /// Items in a step.
     pub batch: usize,
-    /// The learning rate.
+    /// The learning rate over the steps.
     pub schedule: Schedule,
-    /// The optimiser.
+    /// The optimiser's other settings.
     pub adamw: AdamWConfig,
 }
 
@@ -100,7 +100,7 @@ impl<'a> Learner<'a> {
         tensors
     }
 
-    /// Takes up a state as it was after `step` steps.
+    /// Continues from a state as it was after `step` steps.
     ///
     /// # Errors
     /// When a tensor is missing or of another shape.
@@ -109,11 +109,11 @@ impl<'a> Learner<'a> {
         weights::copy(tensors, "weight.", self.store)
     }
 
-    /// Takes up the state that was read from the file `path`.
+    /// Restores the state that was read from the file `path`.
     ///
     /// # Errors
     /// When it does not fit the networks; each tensor that is at fault is named.
-    pub fn take_up(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+    pub fn restore_checked(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let forms = self.state().iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
         weights::check(path, tensors, &forms)?;
         self.restore(step, tensors)

@@ -1,16 +1,16 @@
-//! The learning rate over a training.
+//! The learning-rate schedule: linear warm-up, then linear decay.
 
 use serde::{Deserialize, Serialize};
 
-/// A linear rise, then a straight fall.
+/// Linear warm-up, then linear decay.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
     /// The highest learning rate.
     pub learning_rate: f64,
-    /// Steps over which it rises from zero.
+    /// Steps of the warm-up from zero.
     pub warmup_steps: u64,
-    /// The share of it that is left at the last step.
+    /// The share of the highest rate that is left at the last step.
     pub final_share: f64,
 }
 

@@ -1,17 +1,18 @@
-//! One update, in the paper's order: relabel, evaluate, one policy step, one critic step, the target follows.
+//! One update, in the order of implicit Q-learning: V, the actor, Q, the target. All losses are taken before any weight
+//! changes, so that one that is not finite changes none.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use tch::{Tensor, nn};
 
-use super::batch::Batch;
+use super::batch::{Batch, Segment, Transitions};
 use super::bc;
 use super::chain::Chaining;
-use super::critic::CriticLearner;
-use super::extraction::{self, Pass};
+use super::critic::{CriticBatch, CriticLearner};
 use super::learner::{Learner, Optimisation};
-use super::terms::{NotFinite, Terms};
+use super::loss_terms::{LossTerms, NotFinite};
+use super::policy_extraction::{self, ForwardPass};
 use crate::nets::policy::{Logits, PolicyNet};
 use crate::nets::precision::Precision;
 use crate::nets::weights::{self, Tensors};
@@ -19,7 +20,7 @@ use crate::nets::weights::{self, Tensors};
 /// A policy, and for IQL its critic, under training.
 pub struct Update<'a> {
     policy: &'a PolicyNet,
-    learner: Learner<'a>,
+    actor: Learner<'a>,
     critic: Option<CriticLearner<'a>>,
     chaining: Option<Chaining>,
     precision: Precision,
@@ -34,8 +35,8 @@ impl<'a> Update<'a> {
         optimisation: Optimisation,
         seed: u64,
     ) -> Update<'a> {
-        let learner = Learner::new(store, optimisation, seed);
-        Update { policy, learner, critic, chaining, precision: Precision::Full }
+        let actor = Learner::new(store, optimisation, seed);
+        Update { policy, actor, critic, chaining, precision: Precision::Full }
     }
 
     /// The same, but its networks compute with `precision`.
@@ -45,12 +46,12 @@ impl<'a> Update<'a> {
 
     /// Steps taken.
     pub fn step(&self) -> u64 {
-        self.learner.step()
+        self.actor.step()
     }
 
     /// Whether all steps are taken.
     pub fn is_done(&self) -> bool {
-        self.learner.is_done()
+        self.actor.is_done()
     }
 
     /// Takes one step. Returns the losses by name; with `report` also weights, values and accuracies.
@@ -58,60 +59,82 @@ impl<'a> Update<'a> {
     /// # Errors
     /// [`NotFinite`].
     pub fn update(&mut self, batch: &Batch, report: bool) -> Result<BTreeMap<String, f64>, NotFinite> {
-        self.learner.begin_step();
-        let (all, parts) = batch.relabelled(self.chaining.as_ref(), self.precision);
-        let mut terms = Terms::default();
-        let judged = self.critic.as_ref().map(|critic| critic.evaluate(&all, &parts, self.chaining.as_ref()));
-        // What is chained is no demonstration of what it is told: without weights there is nothing to clone in it.
-        let (passes, weights) = match &self.critic {
-            Some(critic) if critic.is_warming_up() => (Pass::all(&parts, None), None),
-            _ => (Pass::all(&parts, self.chaining.as_ref()), judged.as_ref().map(|judged| &judged.weights)),
-        };
-        let mut policy_loss = Tensor::from(0.0f32).to_device(all.told.device());
-        let mut seen = None;
-        for pass in &passes {
-            let logits = self.policy.forward(&pass.of(&all.observation), &pass.of(&all.told), pass.train);
-            policy_loss += extraction::loss(&logits, &all, pass, weights, &mut terms);
-            seen.get_or_insert(logits);
+        self.actor.begin_step();
+        let (all, segments) = batch.relabelled(self.chaining.as_ref(), self.precision);
+        let critic = self.critic.as_ref().map(|critic| critic.evaluate(&all, &segments, self.chaining.as_ref()));
+        let mut terms = LossTerms::default();
+        let v_loss = critic.as_ref().map(|critic| critic.v_loss(&segments, &mut terms));
+        let (actor_loss, logits) = self.actor_loss(&all, &segments, critic.as_ref(), &mut terms);
+        let q_loss = critic.as_ref().map(|critic| critic.q_loss(&segments, &mut terms));
+        let mut numbers = terms.numbers(self.step() + 1)?;
+
+        self.actor.minimise(&actor_loss);
+        if let (Some(learner), Some(v_loss), Some(q_loss)) = (&mut self.critic, v_loss, q_loss) {
+            learner.update_v_and_q(&(v_loss + q_loss));
+            learner.update_target();
         }
-        let critic_loss = judged.as_ref().map(|judged| judged.loss(&parts, &mut terms));
-        let mut numbers = terms.numbers(self.learner.step() + 1)?;
-        self.learner.minimise(&policy_loss);
-        if let (Some(critic), Some(loss)) = (&mut self.critic, critic_loss) {
-            critic.minimise(&loss);
-        }
-        if report && let Some(logits) = seen {
-            let base = |all: &Tensor| all.narrow(0, 0, batch.base.actions.size()[0]);
-            let shown = Logits { actions: base(&logits.actions), objects: base(&logits.objects) };
-            let (actions, objects) = bc::accuracy(&shown, &batch.base.actions, &batch.base.objects);
-            numbers.extend([("action_accuracy".into(), actions), ("object_accuracy".into(), objects)]);
-            if let Some(judged) = &judged {
-                judged.describe(&parts, &mut numbers);
+        if report {
+            numbers.extend(accuracies(&logits, &batch.base));
+            if let Some(critic) = &critic {
+                critic.describe(&segments, &mut numbers);
             }
         }
         Ok(numbers)
     }
 
+    /// The loss of the policy, and its logits of the first forward pass, which begins with the demonstrated items. A chained
+    /// item is no demonstration of its instruction: without the critic's weights there is nothing to clone in it.
+    fn actor_loss(
+        &self,
+        all: &Transitions,
+        segments: &[Segment],
+        critic: Option<&CriticBatch>,
+        terms: &mut LossTerms,
+    ) -> (Tensor, Option<Logits>) {
+        let (passes, weights) = match &self.critic {
+            Some(critic) if critic.is_warming_up() => (ForwardPass::all(segments, None), None),
+            _ => (ForwardPass::all(segments, self.chaining.as_ref()), critic.map(|critic| &critic.weights)),
+        };
+        let mut loss = Tensor::from(0.0f32).to_device(all.conditioning.device());
+        let mut first = None;
+        for pass in &passes {
+            let (observation, conditioning) = (pass.of(&all.observation), pass.of(&all.conditioning));
+            let logits = self.policy.forward(&observation, &conditioning, pass.train);
+            loss += policy_extraction::loss(&logits, all, pass, weights, terms);
+            first.get_or_insert(logits);
+        }
+        (loss, first)
+    }
+
     /// Every tensor of the training's state, by name.
     pub fn state(&self) -> Tensors {
-        let mut tensors = weights::prefixed("policy.", self.learner.state());
+        let mut tensors = weights::prefixed("policy.", self.actor.state());
         tensors.extend(self.critic.iter().flat_map(CriticLearner::state));
         tensors
     }
 
-    /// Takes up a state that was saved after `step` steps.
+    /// Continues from a state that was saved after `step` steps.
     ///
     /// # Errors
-    /// When a tensor is missing, too many, or of another form; each is named with `path`, and nothing is changed.
+    /// When a tensor is missing, unknown, or of another form; each is named with `path`, and nothing is changed.
     pub fn restore(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let own = self.state();
         weights::check(path, tensors, &own.iter().map(|(name, t)| (name.clone(), weights::Form::of(t))).collect())?;
-        self.learner.restore(step, &weights::under("policy.", tensors))?;
+        self.actor.restore(step, &weights::under("policy.", tensors))?;
         match &mut self.critic {
             Some(critic) => critic.restore(step, tensors),
             None => Ok(()),
         }
     }
+}
+
+/// Shares of right answers among the demonstrated items, with which `logits` begin.
+fn accuracies(logits: &Option<Logits>, base: &Transitions) -> Vec<(String, f64)> {
+    let Some(logits) = logits else { return Vec::new() };
+    let of_base = |all: &Tensor| all.narrow(0, 0, base.actions.size()[0]);
+    let logits = Logits { actions: of_base(&logits.actions), objects: of_base(&logits.objects) };
+    let (actions, objects) = bc::accuracy(&logits, &base.actions, &base.objects);
+    vec![("action_accuracy".into(), actions), ("object_accuracy".into(), objects)]
 }
 
 #[cfg(test)]
@@ -120,8 +143,8 @@ mod tests {
 
     use super::*;
     use crate::algo::adamw::AdamWConfig;
-    use crate::algo::batch::{Pairs, Transitions};
-    use crate::algo::chain::{Bootstrap, Cut, Extracted, Normalised, Pairs as Source};
+    use crate::algo::batch::ChainedPairs;
+    use crate::algo::chain::{Bootstrap, Extracted, Normalised, PairSource};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
@@ -161,12 +184,12 @@ mod tests {
             object_embedding: 2,
             shared_trunk: true,
         };
-        let senses = CriticInputs { channels: STATES, told: TEXTS, goal: None };
+        let inputs = CriticInputs { channels: STATES, conditioning: TEXTS, goal: None };
         Nets {
             policy: PolicyNet::new(&policy_store.root(), &policy, STATES),
             store: policy_store,
-            online: (Critic::new(&online.root(), &critic, senses), online),
-            target: (Critic::new(&target.root(), &critic, senses), target),
+            online: (Critic::new(&online.root(), &critic, inputs), online),
+            target: (Critic::new(&target.root(), &critic, inputs), target),
         }
     }
 
@@ -181,11 +204,9 @@ mod tests {
     };
 
     const CHAINING: Chaining = Chaining {
-        pairs: Source::Pool(1),
+        pairs: PairSource::Pool(1),
         batch: 4,
-        cut: Cut::Uniform,
-        worth: Bootstrap::NextValue,
-        clip: true,
+        bootstrap: Bootstrap::NextValue,
         extracted: Extracted::Both,
         normalised: Normalised::Together,
         weight: 1.0,
@@ -234,12 +255,12 @@ mod tests {
         Transitions {
             observation: look(&column(|row| row.0)),
             next: Some(look(&column(|row| row.3))),
-            told: say(&column(|row| row.1)),
+            conditioning: say(&column(|row| row.1)),
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
-            named: Tensor::from_slice(&vec![0i64; rows.len()]),
+            object_target: Tensor::from_slice(&vec![0i64; rows.len()]),
             actions: Tensor::from_slice(&actions),
             terminal: Tensor::from_slice(&rows.iter().map(|row| row.4).collect::<Vec<f32>>()),
-            taken: Tensor::ones([rows.len() as i64], (Kind::Float, Device::Cpu)),
+            executed: Tensor::ones([rows.len() as i64], (Kind::Float, Device::Cpu)),
         }
     }
 
@@ -248,10 +269,10 @@ mod tests {
         let (a, b) = ((0, 0, 0, 1, 1.0), (1, 1, 0, 2, 1.0));
         let many = |row| transitions(&[row; 4]);
         let base: Vec<_> = [a, b].into_iter().cycle().take(8).collect();
-        let first = Transitions { told: say(&[1; 4]), ..many(a) };
+        let first = Transitions { conditioning: say(&[1; 4]), ..many(a) };
         let cut = first.terminal.shallow_clone();
-        let joint = Some((say(&[2; 4]), Transitions { told: say(&[2; 4]), ..many(b) }));
-        Batch { base: transitions(&base), pairs: Some(Pairs { first, cut, joint }) }
+        let joint = Some((say(&[2; 4]), Transitions { conditioning: say(&[2; 4]), ..many(b) }));
+        Batch { base: transitions(&base), pairs: Some(ChainedPairs { first, cut, joint }) }
     }
 
     /// The chain: action 0 leads from state 0 to state 1 and from there to the end, action 1 back to state 0.
@@ -285,9 +306,9 @@ mod tests {
         }
         let four = transitions(&CHAIN_OF_TWO);
         let (q, v, policy) = solution();
-        let found = nets.target.0.min_q(&four.observation, &four.told, &four.actions, &four.objects);
-        let values = nets.online.0.value(&four.observation, &four.told);
-        let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.told, false));
+        let found = nets.target.0.min_q(&four.observation, &four.conditioning, &four.actions, &four.objects);
+        let values = nets.online.0.value(&four.observation, &four.conditioning);
+        let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.conditioning, false));
         let shares = logits.actions.softmax(-1, Kind::Double);
         for (row, (state, action)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
             let row = row as i64;
@@ -301,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn chaining_carries_the_worth_of_the_second_skill_to_the_first() {
+    fn chaining_carries_the_value_of_the_second_skill_to_the_first() {
         let _chance = crate::nets::testing::chance();
         let nets = nets();
         let mut update = update(&nets, 300, IQL, Some(CHAINING));
@@ -373,11 +394,11 @@ mod tests {
     fn the_policy_learns_what_would_have_been_right_and_the_critic_does_not() {
         let _chance = crate::nets::testing::chance();
         // The last transition ends the skill, or does not: only a critic can tell.
-        let losses = |taken: f32, terminal: f32| {
+        let losses = |executed: f32, terminal: f32| {
             let nets = nets();
             let mut rows = CHAIN_OF_TWO;
             rows[3].4 = terminal;
-            let base = Transitions { taken: Tensor::from_slice(&[1.0, 1.0, 1.0, taken]), ..transitions(&rows) };
+            let base = Transitions { executed: Tensor::from_slice(&[1.0, 1.0, 1.0, executed]), ..transitions(&rows) };
             update(&nets, 1, IQL, None).update(&Batch { base, pairs: None }, false).unwrap()
         };
         let (loss, other) = (losses(0.0, 0.0), losses(0.0, 1.0));
@@ -387,11 +408,12 @@ mod tests {
     }
 
     #[test]
-    fn the_object_head_learns_the_named_classes_and_not_what_the_steps_interact_with() {
+    fn the_object_head_learns_its_targets_and_not_what_the_steps_interact_with() {
         let _chance = crate::nets::testing::chance();
-        let loss = |objects: i64, named: i64| {
+        let loss = |objects: i64, target: i64| {
             let of_all = |class| Tensor::full([4], class, (Kind::Int64, Device::Cpu));
-            let base = Transitions { objects: of_all(objects), named: of_all(named), ..transitions(&CHAIN_OF_TWO) };
+            let base =
+                Transitions { objects: of_all(objects), object_target: of_all(target), ..transitions(&CHAIN_OF_TWO) };
             update(&nets(), 1, IQL, None).update(&Batch { base, pairs: None }, false).unwrap()["object_loss"]
         };
         assert_eq!((loss(0, 0), loss(1, 0)), (0.0, 0.0));

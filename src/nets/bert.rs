@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tch::{Kind, Tensor};
 
-use super::encoder_stack::{LayerNames, Norm, Shelf, Stack, padding_bias};
+use super::encoder_stack::{CheckedTensors, EncoderStack, LayerNames, LayerNorm, padding_bias};
 use super::transformer_config::TransformerConfig;
 use super::weights::Form;
 
@@ -21,8 +21,8 @@ pub(super) struct Bert {
     words: Tensor,
     /// Position embeddings with the first segment's embedding added: every text is one segment.
     positions: Tensor,
-    norm: Norm,
-    stack: Stack,
+    norm: LayerNorm,
+    stack: EncoderStack,
 }
 
 impl Bert {
@@ -40,13 +40,13 @@ impl Bert {
         forms
     }
 
-    pub(super) fn take(shelf: &Shelf<'_>, config: &TransformerConfig) -> anyhow::Result<Bert> {
-        let segments = shelf.tensor("embeddings.token_type_embeddings.weight")?;
+    pub(super) fn take(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Bert> {
+        let segments = tensors.tensor("embeddings.token_type_embeddings.weight")?;
         Ok(Bert {
-            words: shelf.tensor("embeddings.word_embeddings.weight")?,
-            positions: shelf.tensor("embeddings.position_embeddings.weight")? + segments.get(0),
-            norm: shelf.norm("embeddings.LayerNorm")?,
-            stack: Stack::take(shelf, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
+            words: tensors.tensor("embeddings.word_embeddings.weight")?,
+            positions: tensors.tensor("embeddings.position_embeddings.weight")? + segments.get(0),
+            norm: tensors.norm("embeddings.LayerNorm")?,
+            stack: EncoderStack::take(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
         })
     }
 

@@ -6,11 +6,11 @@ use tch::nn::{self, Module};
 
 use super::bounds;
 use super::precision;
-use super::trunk::{Convolutions, Dense, Telling, Trunk};
+use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use super::value::ValueHead;
 use crate::domain::{ActionType, Class};
 
-/// The size of a critic. What it sees and is told is the policy's.
+/// The size of a critic. Its inputs are the policy's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CriticSpec {
@@ -50,13 +50,13 @@ impl CriticSpec {
     }
 }
 
-/// What a critic is told and sees: its inputs' sizes.
+/// The sizes of a critic's inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CriticInputs {
     /// Channels of an observation.
     pub channels: i64,
-    /// Numbers in a sentence embedding, or that a goal is turned into.
-    pub told: i64,
+    /// Numbers in a sentence embedding, or in the vector that a goal becomes.
+    pub conditioning: i64,
     /// The channels of the convolutions that see a goal, where there is one.
     pub goal: Option<[i64; 4]>,
 }
@@ -65,14 +65,14 @@ pub struct CriticInputs {
 struct QHead {
     action: nn::Embedding,
     object: nn::Embedding,
-    dense: Dense,
+    dense: DenseLayers,
     out: nn::Linear,
 }
 
 impl QHead {
     fn new(path: &nn::Path<'_>, from: i64, spec: &CriticSpec) -> QHead {
         let from = from + spec.action_embedding + spec.object_embedding;
-        let dense = Dense::new(path, from, &spec.hidden, spec.dropout);
+        let dense = DenseLayers::new(path, from, &spec.hidden, spec.dropout);
         let table = |name: &str, entries: usize, width: i64| {
             nn::embedding(path / name, entries as i64, width, Default::default())
         };
@@ -91,7 +91,7 @@ impl QHead {
     }
 }
 
-/// A critic's opinion of a batch in training.
+/// Q and V of a batch in training.
 #[derive(Debug)]
 pub struct CriticValues {
     /// Both Q, each `[n]`.
@@ -105,7 +105,7 @@ pub struct CriticValues {
 /// Twin Q and V over one trunk or one each.
 #[derive(Debug)]
 pub struct Critic {
-    telling: Telling,
+    conditioner: Conditioning,
     trunks: Vec<Trunk>,
     q: [QHead; 2],
     value: ValueHead,
@@ -113,14 +113,15 @@ pub struct Critic {
 
 impl Critic {
     /// A critic with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, senses: CriticInputs) -> Critic {
+    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, inputs: CriticInputs) -> Critic {
         let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
         let over = |channels| Convolutions { channels, halved: spec.halved };
-        let trunk = |name: &&str| Trunk::new(&(path / *name), senses.channels, over(&spec.channels), Some(senses.told));
+        let trunk =
+            |name: &&str| Trunk::new(&(path / *name), inputs.channels, over(&spec.channels), Some(inputs.conditioning));
         let trunks: Vec<Trunk> = names.iter().map(trunk).collect();
-        let from = trunks[0].width() + senses.told;
+        let from = trunks[0].width() + inputs.conditioning;
         Critic {
-            telling: Telling::new(path, senses.told, senses.goal.as_ref().map(over), senses.channels),
+            conditioner: Conditioning::new(path, inputs.conditioning, inputs.goal.as_ref().map(over), inputs.channels),
             trunks,
             q: ["q1", "q2"].map(|name| QHead::new(&(path / name), from, spec)),
             value: ValueHead::new(&(path / "value"), from, &spec.hidden, spec.dropout),
@@ -128,23 +129,36 @@ impl Critic {
     }
 
     /// The input of head `head` (0 and 1: Q, 2: V), given what an earlier head read.
-    fn input(&self, head: usize, observation: &Tensor, told: &Tensor, earlier: Option<&Tensor>, train: bool) -> Tensor {
+    fn input(
+        &self,
+        head: usize,
+        observation: &Tensor,
+        conditioning: &Tensor,
+        earlier: Option<&Tensor>,
+        train: bool,
+    ) -> Tensor {
         match (earlier, &self.trunks[..]) {
             (Some(earlier), [_]) => earlier.shallow_clone(),
             (_, trunks) => {
                 let trunk = &trunks[head.min(trunks.len() - 1)];
-                Tensor::cat(&[&trunk.forward(observation, Some(told), train), told], 1)
+                Tensor::cat(&[&trunk.forward(observation, Some(conditioning), train), conditioning], 1)
             }
         }
     }
 
-    /// Judges a batch in training: `observation` [n, channels, 7, 7], `told` as the policy's, `actions` and `objects` n each
+    /// Q and V of a batch in training: `observation` [n, channels, 7, 7], `conditioning` as the policy's, `actions` and `objects` [n]
     /// (class indices, 0 for navigation).
-    pub fn evaluate(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> CriticValues {
-        let told = self.telling.forward(told, observation.kind(), true);
-        let first = self.input(0, observation, &told, None, true);
-        let second = self.input(1, observation, &told, Some(&first), true);
-        let third = self.input(2, observation, &told, Some(&first), true);
+    pub fn evaluate(
+        &self,
+        observation: &Tensor,
+        conditioning: &Tensor,
+        actions: &Tensor,
+        objects: &Tensor,
+    ) -> CriticValues {
+        let conditioning = self.conditioner.forward(conditioning, observation.kind(), true);
+        let first = self.input(0, observation, &conditioning, None, true);
+        let second = self.input(1, observation, &conditioning, Some(&first), true);
+        let third = self.input(2, observation, &conditioning, Some(&first), true);
         CriticValues {
             q: [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, true)),
             value: self.value.forward(&third, true),
@@ -152,37 +166,42 @@ impl Critic {
         }
     }
 
-    /// min(Q1, Q2) `[n]`, without dropout and without gradient.
-    pub fn min_q(&self, observation: &Tensor, told: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
+    /// min(Q1, Q2) [n], without dropout and without gradient.
+    pub fn min_q(&self, observation: &Tensor, conditioning: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
         tch::no_grad(|| {
-            let told = self.telling.forward(told, observation.kind(), false);
-            let first = self.input(0, observation, &told, None, false);
-            let second = self.input(1, observation, &told, Some(&first), false);
+            let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
+            let first = self.input(0, observation, &conditioning, None, false);
+            let second = self.input(1, observation, &conditioning, Some(&first), false);
             let [one, other] =
                 [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, false));
             one.minimum(&other)
         })
     }
 
-    /// V `[n]`, without dropout and without gradient.
-    pub fn value(&self, observation: &Tensor, told: &Tensor) -> Tensor {
+    /// V [n], without dropout and without gradient.
+    pub fn value(&self, observation: &Tensor, conditioning: &Tensor) -> Tensor {
         tch::no_grad(|| {
-            let told = self.telling.forward(told, observation.kind(), false);
-            self.value.forward(&self.input(2, observation, &told, None, false), false)
+            let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
+            self.value.forward(&self.input(2, observation, &conditioning, None, false), false)
         })
     }
 
-    /// Of one situation, V and min(Q1, Q2) of each (action, object) pair; the situation is looked at once.
-    pub fn evaluate_actions(&self, observation: &Tensor, told: &Tensor, pairs: &[(i64, i64)]) -> (Tensor, Tensor) {
+    /// V of one observation and min(Q1, Q2) of each (action, object) pair; the trunk runs once.
+    pub fn evaluate_actions(
+        &self,
+        observation: &Tensor,
+        conditioning: &Tensor,
+        pairs: &[(i64, i64)],
+    ) -> (Tensor, Tensor) {
         let column = |of: fn(&(i64, i64)) -> i64| {
             Tensor::from_slice(&pairs.iter().map(of).collect::<Vec<i64>>()).to_device(observation.device())
         };
         let (actions, objects) = (column(|pair| pair.0), column(|pair| pair.1));
         tch::no_grad(|| {
-            let told = self.telling.forward(told, observation.kind(), false);
-            let first = self.input(0, observation, &told, None, false);
+            let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
+            let first = self.input(0, observation, &conditioning, None, false);
             let inputs =
-                [0, 1, 2].map(|head| self.input(head, observation, &told, (head > 0).then_some(&first), false));
+                [0, 1, 2].map(|head| self.input(head, observation, &conditioning, (head > 0).then_some(&first), false));
             let rows = pairs.len() as i64;
             let [one, other] =
                 [0, 1].map(|k| self.q[k].forward(&inputs[k].expand([rows, -1], false), &actions, &objects, false));
@@ -208,7 +227,7 @@ mod tests {
             object_embedding: 3,
             shared_trunk,
         };
-        Critic::new(&store.root(), &spec, CriticInputs { channels: 10, told: 5, goal: None })
+        Critic::new(&store.root(), &spec, CriticInputs { channels: 10, conditioning: 5, goal: None })
     }
 
     fn inputs(n: i64) -> (Tensor, Tensor, Tensor, Tensor) {
@@ -221,34 +240,34 @@ mod tests {
     fn a_shared_trunk_has_a_third_of_the_convolutions_and_all_shapes_agree() {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(2);
-        let (observation, told, actions, objects) = inputs(3);
+        let (observation, conditioning, actions, objects) = inputs(3);
         let convolutions = [true, false].map(|shared| {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = critic(&store, shared);
-            let judged = critic.evaluate(&observation, &told, &actions, &objects);
-            assert!([&judged.q[0], &judged.q[1], &judged.value, &judged.baseline].iter().all(|t| t.size() == [3]));
-            assert!(judged.value.requires_grad() && !judged.baseline.requires_grad());
+            let values = critic.evaluate(&observation, &conditioning, &actions, &objects);
+            assert!([&values.q[0], &values.q[1], &values.value, &values.baseline].iter().all(|t| t.size() == [3]));
+            assert!(values.value.requires_grad() && !values.baseline.requires_grad());
             store.variables().keys().filter(|name| name.ends_with("conv.weight")).count()
         });
         assert_eq!(convolutions, [4, 12]);
     }
 
     #[test]
-    fn pairs_of_one_situation_are_judged_as_in_a_batch() {
+    fn pairs_of_one_observation_are_valued_as_in_a_batch() {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(3);
         for shared in [true, false] {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = critic(&store, shared);
-            let (observation, told, ..) = inputs(1);
+            let (observation, conditioning, ..) = inputs(1);
             let pairs = [(0, 0), (5, 2), (5, 40), (9, 81)];
-            let (value, q) = critic.evaluate_actions(&observation, &told, &pairs);
+            let (value, q) = critic.evaluate_actions(&observation, &conditioning, &pairs);
             let (actions, objects) = (Tensor::from_slice(&pairs.map(|p| p.0)), Tensor::from_slice(&pairs.map(|p| p.1)));
             let repeat = |tensor: &Tensor| tensor.repeat([&[4i64][..], &vec![1; tensor.dim() - 1]].concat());
-            let (many, tellings) = (repeat(&observation), repeat(&told));
+            let (many, conditionings) = (repeat(&observation), repeat(&conditioning));
             let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-5;
-            assert!(close(&q, &critic.min_q(&many, &tellings, &actions, &objects)));
-            assert!(close(&value, &critic.value(&many, &tellings)));
+            assert!(close(&q, &critic.min_q(&many, &conditionings, &actions, &objects)));
+            assert!(close(&value, &critic.value(&many, &conditionings)));
             assert!((q.max() - q.min()).double_value(&[]) > 1e-4, "the action matters");
         }
     }

@@ -6,17 +6,17 @@ use super::weights::{Form, Tensors};
 
 /// A fully connected layer, its weight kept as `[inputs, outputs]`: for the few rows of a short sentence the product
 /// is a third faster than with the published `[outputs, inputs]`.
-pub(super) struct Dense {
+pub(super) struct Linear {
     weight: Tensor,
     bias: Tensor,
 }
 
-impl Dense {
+impl Linear {
     /// Joins published layers that read the same input into one.
-    fn join(parts: &[Dense]) -> Dense {
+    fn join(parts: &[Linear]) -> Linear {
         let weights: Vec<&Tensor> = parts.iter().map(|part| &part.weight).collect();
         let biases: Vec<&Tensor> = parts.iter().map(|part| &part.bias).collect();
-        Dense { weight: Tensor::cat(&weights, 1), bias: Tensor::cat(&biases, 0) }
+        Linear { weight: Tensor::cat(&weights, 1), bias: Tensor::cat(&biases, 0) }
     }
 
     /// `[batch, tokens, outputs]` from `[batch, tokens, inputs]`.
@@ -27,38 +27,38 @@ impl Dense {
 }
 
 /// A layer normalisation over the last dimension.
-pub(super) struct Norm {
+pub(super) struct LayerNorm {
     weight: Tensor,
     bias: Tensor,
     epsilon: f64,
 }
 
-impl Norm {
+impl LayerNorm {
     pub(super) fn forward(&self, input: &Tensor) -> Tensor {
         input.layer_norm(self.weight.size(), Some(&self.weight), Some(&self.bias), self.epsilon, false)
     }
 }
 
 /// Hands out the tensors of a weights file by name. The file was checked against the model's forms before.
-pub(super) struct Shelf<'a> {
+pub(super) struct CheckedTensors<'a> {
     pub(super) tensors: &'a Tensors,
     pub(super) epsilon: f64,
 }
 
-impl Shelf<'_> {
+impl CheckedTensors<'_> {
     pub(super) fn tensor(&self, name: &str) -> anyhow::Result<Tensor> {
         let tensor = self.tensors.get(name);
         tensor.map(Tensor::shallow_clone).ok_or_else(|| anyhow::anyhow!("the tensor {name} is missing"))
     }
 
-    pub(super) fn dense(&self, name: &str) -> anyhow::Result<Dense> {
+    pub(super) fn dense(&self, name: &str) -> anyhow::Result<Linear> {
         let weight = self.tensor(&format!("{name}.weight"))?.tr().contiguous();
-        Ok(Dense { weight, bias: self.tensor(&format!("{name}.bias"))? })
+        Ok(Linear { weight, bias: self.tensor(&format!("{name}.bias"))? })
     }
 
-    pub(super) fn norm(&self, name: &str) -> anyhow::Result<Norm> {
+    pub(super) fn norm(&self, name: &str) -> anyhow::Result<LayerNorm> {
         let (weight, bias) = (self.tensor(&format!("{name}.weight"))?, self.tensor(&format!("{name}.bias"))?);
-        Ok(Norm { weight, bias, epsilon: self.epsilon })
+        Ok(LayerNorm { weight, bias, epsilon: self.epsilon })
     }
 }
 
@@ -97,36 +97,41 @@ impl LayerNames {
 }
 
 /// One layer; queries, keys and values are one matrix so that a short sentence costs one product instead of three.
-struct Layer {
-    query_key_value: Dense,
-    attention_output: Dense,
-    attention_norm: Norm,
-    inner: Dense,
-    outer: Dense,
-    norm: Norm,
+struct EncoderLayer {
+    query_key_value: Linear,
+    attention_output: Linear,
+    attention_norm: LayerNorm,
+    inner: Linear,
+    outer: Linear,
+    norm: LayerNorm,
 }
 
 /// The layers of an encoder.
-pub(super) struct Stack {
-    layers: Vec<Layer>,
+pub(super) struct EncoderStack {
+    layers: Vec<EncoderLayer>,
     heads: i64,
 }
 
-impl Stack {
-    pub(super) fn take(shelf: &Shelf<'_>, names: &LayerNames, layers: i64, heads: i64) -> anyhow::Result<Stack> {
+impl EncoderStack {
+    pub(super) fn take(
+        tensors: &CheckedTensors<'_>,
+        names: &LayerNames,
+        layers: i64,
+        heads: i64,
+    ) -> anyhow::Result<EncoderStack> {
         let layers = (0..layers).map(|layer| {
             let at = |name: &str| format!("encoder.layer.{layer}.{name}");
-            let [query, key, value] = [names.query, names.key, names.value].map(|name| shelf.dense(&at(name)));
-            Ok(Layer {
-                query_key_value: Dense::join(&[query?, key?, value?]),
-                attention_output: shelf.dense(&at(names.output))?,
-                attention_norm: shelf.norm(&at(names.attention_norm))?,
-                inner: shelf.dense(&at("intermediate.dense"))?,
-                outer: shelf.dense(&at("output.dense"))?,
-                norm: shelf.norm(&at("output.LayerNorm"))?,
+            let [query, key, value] = [names.query, names.key, names.value].map(|name| tensors.dense(&at(name)));
+            Ok(EncoderLayer {
+                query_key_value: Linear::join(&[query?, key?, value?]),
+                attention_output: tensors.dense(&at(names.output))?,
+                attention_norm: tensors.norm(&at(names.attention_norm))?,
+                inner: tensors.dense(&at("intermediate.dense"))?,
+                outer: tensors.dense(&at("output.dense"))?,
+                norm: tensors.norm(&at("output.LayerNorm"))?,
             })
         });
-        Ok(Stack { layers: layers.collect::<anyhow::Result<_>>()?, heads })
+        Ok(EncoderStack { layers: layers.collect::<anyhow::Result<_>>()?, heads })
     }
 
     /// Hidden states `[batch, tokens, hidden]` after all layers; `bias` is added to the attention scores and broadcasts
@@ -136,7 +141,7 @@ impl Stack {
     }
 }
 
-impl Layer {
+impl EncoderLayer {
     fn forward(&self, states: &Tensor, bias: Option<&Tensor>, heads: i64) -> Tensor {
         let attended = self.attention_output.forward(&self.attend(states, bias, heads));
         let states = self.attention_norm.forward(&(attended + states));

@@ -45,7 +45,7 @@ impl AttentionSpec {
 }
 
 #[derive(Debug)]
-struct Layer {
+struct AttentionLayer {
     query_key_value: nn::Linear,
     attended: nn::Linear,
     attended_norm: nn::LayerNorm,
@@ -56,11 +56,11 @@ struct Layer {
     dropout: f64,
 }
 
-impl Layer {
-    fn new(path: &nn::Path<'_>, width: i64, spec: &AttentionSpec, dropout: f64) -> Layer {
+impl AttentionLayer {
+    fn new(path: &nn::Path<'_>, width: i64, spec: &AttentionSpec, dropout: f64) -> AttentionLayer {
         let linear = |name: &str, from: i64, to: i64| nn::linear(path / name, from, to, Default::default());
         let norm = |name: &str| nn::layer_norm(path / name, vec![width], Default::default());
-        Layer {
+        AttentionLayer {
             query_key_value: linear("query_key_value", width, 3 * width),
             attended: linear("attended", width, width),
             attended_norm: norm("attended_norm"),
@@ -95,8 +95,8 @@ pub struct Episodic {
     words: nn::Embedding,
     trunk: Trunk,
     frame: nn::Linear,
-    language: Vec<Layer>,
-    fusion: Vec<Layer>,
+    language: Vec<AttentionLayer>,
+    fusion: Vec<AttentionLayer>,
     norm: nn::LayerNorm,
     history: i64,
     width: i64,
@@ -110,8 +110,10 @@ impl Episodic {
         (history, features): (i64, i64),
         (width, convolutions, dropout): (i64, Convolutions<'_>, f64),
     ) -> Episodic {
-        let layers = |name: &str| -> Vec<Layer> {
-            (1..=spec.layers).map(|i| Layer::new(&(path / format!("{name}{i}")), width, spec, dropout)).collect()
+        let layers = |name: &str| -> Vec<AttentionLayer> {
+            (1..=spec.layers)
+                .map(|i| AttentionLayer::new(&(path / format!("{name}{i}")), width, spec, dropout))
+                .collect()
         };
         let trunk = Trunk::new(&(path / "frame"), features, convolutions, None);
         Episodic {
@@ -129,16 +131,17 @@ impl Episodic {
     /// `observation` [n, history * features, 7, 7] and `words` [n, words], 0 for padding, to [n, width].
     pub fn forward(&self, observation: &Tensor, words: &Tensor, train: bool) -> Tensor {
         let (n, kind) = (words.size()[0], observation.kind());
-        let told = words.gt(0).to_kind(Kind::Float);
+        let present = words.gt(0).to_kind(Kind::Float);
         let bias = |mask: &Tensor| (mask.unsqueeze(1).unsqueeze(1) - 1.0) * 1e4;
         let read = self.words.forward(words) + self.places(0, words.size()[1], words);
-        let read = self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&told), kind, train));
+        let read =
+            self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&present), kind, train));
         let frames = observation.reshape([n * self.history, -1, SIDE, SIDE]);
         let seen =
             precision::answer(&self.frame, &self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
-        // Frames come after the longest text, so that their places do not depend on what is told.
+        // Frames come after the longest text, so that their places do not depend on the instruction.
         let tokens = Tensor::cat(&[&read, &(&seen + self.places(1000, self.history, words))], 1);
-        let mask = Tensor::cat(&[&told, &told.new_ones([n, self.history], (Kind::Float, told.device()))], 1);
+        let mask = Tensor::cat(&[&present, &present.new_ones([n, self.history], (Kind::Float, present.device()))], 1);
         let tokens = self.norm.forward(&tokens);
         let tokens = self.fusion.iter().fold(tokens, |tokens, layer| layer.forward(&tokens, &bias(&mask), kind, train));
         tokens.select(1, -1) + seen.select(1, -1)
@@ -165,7 +168,8 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(4);
         let store = nn::VarStore::new(Device::Cpu);
-        let layer = Layer::new(&store.root(), 8, &AttentionSpec { words: 9, layers: 1, heads: 2, inner: 16 }, 0.0);
+        let layer =
+            AttentionLayer::new(&store.root(), 8, &AttentionSpec { words: 9, layers: 1, heads: 2, inner: 16 }, 0.0);
         let (tokens, bias) = (Tensor::randn([3, 5, 8], (Kind::Float, Device::Cpu)), Tensor::from(0.0f32));
         let [full, mixed] = [Kind::Float, Kind::BFloat16].map(|kind| layer.forward(&tokens, &bias, kind, false));
         assert_eq!([full.kind(), mixed.kind()], [Kind::Float, Kind::Float]);

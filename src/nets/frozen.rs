@@ -36,7 +36,7 @@ fn channels_last(tensor: &Tensor) -> Tensor {
 }
 
 /// The parts of a batch norm, and what its variances are kept from 0 by.
-pub(super) struct Norm<'a> {
+pub(super) struct BatchNormParts<'a> {
     pub(super) weight: &'a Tensor,
     pub(super) bias: &'a Tensor,
     pub(super) mean: &'a Tensor,
@@ -44,25 +44,25 @@ pub(super) struct Norm<'a> {
     pub(super) epsilon: f64,
 }
 
-impl<'a> Norm<'a> {
+impl<'a> BatchNormParts<'a> {
     /// Of a trained layer with the usual epsilon; nothing when it has no weights.
-    pub(super) fn of(norm: &'a nn::BatchNorm) -> Option<Norm<'a>> {
+    pub(super) fn of(norm: &'a nn::BatchNorm) -> Option<BatchNormParts<'a>> {
         let (weight, bias) = (norm.ws.as_ref()?, norm.bs.as_ref()?);
-        Some(Norm { weight, bias, mean: &norm.running_mean, variance: &norm.running_var, epsilon: 1e-5 })
+        Some(BatchNormParts { weight, bias, mean: &norm.running_mean, variance: &norm.running_var, epsilon: 1e-5 })
     }
 }
 
 /// A convolution without bias with the batch norm after it folded in.
 #[derive(Debug)]
-pub(super) struct Folded {
+pub(super) struct FoldedConv {
     weight: Tensor,
     bias: Tensor,
     stride: i64,
     padding: i64,
 }
 
-impl Folded {
-    pub(super) fn new(weight: &Tensor, norm: Option<&Norm<'_>>, stride: i64) -> Folded {
+impl FoldedConv {
+    pub(super) fn new(weight: &Tensor, norm: Option<&BatchNormParts<'_>>, stride: i64) -> FoldedConv {
         tch::no_grad(|| {
             let padding = weight.size()[2] / 2;
             let (weight, bias) = match norm {
@@ -72,7 +72,7 @@ impl Folded {
                 }
                 None => (weight.copy(), Tensor::zeros([weight.size()[0]], (Kind::Float, weight.device()))),
             };
-            Folded { weight: channels_last(&weight.detach()), bias: bias.detach(), stride, padding }
+            FoldedConv { weight: channels_last(&weight.detach()), bias: bias.detach(), stride, padding }
         })
     }
 
@@ -85,7 +85,7 @@ impl Folded {
         self.forward(x).relu_()
     }
 
-    pub(super) fn twin(&self) -> Folded {
-        Folded { weight: self.weight.shallow_clone(), bias: self.bias.shallow_clone(), ..*self }
+    pub(super) fn twin(&self) -> FoldedConv {
+        FoldedConv { weight: self.weight.shallow_clone(), bias: self.bias.shallow_clone(), ..*self }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tch::{Kind, Tensor};
 
-use super::encoder_stack::{LayerNames, Norm, Shelf, Stack, padding_bias};
+use super::encoder_stack::{CheckedTensors, EncoderStack, LayerNames, LayerNorm, padding_bias};
 use super::transformer_config::TransformerConfig;
 use super::weights::Form;
 
@@ -24,10 +24,10 @@ pub(super) struct Mpnet {
     words: Tensor,
     positions: Tensor,
     padding: i64,
-    norm: Norm,
+    norm: LayerNorm,
     /// Bias by bucket and head, `[buckets, heads]`; one table for all layers.
     relative: Tensor,
-    stack: Stack,
+    stack: EncoderStack,
 }
 
 impl Mpnet {
@@ -46,14 +46,14 @@ impl Mpnet {
         forms
     }
 
-    pub(super) fn take(shelf: &Shelf<'_>, config: &TransformerConfig) -> anyhow::Result<Mpnet> {
+    pub(super) fn take(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Mpnet> {
         Ok(Mpnet {
-            words: shelf.tensor("embeddings.word_embeddings.weight")?,
-            positions: shelf.tensor("embeddings.position_embeddings.weight")?,
+            words: tensors.tensor("embeddings.word_embeddings.weight")?,
+            positions: tensors.tensor("embeddings.position_embeddings.weight")?,
             padding: config.padding(),
-            norm: shelf.norm("embeddings.LayerNorm")?,
-            relative: shelf.tensor("encoder.relative_attention_bias.weight")?,
-            stack: Stack::take(shelf, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
+            norm: tensors.norm("embeddings.LayerNorm")?,
+            relative: tensors.tensor("encoder.relative_attention_bias.weight")?,
+            stack: EncoderStack::take(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
         })
     }
 

@@ -8,7 +8,7 @@ use crate::domain::Class;
 
 /// Heads over a feature map; thrown away after training.
 #[derive(Debug)]
-pub struct SightHeads {
+pub struct PerceptionHeads {
     marks: nn::Conv2D,
     depth: nn::Conv2D,
     held: nn::Linear,
@@ -16,7 +16,7 @@ pub struct SightHeads {
 
 /// A batch's losses; each a scalar tensor.
 #[derive(Debug)]
-pub struct SightLoss {
+pub struct PerceptionLoss {
     /// Binary cross-entropy of the marks, added up over the marks of a place.
     pub marks: Tensor,
     /// Mean absolute error of the logarithm of depth.
@@ -25,16 +25,16 @@ pub struct SightLoss {
     pub held: Tensor,
 }
 
-impl SightLoss {
+impl PerceptionLoss {
     /// All together.
     pub fn total(&self) -> Tensor {
         &self.marks + &self.depth + &self.held
     }
 }
 
-/// What is known of a batch of frames.
+/// The labels of a batch of frames.
 #[derive(Debug)]
-pub struct Known {
+pub struct FrameLabels {
     /// [n, marks, 7, 7], 0 or 1.
     pub marks: Tensor,
     /// [n, 1, 7, 7], the logarithm of metres.
@@ -43,34 +43,35 @@ pub struct Known {
     pub held: Tensor,
 }
 
-impl SightHeads {
+impl PerceptionHeads {
     /// Heads for that many marks, over maps of `features` channels.
-    pub fn new(path: &nn::Path<'_>, features: i64, marks: i64) -> SightHeads {
-        SightHeads {
+    pub fn new(path: &nn::Path<'_>, features: i64, marks: i64) -> PerceptionHeads {
+        PerceptionHeads {
             marks: nn::conv2d(path / "marks", features, marks, 1, Default::default()),
             depth: nn::conv2d(path / "depth", features, 1, 1, Default::default()),
             held: nn::linear(path / "held", features * SIDE * SIDE, Class::VOCABULARY as i64, Default::default()),
         }
     }
 
-    /// How far `maps` are from telling what is `known`. A mark that holds weighs `positive_weight` times one that does not.
-    pub fn loss(&self, maps: &Tensor, known: &Known, positive_weight: f64) -> SightLoss {
+    /// How far `maps` are from the `labels`. A mark that holds weighs `positive_weight` times one that does not.
+    pub fn loss(&self, maps: &Tensor, labels: &FrameLabels, positive_weight: f64) -> PerceptionLoss {
         let logits = maps.apply(&self.marks);
         let weight = Tensor::from(positive_weight as f32).to_device(logits.device());
         let marks =
-            logits.binary_cross_entropy_with_logits(&known.marks, None::<&Tensor>, Some(&weight), Reduction::Mean);
-        SightLoss {
+            logits.binary_cross_entropy_with_logits(&labels.marks, None::<&Tensor>, Some(&weight), Reduction::Mean);
+        PerceptionLoss {
             marks: marks * logits.size()[1],
-            depth: (maps.apply(&self.depth) - &known.depth).abs().mean(Kind::Float),
-            held: self.held.forward(&maps.flatten(1, -1)).cross_entropy_for_logits(&known.held),
+            depth: (maps.apply(&self.depth) - &labels.depth).abs().mean(Kind::Float),
+            held: self.held.forward(&maps.flatten(1, -1)).cross_entropy_for_logits(&labels.held),
         }
     }
 
-    /// Of the marks `from..to`: how many hold and are told, hold, and are told; and how many held classes are right.
-    pub fn counts(&self, maps: &Tensor, known: &Known, from: i64, to: i64) -> [f64; 4] {
-        let told = maps.apply(&self.marks).gt(0.0).to_kind(Kind::Float).narrow(1, from, to - from);
-        let holds = known.marks.narrow(1, from, to - from);
-        let held = self.held.forward(&maps.flatten(1, -1)).argmax(-1, false).eq_tensor(&known.held);
-        [&told * &holds, holds, told, held.to_kind(Kind::Float)].map(|tensor| tensor.sum(Kind::Float).double_value(&[]))
+    /// Of the marks `from..to`: how many hold and are predicted, hold, are predicted; and how many held classes are right.
+    pub fn counts(&self, maps: &Tensor, labels: &FrameLabels, from: i64, to: i64) -> [f64; 4] {
+        let predicted = maps.apply(&self.marks).gt(0.0).to_kind(Kind::Float).narrow(1, from, to - from);
+        let holds = labels.marks.narrow(1, from, to - from);
+        let held = self.held.forward(&maps.flatten(1, -1)).argmax(-1, false).eq_tensor(&labels.held);
+        [&predicted * &holds, holds, predicted, held.to_kind(Kind::Float)]
+            .map(|tensor| tensor.sum(Kind::Float).double_value(&[]))
     }
 }

@@ -7,7 +7,7 @@ use tch::nn;
 use super::bounds;
 use super::episodic::{AttentionSpec, Episodic};
 use super::precision;
-use super::trunk::{Convolutions, Dense, Telling, Trunk};
+use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use crate::domain::{ActionType, Class};
 
 /// The size of a policy network.
@@ -27,7 +27,7 @@ pub struct PolicySpec {
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
     pub dropout: f64,
-    /// Where the agent is shown a state to reach instead of being told: the channels of the four convolutions that see it.
+    /// Where a state to reach takes the place of an instruction: the channels of the four convolutions that see it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<[i64; 4]>,
     /// Where the agent reads words and attends to them: the attention layers.
@@ -67,19 +67,19 @@ pub struct Logits {
     pub objects: Tensor,
 }
 
-/// How it sees, and takes in what it is told.
+/// How the observation and the conditioning become features.
 #[derive(Debug)]
 enum Body {
-    Trunk { telling: Telling, trunk: Trunk },
+    Trunk { conditioner: Conditioning, trunk: Trunk },
     Episodic(Box<Episodic>),
 }
 
-/// Sees the last few frames and is told something; says what to do and to which class.
+/// From the last few frames and an instruction or goal to logits of actions and object classes.
 #[derive(Debug)]
 pub struct PolicyNet {
     spec: PolicySpec,
     body: Body,
-    dense: Dense,
+    dense: DenseLayers,
     actions: nn::Linear,
     objects: nn::Linear,
 }
@@ -96,12 +96,12 @@ impl PolicyNet {
             }
             None => {
                 let trunk = Trunk::new(path, from, over(&spec.channels), Some(spec.embedding));
-                let telling = Telling::new(path, spec.embedding, spec.goal.as_ref().map(over), from);
+                let conditioner = Conditioning::new(path, spec.embedding, spec.goal.as_ref().map(over), from);
                 let width = trunk.width();
-                (Body::Trunk { telling, trunk }, width + spec.embedding)
+                (Body::Trunk { conditioner, trunk }, width + spec.embedding)
             }
         };
-        let dense = Dense::new(path, width, &spec.hidden, spec.dropout);
+        let dense = DenseLayers::new(path, width, &spec.hidden, spec.dropout);
         PolicyNet {
             body,
             actions: nn::linear(path / "actions", dense.width(), ActionType::COUNT as i64, Default::default()),
@@ -116,14 +116,14 @@ impl PolicyNet {
         &self.spec
     }
 
-    /// `observation` [n, history * features, 7, 7], oldest frame first, and `told`: sentences [n, embedding] of unit length,
+    /// `observation` [n, history * features, 7, 7], oldest frame first, and `conditioning`: sentences [n, embedding] of unit length,
     /// goals of the observation's shape, or numbers of words [n, words].
-    pub fn forward(&self, observation: &Tensor, told: &Tensor, train: bool) -> Logits {
+    pub fn forward(&self, observation: &Tensor, conditioning: &Tensor, train: bool) -> Logits {
         let features = match &self.body {
-            Body::Episodic(episodic) => episodic.forward(observation, told, train),
-            Body::Trunk { telling, trunk } => {
-                let told = telling.forward(told, observation.kind(), train);
-                Tensor::cat(&[trunk.forward(observation, Some(&told), train), told], 1)
+            Body::Episodic(episodic) => episodic.forward(observation, conditioning, train),
+            Body::Trunk { conditioner, trunk } => {
+                let conditioning = conditioner.forward(conditioning, observation.kind(), train);
+                Tensor::cat(&[trunk.forward(observation, Some(&conditioning), train), conditioning], 1)
             }
         };
         let x = self.dense.forward(features, train);

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context;
 use tch::{Device, Kind, Tensor};
 
-use super::frozen::{Folded, FrameEncoder, Norm, stacked};
+use super::frozen::{BatchNormParts, FoldedConv, FrameEncoder, stacked};
 use super::resize::shrink_bilinear;
 use super::weights::{self, Form, Tensors};
 use crate::house::view::Frame;
@@ -22,7 +22,7 @@ const DEVIATION: [f32; 3] = [0.229, 0.224, 0.225];
 /// The trunk of a ResNet-18, batch norms folded in.
 #[derive(Debug)]
 pub struct ResNet18 {
-    stem: Folded,
+    stem: FoldedConv,
     blocks: Vec<Block>,
     mean: Tensor,
     deviation: Tensor,
@@ -32,10 +32,10 @@ pub struct ResNet18 {
 
 #[derive(Debug)]
 struct Block {
-    first: Folded,
-    second: Folded,
+    first: FoldedConv,
+    second: FoldedConv,
     /// What brings the input into the output's shape, where that is another one.
-    shortcut: Option<Folded>,
+    shortcut: Option<FoldedConv>,
 }
 
 /// The two blocks of each layer: their names, channels before and after, and stride.
@@ -80,15 +80,15 @@ impl ResNet18 {
         let digest = weights::digest(tensors.iter().map(|(name, tensor)| (name.clone(), tensor.shallow_clone())))?;
         let tensors: Tensors = tensors.into_iter().map(|(name, tensor)| (name, tensor.to_device(device))).collect();
         let get = |name: String| tensors.get(&name).with_context(|| format!("the tensor {name} is missing"));
-        let folded = |conv: &str, norm: &str, stride: i64| -> anyhow::Result<Folded> {
-            let norm = Norm {
+        let folded = |conv: &str, norm: &str, stride: i64| -> anyhow::Result<FoldedConv> {
+            let norm = BatchNormParts {
                 weight: get(format!("{norm}.weight"))?,
                 bias: get(format!("{norm}.bias"))?,
                 mean: get(format!("{norm}.running_mean"))?,
                 variance: get(format!("{norm}.running_var"))?,
                 epsilon: 1e-5,
             };
-            Ok(Folded::new(get(format!("{conv}.weight"))?, Some(&norm), stride))
+            Ok(FoldedConv::new(get(format!("{conv}.weight"))?, Some(&norm), stride))
         };
         let block = |(name, _, _, stride): (String, i64, i64, i64)| -> anyhow::Result<Block> {
             let [one, two, down] = ["conv1", "conv2", "downsample.0"].map(|part| format!("{name}.{part}"));
@@ -126,7 +126,7 @@ impl Block {
         Block {
             first: self.first.twin(),
             second: self.second.twin(),
-            shortcut: self.shortcut.as_ref().map(Folded::twin),
+            shortcut: self.shortcut.as_ref().map(FoldedConv::twin),
         }
     }
 }

@@ -6,7 +6,7 @@ use anyhow::bail;
 use tch::{Device, Kind, Tensor};
 
 use super::bert::Bert;
-use super::encoder_stack::Shelf;
+use super::encoder_stack::CheckedTensors;
 use super::mpnet::Mpnet;
 use super::transformer_config::TransformerConfig;
 use super::weights::{self, Tensors, WeightsError};
@@ -36,15 +36,15 @@ impl Transformer {
                 (name, tensor.to_kind(kind).to_device(device))
             })
             .collect();
-        let shelf = Shelf { tensors: &tensors, epsilon: config.layer_norm_eps };
+        let checked = CheckedTensors { tensors: &tensors, epsilon: config.layer_norm_eps };
         match config.model_type.as_str() {
             "bert" => {
                 weights::check(path, &tensors, &Bert::forms(config))?;
-                Ok(Transformer::Bert(Bert::take(&shelf, config)?))
+                Ok(Transformer::Bert(Bert::take(&checked, config)?))
             }
             "mpnet" => {
                 weights::check(path, &tensors, &Mpnet::forms(config))?;
-                Ok(Transformer::Mpnet(Mpnet::take(&shelf, config)?))
+                Ok(Transformer::Mpnet(Mpnet::take(&checked, config)?))
             }
             other => bail!("model_type {other:?} is not supported (bert and mpnet are)"),
         }

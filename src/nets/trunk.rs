@@ -1,5 +1,5 @@
-//! What policy and critic have in common: the convolutional trunk over stacked feature maps, modulated by what the agent is
-//! told, and the fully connected layers above it.
+//! What policy and critic have in common: the convolutional trunk over stacked feature maps, modulated by the conditioning,
+//! and the fully connected layers above it.
 
 use tch::nn::{self, ModuleT};
 use tch::{Kind, Tensor};
@@ -32,12 +32,12 @@ impl Convolutions<'_> {
 /// Four convolutions, the first 1 x 1, the others 3 x 3, each with batch norm, FiLM and ReLU.
 #[derive(Debug)]
 pub struct Trunk {
-    stages: Vec<Stage>,
+    stages: Vec<TrunkStage>,
     width: i64,
 }
 
 #[derive(Debug)]
-struct Stage {
+struct TrunkStage {
     conv: nn::Conv2D,
     stride: i64,
     norm: nn::BatchNorm,
@@ -45,10 +45,10 @@ struct Stage {
 }
 
 impl Trunk {
-    /// A trunk over `from` channels with fresh weights under `path`; `told` is the width of the vector that modulates it, if
+    /// A trunk over `from` channels with fresh weights under `path`; `conditioning` is the width of the vector that modulates it, if
     /// there is one. Norms begin with scales by chance between 0 and 1: where they began at 1, a clone had a held-out action loss
     /// of 0.66 after 2,000 updates instead of 0.64.
-    pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, told: Option<i64>) -> Trunk {
+    pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, conditioning: Option<i64>) -> Trunk {
         let mut from = from;
         let mut stages = Vec::new();
         for (i, &to) in convolutions.channels.iter().enumerate() {
@@ -56,11 +56,11 @@ impl Trunk {
             let (kernel, padding) = if i == 0 { (1, 0) } else { (3, 1) };
             let stride = convolutions.stride(i);
             let config = nn::ConvConfig { padding, stride, bias: false, ..Default::default() };
-            stages.push(Stage {
+            stages.push(TrunkStage {
                 conv: nn::conv2d(&here / "conv", from, to, kernel, config),
                 stride,
                 norm: nn::batch_norm2d(&here / "norm", to, Default::default()),
-                film: told.map(|width| Film::new(&(&here / "film"), width, to)),
+                film: conditioning.map(|width| Film::new(&(&here / "film"), width, to)),
             });
             from = to;
         }
@@ -72,13 +72,13 @@ impl Trunk {
         self.width
     }
 
-    /// `observation` [n, channels, 7, 7] and `told` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
-    pub fn forward(&self, observation: &Tensor, told: Option<&Tensor>, train: bool) -> Tensor {
+    /// `observation` [n, channels, 7, 7] and `conditioning` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
+    pub fn forward(&self, observation: &Tensor, conditioning: Option<&Tensor>, train: bool) -> Tensor {
         let mut x = observation.shallow_clone();
-        for Stage { conv, stride, norm, film } in &self.stages {
+        for TrunkStage { conv, stride, norm, film } in &self.stages {
             x = norm.forward_t(&precision::convolution(conv, &x, *stride), train);
-            if let (Some(film), Some(told)) = (film, told) {
-                x = film.forward(&x, told);
+            if let (Some(film), Some(conditioning)) = (film, conditioning) {
+                x = film.forward(&x, conditioning);
             }
             x = x.relu_();
         }
@@ -88,22 +88,22 @@ impl Trunk {
 
 /// Fully connected layers with ReLU and dropout, named `dense1`, `dense2` and so on.
 #[derive(Debug)]
-pub struct Dense {
+pub struct DenseLayers {
     layers: Vec<nn::Linear>,
     dropout: f64,
     width: i64,
 }
 
-impl Dense {
+impl DenseLayers {
     /// Layers of widths `hidden` over `from` numbers with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> Dense {
+    pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> DenseLayers {
         let mut width = from;
         let mut layers = Vec::new();
         for (i, &to) in hidden.iter().enumerate() {
             layers.push(nn::linear(path / format!("dense{}", i + 1), width, to, Default::default()));
             width = to;
         }
-        Dense { layers, dropout, width }
+        DenseLayers { layers, dropout, width }
     }
 
     /// How many numbers come out.
@@ -111,15 +111,15 @@ impl Dense {
         self.width
     }
 
-    /// `x` [n, from] to [n, [`Dense::width`]].
+    /// `x` [n, from] to [n, [`DenseLayers::width`]].
     pub fn forward(&self, x: Tensor, train: bool) -> Tensor {
         self.layers.iter().fold(x, |x, layer| precision::linear(layer, &x).relu_().dropout(self.dropout, train))
     }
 }
 
-/// What the agent is told, as the vector that modulates and joins the features.
+/// Turns an instruction or a goal into the vector that modulates the trunk and joins its features.
 #[derive(Debug)]
-pub enum Telling {
+pub enum Conditioning {
     /// A sentence embedding of unit length.
     Sentence {
         /// Its width.
@@ -127,30 +127,30 @@ pub enum Telling {
     },
     /// Actionable Models: the stack of frames of the state to reach, seen by convolutions of its own.
     Goal {
-        /// Sees.
+        /// Convolutions over the goal's maps.
         trunk: Trunk,
-        /// From what is seen to as many numbers as a sentence would have.
+        /// From their features to as many numbers as a sentence would have.
         out: nn::Linear,
     },
 }
 
-impl Telling {
+impl Conditioning {
     /// For sentences of `width` numbers, or with `goal`, its convolutions, for stacks of `from` channels.
-    pub fn new(path: &nn::Path<'_>, width: i64, goal: Option<Convolutions<'_>>, from: i64) -> Telling {
-        let Some(convolutions) = goal else { return Telling::Sentence { width } };
+    pub fn new(path: &nn::Path<'_>, width: i64, goal: Option<Convolutions<'_>>, from: i64) -> Conditioning {
+        let Some(convolutions) = goal else { return Conditioning::Sentence { width } };
         let path = path / "goal";
         let trunk = Trunk::new(&path, from, convolutions, None);
         let out = nn::linear(&path / "out", trunk.width(), width, Default::default());
-        Telling::Goal { trunk, out }
+        Conditioning::Goal { trunk, out }
     }
 
-    /// `told`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width], as wide as `kind` says.
-    pub fn forward(&self, told: &Tensor, kind: Kind, train: bool) -> Tensor {
+    /// `conditioning`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width], as wide as `kind` says.
+    pub fn forward(&self, conditioning: &Tensor, kind: Kind, train: bool) -> Tensor {
         match self {
             // A unit vector's entries are tiny; scaled to unit variance they weigh as much as the other features.
-            Telling::Sentence { width } => (told * (*width as f64).sqrt()).to_kind(kind),
-            Telling::Goal { trunk, out } => {
-                precision::linear(out, &trunk.forward(&told.to_kind(kind), None, train)).tanh()
+            Conditioning::Sentence { width } => (conditioning * (*width as f64).sqrt()).to_kind(kind),
+            Conditioning::Goal { trunk, out } => {
+                precision::linear(out, &trunk.forward(&conditioning.to_kind(kind), None, train)).tanh()
             }
         }
     }

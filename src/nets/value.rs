@@ -4,19 +4,19 @@ use tch::Tensor;
 use tch::nn;
 
 use super::precision;
-use super::trunk::Dense;
+use super::trunk::DenseLayers;
 
-/// Fully connected layers over a trunk's features and what the agent is told, down to one number.
+/// Fully connected layers over a trunk's features and the conditioning, down to one number.
 #[derive(Debug)]
 pub struct ValueHead {
-    dense: Dense,
+    dense: DenseLayers,
     out: nn::Linear,
 }
 
 impl ValueHead {
     /// A head over `from` numbers with fresh weights under `path`.
     pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> ValueHead {
-        let dense = Dense::new(path, from, hidden, dropout);
+        let dense = DenseLayers::new(path, from, hidden, dropout);
         ValueHead { out: nn::linear(path / "out", dense.width(), 1, Default::default()), dense }
     }
 

@@ -6,7 +6,7 @@ use tch::nn::{self, ModuleT};
 use tch::{Device, Kind, Tensor};
 
 use super::bounds;
-use super::frozen::{Folded, FrameEncoder, Norm, stacked};
+use super::frozen::{BatchNormParts, FoldedConv, FrameEncoder, stacked};
 use super::precision::{self, Precision};
 use super::resize::shrink;
 use super::weights;
@@ -56,16 +56,16 @@ impl VisualSpec {
 }
 
 #[derive(Debug)]
-struct Layer {
+struct ConvNorm {
     conv: nn::Conv2D,
     stride: i64,
     norm: nn::BatchNorm,
 }
 
-impl Layer {
-    fn new(path: &nn::Path<'_>, from: i64, to: i64, stride: i64) -> Layer {
+impl ConvNorm {
+    fn new(path: &nn::Path<'_>, from: i64, to: i64, stride: i64) -> ConvNorm {
         let config = nn::ConvConfig { stride, padding: 1, bias: false, ..Default::default() };
-        Layer {
+        ConvNorm {
             conv: nn::conv2d(path / "conv", from, to, 3, config),
             stride,
             norm: nn::batch_norm2d(path / "norm", to, Default::default()),
@@ -76,25 +76,25 @@ impl Layer {
         self.norm.forward_t(&precision::convolution(&self.conv, x, self.stride), train)
     }
 
-    fn folded(&self) -> Folded {
-        Folded::new(&self.conv.ws, Norm::of(&self.norm).as_ref(), self.stride)
+    fn folded(&self) -> FoldedConv {
+        FoldedConv::new(&self.conv.ws, BatchNormParts::of(&self.norm).as_ref(), self.stride)
     }
 }
 
 /// A step down in resolution, then a residual block.
 #[derive(Debug)]
-struct Stage {
-    down: Layer,
-    first: Layer,
-    second: Layer,
+struct ResidualStage {
+    down: ConvNorm,
+    first: ConvNorm,
+    second: ConvNorm,
 }
 
-impl Stage {
-    fn new(path: &nn::Path<'_>, from: i64, to: i64) -> Stage {
-        Stage {
-            down: Layer::new(&(path / "down"), from, to, 2),
-            first: Layer::new(&(path / "first"), to, to, 1),
-            second: Layer::new(&(path / "second"), to, to, 1),
+impl ResidualStage {
+    fn new(path: &nn::Path<'_>, from: i64, to: i64) -> ResidualStage {
+        ResidualStage {
+            down: ConvNorm::new(&(path / "down"), from, to, 2),
+            first: ConvNorm::new(&(path / "first"), to, to, 1),
+            second: ConvNorm::new(&(path / "second"), to, to, 1),
         }
     }
 
@@ -109,17 +109,18 @@ impl Stage {
 #[derive(Debug)]
 pub struct HouseEncoder {
     spec: VisualSpec,
-    stem: Layer,
-    stages: Vec<Stage>,
+    stem: ConvNorm,
+    stages: Vec<ResidualStage>,
     device: Device,
 }
 
 impl HouseEncoder {
     /// An encoder with fresh weights under `path`.
     pub fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> HouseEncoder {
-        let stage = |(i, pair): (usize, &[i64])| Stage::new(&(path / format!("stage{}", i + 1)), pair[0], pair[1]);
+        let stage =
+            |(i, pair): (usize, &[i64])| ResidualStage::new(&(path / format!("stage{}", i + 1)), pair[0], pair[1]);
         HouseEncoder {
-            stem: Layer::new(&(path / "stem"), 3, spec.channels[0], 2),
+            stem: ConvNorm::new(&(path / "stem"), 3, spec.channels[0], 2),
             stages: spec.channels.windows(2).enumerate().map(stage).collect(),
             spec: spec.clone(),
             device: path.device(),
@@ -153,7 +154,7 @@ impl HouseEncoder {
     /// # Errors
     /// When the weights cannot be read.
     pub fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
-        let stage = |stage: &Stage| [stage.down.folded(), stage.first.folded(), stage.second.folded()];
+        let stage = |stage: &ResidualStage| [stage.down.folded(), stage.first.folded(), stage.second.folded()];
         Ok(FrozenVisual {
             spec: self.spec.clone(),
             stem: self.stem.folded(),
@@ -175,8 +176,8 @@ impl HouseEncoder {
 #[derive(Debug)]
 pub struct FrozenVisual {
     spec: VisualSpec,
-    stem: Folded,
-    stages: Vec<[Folded; 3]>,
+    stem: FoldedConv,
+    stages: Vec<[FoldedConv; 3]>,
     device: Device,
     digest: String,
 }
@@ -214,7 +215,7 @@ impl FrameEncoder for FrozenVisual {
         Box::new(FrozenVisual {
             spec: self.spec.clone(),
             stem: self.stem.twin(),
-            stages: self.stages.iter().map(|stage| stage.each_ref().map(Folded::twin)).collect(),
+            stages: self.stages.iter().map(|stage| stage.each_ref().map(FoldedConv::twin)).collect(),
             device: self.device,
             digest: self.digest.clone(),
         })

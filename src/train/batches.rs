@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
 use super::training_data::{ConditioningTable, TrainingData};
-use crate::algo::batch::{Batch, Pairs, Transitions};
-use crate::algo::chain::{Chaining, Pairs as Source};
+use crate::algo::batch::{Batch, ChainedPairs, Transitions};
+use crate::algo::chain::{Chaining, PairSource, cut_chance};
 use crate::data::items::{Item, Span};
 use crate::nets::visual::SIDE;
 
@@ -85,10 +85,10 @@ impl<'a> Batches<'a> {
     }
 
     /// Pairs (A, B): from the batch by a permutation, or from the pool.
-    fn pairs(&self, chaining: &Chaining, items: &[Item], step: u64) -> anyhow::Result<Pairs> {
+    fn pairs(&self, chaining: &Chaining, items: &[Item], step: u64) -> anyhow::Result<ChainedPairs> {
         let mut rng = self.chance(CHAINING, step);
         let (first, second, joint) = match (chaining.pairs, &self.material.pool) {
-            (Source::Pool(_), Some(pool)) => {
+            (PairSource::Pool(_), Some(pool)) => {
                 let drawn: Vec<usize> = (0..chaining.batch).map(|_| rng.random_range(0..pool.pairs.len())).collect();
                 let mut of = |text: u32| pool.item(self.material.items, text, &mut rng);
                 let first: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].0)).collect();
@@ -107,14 +107,13 @@ impl<'a> Batches<'a> {
                 (first, second, joint)
             }
         };
-        let cut: Vec<f32> =
-            first.iter().map(|item| flag(rng.random_bool(chaining.cut.chance(item.end - item.frame)))).collect();
+        let cut: Vec<f32> = first.iter().map(|item| flag(rng.random_bool(cut_chance(item.end - item.frame)))).collect();
         let joint = match chaining.aggregate > 0.0 {
             true => Some((joint.shallow_clone(), self.transitions(&second, joint)?)),
             false => None,
         };
         let first = self.transitions(&first, self.told(&second)?)?;
-        Ok(Pairs { first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
+        Ok(ChainedPairs { first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
     }
 
     /// What items are told.
@@ -162,12 +161,12 @@ impl<'a> Batches<'a> {
         Ok(Transitions {
             observation: seen(0),
             next: self.judged.then(|| seen(1)),
-            told,
+            conditioning: told,
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
-            named: Tensor::from_slice(&named).to_device(self.device),
+            object_target: Tensor::from_slice(&named).to_device(self.device),
             terminal: Tensor::from_slice(&terminal).to_device(self.device),
-            taken: Tensor::from_slice(&taken).to_device(self.device),
+            executed: Tensor::from_slice(&taken).to_device(self.device),
         })
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
-use crate::algo::chain::{Chaining, Pairs};
+use crate::algo::chain::{Chaining, PairSource};
 use crate::algo::iql::Iql;
 use crate::algo::learner::Optimisation;
 use crate::data::selection::Selection;
@@ -222,7 +222,7 @@ impl Preset {
         let sentences = self.policy.goal.is_none();
         anyhow::ensure!(sentences || chaining.aggregate == 0.0, "chaining.aggregate joins sentences; goals have none");
         anyhow::ensure!(
-            sentences || chaining.pairs == Pairs::InBatch,
+            sentences || chaining.pairs == PairSource::InBatch,
             "chaining.pairs: a pool is of sentences; goals are paired in-batch"
         );
         Ok(())
@@ -292,7 +292,7 @@ mod tests {
             assert!(paper.critic.is_none_or(|critic| !critic.shared_trunk), "{name}");
             assert_eq!((preset.data.named, paper.data.named), (Named::Ahead, Named::Own), "{name}");
             assert!(paper.iql.is_none_or(|iql| iql.advantage_scale == 0.0), "{name}");
-            assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == Pairs::InBatch), "{name}");
+            assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == PairSource::InBatch), "{name}");
         }
         let method = |name| Preset::named(name).unwrap().method();
         let methods = ["sprint", "sprint-no-agg", "sprint-no-chain", "iql-primitive", "l-bc", "l-bc-agg", "am", "et"];

@@ -12,7 +12,7 @@ use super::metrics::{Report, Scalars};
 use super::preset::Preset;
 use super::training_state::TrainingState;
 use crate::agent::checkpoint::Networks;
-use crate::algo::batch::{Batch, Transitions, seen};
+use crate::algo::batch::{Batch, Transitions, network_input};
 use crate::algo::bc;
 use crate::algo::critic::CriticLearner;
 use crate::algo::update::Update;
@@ -137,15 +137,15 @@ impl Trainer<'_> {
     fn measure(&self, measured: &[Transitions], scalars: &mut Scalars) {
         let mut sums = [0.0; 6];
         for items in measured {
-            let observation = seen(&items.observation, Precision::Full);
+            let observation = network_input(&items.observation, Precision::Full);
             let (logits, surprise) = tch::no_grad(|| {
-                let logits = self.networks.policy.forward(&observation, &items.told, false);
-                let surprise = bc::surprise(&logits, &items.actions, &items.objects);
+                let logits = self.networks.policy.forward(&observation, &items.conditioning, false);
+                let surprise = bc::neg_log_likelihood(&logits, &items.actions, &items.objects);
                 (logits, surprise)
             });
             let (actions, objects) = bc::accuracy(&logits, &items.actions, &items.objects);
             let sum = |tensor: &Tensor| tensor.sum(Kind::Double).double_value(&[]);
-            let (count, named) = (items.actions.size()[0] as f64, sum(&bc::naming(&items.objects)));
+            let (count, named) = (items.actions.size()[0] as f64, sum(&bc::object_mask(&items.objects)));
             let found = [count, sum(&surprise.action), actions * count, named, sum(&surprise.object), objects * named];
             sums.iter_mut().zip(found).for_each(|(sum, value)| *sum += value);
         }
@@ -184,7 +184,7 @@ mod tests {
     use tch::Device;
 
     use super::*;
-    use crate::algo::chain::Pairs;
+    use crate::algo::chain::PairSource;
     use crate::data::features::{Features, Header, Writer};
     use crate::data::items::{Items, Label};
     use crate::data::selection::{Named, Past};
@@ -217,8 +217,8 @@ mod tests {
         preset.critic = preset.critic.map(|critic| CriticSpec { channels: [4; 4], hidden: vec![16], ..critic });
         if let Some(chaining) = &mut preset.chaining {
             chaining.batch = 8;
-            if chaining.pairs != Pairs::InBatch {
-                chaining.pairs = Pairs::Pool(5);
+            if chaining.pairs != PairSource::InBatch {
+                chaining.pairs = PairSource::Pool(5);
             }
         }
         preset.visual.channels = vec![2; 4];
@@ -315,8 +315,8 @@ mod tests {
                 None => ConditioningTable::Sentences(Rows::new(&sentences, Device::Cpu).unwrap()),
             };
             let pool = preset.chaining.as_ref().and_then(|chaining| match chaining.pairs {
-                Pairs::InBatch => None,
-                Pairs::Pool(count) => {
+                PairSource::InBatch => None,
+                PairSource::Pool(count) => {
                     let pairs = Pool::draw(&items, preset.seed, count);
                     let texts: Vec<String> = pairs.iter().map(|&pair| joined(&items, pair)).collect();
                     let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
@@ -431,7 +431,7 @@ mod tests {
     fn pairs_are_embedded_live_when_they_come_from_the_batch() {
         let _chance = crate::nets::testing::chance();
         let mut preset = preset("sprint", 2);
-        preset.chaining.as_mut().unwrap().pairs = Pairs::InBatch;
+        preset.chaining.as_mut().unwrap().pairs = PairSource::InBatch;
         assert!(trained(&preset, u64::MAX).1.values["lead_q_loss"].is_finite());
     }
 }

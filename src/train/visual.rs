@@ -17,7 +17,7 @@ use crate::algo::learner::Learner;
 use crate::domain::Class;
 use crate::house::House;
 use crate::house::render::Renderer;
-use crate::nets::perception_heads::{Known, SightHeads};
+use crate::nets::perception_heads::{FrameLabels, PerceptionHeads};
 use crate::nets::visual::{HouseEncoder, SIDE};
 
 /// Frames on which the encoder is measured while it trains.
@@ -37,11 +37,11 @@ pub fn train(
     report: &mut dyn Report,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
-    let heads = SightHeads::new(&(store.root() / "heads"), encoder.spec().features(), MARKS as i64);
+    let heads = PerceptionHeads::new(&(store.root() / "heads"), encoder.spec().features(), MARKS as i64);
     let training = &preset.visual_training;
     let mut learner = Learner::new(store, training.optimisation.clone(), preset.seed);
     if let Some((step, tensors)) = state.read()? {
-        learner.take_up(state.path, step, &tensors)?;
+        learner.restore_checked(state.path, step, &tensors)?;
     }
     let apart = frame_store.kept_apart(preset.hold_out);
     ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
@@ -78,7 +78,7 @@ pub fn train(
 
 fn measure(
     encoder: &HouseEncoder,
-    heads: &SightHeads,
+    heads: &PerceptionHeads,
     frame_store: &FrameStore,
     held_out: &[usize],
     scalars: &mut Scalars,
@@ -107,7 +107,7 @@ fn frames(frame_store: &FrameStore, seed: u64, step: u64, count: usize, wanted: 
 }
 
 /// Draws frames: what the encoder reads and what is known of them.
-fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, Known)> {
+fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, FrameLabels)> {
     let spec = encoder.spec();
     let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, Sight)> {
         let (scene, world) = frame_store.state(frame)?;
@@ -123,7 +123,7 @@ fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> 
     let gather = |part: fn(&Sight) -> &[u8]| sights.iter().flat_map(part).copied().collect::<Vec<u8>>();
     let depth: Vec<f32> = sights.iter().flat_map(|sight| sight.depth.iter().copied()).collect();
     let device = encoder.device();
-    let known = Known {
+    let known = FrameLabels {
         marks: Tensor::from_slice(&gather(|sight| &sight.marks))
             .view([n, MARKS as i64, SIDE, SIDE])
             .to_device(device)

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use baseline::Baselines;
 use sprint_explorer::agent::checkpoint::Networks;
-use sprint_explorer::algo::chain::Pairs;
+use sprint_explorer::algo::chain::PairSource;
 use sprint_explorer::data::features::{Features, Header, Writer};
 use sprint_explorer::data::items::{Items, Label, Span};
 use sprint_explorer::data::selection::{Named, Past};
@@ -70,7 +70,7 @@ fn measure(preset: &Preset, device: Device, baselines: &mut Baselines) -> anyhow
         (None, None) => ConditioningTable::Sentences(Rows::new(&embed(&texts)?, device)?),
     };
     let pool = match preset.chaining.as_ref().map(|chaining| chaining.pairs) {
-        Some(Pairs::Pool(count)) => {
+        Some(PairSource::Pool(count)) => {
             let pairs = Pool::draw(&items, preset.seed, count);
             let texts: Vec<String> = pairs.iter().map(|&pair| joined(&items, pair)).collect();
             let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>())?;

@@ -25,7 +25,7 @@ use super::training_state::TrainingState;
 use crate::agent::config::Config;
 use crate::agent::learned::SharedEmbedder;
 use crate::agent::logit_adjustment::LogitAdjustment;
-use crate::algo::chain::Pairs;
+use crate::algo::chain::PairSource;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
 use crate::data::items::{Items, Source};
@@ -186,7 +186,7 @@ impl Pretraining {
             ConditioningTable::Sentences(Rows::new(&sentences, self.device)?)
         };
         let pool = match self.preset.chaining.as_ref().map(|chaining| chaining.pairs) {
-            Some(Pairs::Pool(count)) => {
+            Some(PairSource::Pool(count)) => {
                 let pairs = Pool::draw(items, self.preset.seed, count);
                 let texts: Vec<String> = pairs.iter().map(|&pair| joined(items, pair)).collect();
                 let Some(joint) = self.embed(&texts, report, stop)? else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! The terms of a loss by name, and the guard against those that are no numbers.
+//! The terms of a loss by name, and the guard against those that are not finite.
 
 use std::collections::BTreeMap;
 
@@ -6,19 +6,19 @@ use tch::{Device, Kind, Tensor};
 
 /// The losses by name, looked at before any weight is changed.
 #[derive(Default)]
-pub(super) struct Terms {
+pub(super) struct LossTerms {
     names: Vec<String>,
     tensors: Vec<Tensor>,
 }
 
-impl Terms {
-    /// One more.
+impl LossTerms {
+    /// Keeps the value of a scalar `tensor`, without its graph.
     pub fn add(&mut self, name: String, tensor: &Tensor) {
         self.names.push(name);
         self.tensors.push(tensor.detach());
     }
 
-    /// All of them, fetched at once.
+    /// All of them, in one transfer from the device.
     ///
     /// # Errors
     /// [`NotFinite`].
@@ -33,14 +33,14 @@ impl Terms {
     }
 }
 
-/// A loss that is not a number; no weight was changed by it. Batch norms have seen the items of its step.
+/// A loss that is not finite; no weight was changed by it. Running statistics of batch norms already include its step.
 #[derive(Debug, thiserror::Error)]
 #[error("step {step}: {term} is {value}; no weight was changed by this step, and the last saved state is kept")]
 pub struct NotFinite {
     /// The step that failed, from 1.
     pub step: u64,
-    /// The loss.
+    /// The loss's name.
     pub term: String,
-    /// What it came to.
+    /// NaN or infinite.
     pub value: f64,
 }
