@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use sprint_explorer::data::alfred::import::parse_recording;
 use sprint_explorer::data::alfred::tasks;
-use sprint_explorer::data::items::{Items, Label, Source, Span};
-use sprint_explorer::data::selection::{Composites, Selection};
+use sprint_explorer::data::items::{ActionLabel, ItemSource, Items, Span};
+use sprint_explorer::data::selection::{Composites, DataSelection};
 use sprint_explorer::data::summaries::Summaries;
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Action, ActionType, SkillKind, Subtask, Trajectory, World};
@@ -58,12 +58,12 @@ fn the_train_split_has_as_many_spans_as_are_known_of_it() {
     let held_out: Vec<String> = chain.iter().map(|entry| entry.trajectory().to_owned()).collect();
     assert_eq!(held_out.len(), 20);
     let summaries = Summaries::default();
-    let label = Some(Label { action: 0, object: 0, taken: true });
+    let label = Some(ActionLabel { action: 0, object: 0, taken: true });
     let of_one = |one: &Trajectory| std::iter::repeat_n(label, one.actions.len()).chain([None]).collect::<Vec<_>>();
-    let labels: Vec<Option<Label>> = trajectories.iter().flat_map(of_one).collect();
+    let labels: Vec<Option<ActionLabel>> = trajectories.iter().flat_map(of_one).collect();
     let items = |held_out: &[String]| {
-        let source = Source { trajectories: &trajectories, apart: &[], held_out, summaries: &summaries };
-        Items::of(&source, labels.clone(), &Selection::of(Composites::Concat)).unwrap()
+        let source = ItemSource { trajectories: &trajectories, apart: &[], held_out, summaries: &summaries };
+        Items::of(&source, labels.clone(), &DataSelection::of(Composites::Concat)).unwrap()
     };
     let (all, without) = (items(&[]), items(&held_out));
     let count = |items: &Items, primitive| items.training.iter().filter(|s| s.is_primitive() == primitive).count();

@@ -12,7 +12,7 @@ use crate::house::view::Candidate;
 use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
 use crate::nets::policy::{PolicyNet, PolicySpec};
 use crate::nets::visual_encoder::VisualEncoder;
-use crate::nets::weights::{self, Form};
+use crate::nets::weights::{self, TensorSpec};
 
 /// A policy's networks with the stores that own their weights.
 #[derive(Debug)]
@@ -102,7 +102,7 @@ impl Networks {
         let tensors = weights::read(&path)?;
         let networks = Networks::new(config.eyes(device)?, &config.policy, config.critic.as_ref(), device);
         let variables = networks.tensors();
-        let forms = variables.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
+        let forms = variables.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
         weights::check(&path, &tensors, &forms)?;
         tch::no_grad(|| -> anyhow::Result<()> {
             for (name, mut variable) in variables {

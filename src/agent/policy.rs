@@ -7,7 +7,7 @@ use super::decision::Decision;
 use super::frame_history::FrameHistory;
 use super::value_estimates::Values;
 use crate::env::Environment;
-use crate::house::expert::Plan;
+use crate::house::expert::ExpertState;
 
 /// What a policy decides from.
 pub struct Observation<'a> {
@@ -52,7 +52,7 @@ pub enum PolicyState {
     /// Its random numbers.
     Random(Box<ChaCha8Rng>),
     /// What it is about to do.
-    Plan(Box<Plan>),
+    Plan(Box<ExpertState>),
     /// The last frames, and its random numbers.
     Frames(Box<FrameHistory>),
 }

@@ -7,7 +7,7 @@ use tch::{Tensor, nn};
 
 use super::adamw::{AdamW, AdamWConfig};
 use super::schedule::Schedule;
-use crate::nets::weights::{self, Form, Tensors};
+use crate::nets::weights::{self, TensorSpec, Tensors};
 
 /// How weights are optimised.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -114,7 +114,7 @@ impl<'a> Learner<'a> {
     /// # Errors
     /// When it does not fit the networks; each tensor that is at fault is named.
     pub fn restore_checked(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
-        let forms = self.state().iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
+        let forms = self.state().iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
         weights::check(path, tensors, &forms)?;
         self.restore(step, tensors)
     }

@@ -119,7 +119,11 @@ impl<'a> Update<'a> {
     /// When a tensor is missing, unknown, or of another form; each is named with `path`, and nothing is changed.
     pub fn restore(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let own = self.state();
-        weights::check(path, tensors, &own.iter().map(|(name, t)| (name.clone(), weights::Form::of(t))).collect())?;
+        weights::check(
+            path,
+            tensors,
+            &own.iter().map(|(name, t)| (name.clone(), weights::TensorSpec::of(t))).collect(),
+        )?;
         self.actor.restore(step, &weights::under("policy.", tensors))?;
         match &mut self.critic {
             Some(critic) => critic.restore(step, tensors),

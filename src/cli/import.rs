@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use super::exit_status::ExitStatus;
 use super::progress_style;
 use super::streams::say;
-use crate::data::alfred::{self, Progress};
+use crate::data::alfred::{self, ImportProgress};
 
 /// Makes a dataset folder.
 #[derive(Args)]
@@ -49,11 +49,11 @@ impl Import {
 impl Alfred {
     fn run(self) -> anyhow::Result<ExitStatus> {
         let bar = ProgressBar::new(0).with_style(progress_style::counted());
-        let show = |progress: Progress| {
+        let show = |progress: ImportProgress| {
             let (what, done, total) = match progress {
-                Progress::Reading(done, total) => ("reading", done, total),
-                Progress::Building(done, total) => ("building scenes", done, total),
-                Progress::Writing(done, total) => ("writing", done, total),
+                ImportProgress::Reading(done, total) => ("reading", done, total),
+                ImportProgress::Building(done, total) => ("building scenes", done, total),
+                ImportProgress::Writing(done, total) => ("writing", done, total),
             };
             if done <= 1 || done == total {
                 bar.set_message(what);
@@ -61,7 +61,7 @@ impl Alfred {
             }
             bar.set_position(done);
         };
-        let options = alfred::Options { eval_lists: self.eval_lists };
+        let options = alfred::ImportOptions { eval_lists: self.eval_lists };
         let summary = alfred::import(&self.source, &self.out, &options, &show);
         bar.finish_and_clear();
         let summary = summary?;

@@ -45,7 +45,7 @@ pub struct Skipped {
 /// `dataset.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Manifest {
+pub struct DatasetManifest {
     /// Version of this format.
     pub format_version: u32,
     /// Where it came from: `alfred`, `generated`.
@@ -60,7 +60,7 @@ pub struct Manifest {
     pub skipped: Vec<Skipped>,
 }
 
-impl Manifest {
+impl DatasetManifest {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 1;
 }
@@ -69,7 +69,7 @@ impl Manifest {
 #[derive(Clone, Debug)]
 pub struct Dataset {
     folder: PathBuf,
-    manifest: Manifest,
+    manifest: DatasetManifest,
 }
 
 impl Dataset {
@@ -84,7 +84,7 @@ impl Dataset {
             "{} is no dataset (dataset.json is missing); `sprint import` or `sprint collect` makes one",
             folder.display()
         );
-        let manifest = json::read::<Manifest>(&path, Manifest::FORMAT)?.value;
+        let manifest = json::read::<DatasetManifest>(&path, DatasetManifest::FORMAT)?.value;
         Ok(Dataset { folder: folder.to_owned(), manifest })
     }
 
@@ -105,7 +105,7 @@ impl Dataset {
     }
 
     /// What `dataset.json` says.
-    pub fn manifest(&self) -> &Manifest {
+    pub fn manifest(&self) -> &DatasetManifest {
         &self.manifest
     }
 
@@ -199,17 +199,17 @@ pub fn read_scene(folder: &Path, name: &str) -> anyhow::Result<Scene> {
 }
 
 /// Writes a dataset folder. `dataset.json` comes last: a folder without it is not a dataset.
-pub struct Writer {
+pub struct DatasetWriter {
     folder: PathBuf,
     trajectories: zstd::Encoder<'static, tempfile::NamedTempFile>,
 }
 
-impl Writer {
+impl DatasetWriter {
     /// Starts a dataset in `folder`, which is made when absent. An earlier dataset there is replaced.
     ///
     /// # Errors
     /// When the folder cannot be made or written.
-    pub fn new(folder: &Path) -> anyhow::Result<Writer> {
+    pub fn new(folder: &Path) -> anyhow::Result<DatasetWriter> {
         for part in ["scenes", "tasks"] {
             let part = folder.join(part);
             std::fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
@@ -219,7 +219,7 @@ impl Writer {
             std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
         }
         let file = atomic_file::begin(&folder.join(TRAJECTORIES)).with_context(|| folder.display().to_string())?;
-        Ok(Writer { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
+        Ok(DatasetWriter { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
     }
 
     /// Writes a scene.
@@ -252,7 +252,7 @@ impl Writer {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn finish(self, manifest: &Manifest) -> anyhow::Result<()> {
+    pub fn finish(self, manifest: &DatasetManifest) -> anyhow::Result<()> {
         let path = self.folder.join(TRAJECTORIES);
         let file = self.trajectories.finish()?;
         atomic_file::keep(file, &path).with_context(|| path.display().to_string())?;
@@ -266,9 +266,9 @@ pub mod testing {
     use super::*;
 
     /// Of a test's dataset, without counts.
-    pub fn manifest(scenes: u64, held_out: &[&str]) -> Manifest {
-        Manifest {
-            format_version: Manifest::FORMAT,
+    pub fn manifest(scenes: u64, held_out: &[&str]) -> DatasetManifest {
+        DatasetManifest {
+            format_version: DatasetManifest::FORMAT,
             source: "test".into(),
             counts: BTreeMap::new(),
             scenes,
@@ -296,15 +296,22 @@ mod tests {
         }
     }
 
-    fn manifest() -> Manifest {
+    fn manifest() -> DatasetManifest {
         let counts = BTreeMap::from([("train".to_owned(), Counts { trajectories: 1, ..Counts::default() })]);
-        Manifest { format_version: 1, source: "alfred".into(), counts, scenes: 1, held_out: vec![], skipped: vec![] }
+        DatasetManifest {
+            format_version: 1,
+            source: "alfred".into(),
+            counts,
+            scenes: 1,
+            held_out: vec![],
+            skipped: vec![],
+        }
     }
 
     #[test]
     fn what_is_written_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
-        let writer = Writer::new(folder.path()).unwrap();
+        let writer = DatasetWriter::new(folder.path()).unwrap();
         writer.scene(&scene()).unwrap();
         writer.finish(&manifest()).unwrap();
         let dataset = Dataset::open(folder.path()).unwrap();
@@ -317,7 +324,7 @@ mod tests {
     #[test]
     fn an_unfinished_dataset_is_no_dataset() {
         let folder = tempfile::tempdir().unwrap();
-        Writer::new(folder.path()).unwrap().scene(&scene()).unwrap();
+        DatasetWriter::new(folder.path()).unwrap().scene(&scene()).unwrap();
         assert!(Dataset::open(folder.path()).is_err());
     }
 

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// What a feature file holds; its first line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Header {
+pub struct FeatureHeader {
     /// Version of this format.
     pub format_version: u32,
     /// The digest of the encoder that computed it.
@@ -25,7 +25,7 @@ pub struct Header {
     pub numbers: u64,
 }
 
-impl Header {
+impl FeatureHeader {
     /// The format version this program reads and writes.
     pub const FORMAT: u32 = 1;
 
@@ -48,13 +48,13 @@ impl Header {
 
 /// The maps of datasets, one after the other. They stay in their files; what is read often stays in the system's page cache.
 pub struct Features {
-    files: Vec<Maps>,
+    files: Vec<MapFile>,
     /// Bytes of a map.
     width: usize,
 }
 
 /// The maps of one file.
-struct Maps {
+struct MapFile {
     file: File,
     path: PathBuf,
     /// Where the first one begins.
@@ -68,7 +68,7 @@ impl Features {
     ///
     /// # Errors
     /// When the file is there but cannot be read.
-    pub fn read(folder: &Path, wanted: &Header) -> anyhow::Result<Option<Features>> {
+    pub fn read(folder: &Path, wanted: &FeatureHeader) -> anyhow::Result<Option<Features>> {
         let path = folder.join(wanted.file_name());
         let Ok(file) = File::open(&path) else { return Ok(None) };
         let line = wanted.line()?;
@@ -79,7 +79,7 @@ impl Features {
         if found != line || file.metadata().with_context(context)?.len() != expected {
             return Ok(None);
         }
-        let maps = Maps { file, path, offset: line.len() as u64, range: 0..wanted.maps as usize };
+        let maps = MapFile { file, path, offset: line.len() as u64, range: 0..wanted.maps as usize };
         Ok(Some(Features { files: vec![maps], width: wanted.width() }))
     }
 
@@ -88,7 +88,7 @@ impl Features {
         let before = self.len();
         self.files.extend(other.files.into_iter().map(|maps| {
             let range = maps.range.start + before..maps.range.end + before;
-            Maps { range, ..maps }
+            MapFile { range, ..maps }
         }));
     }
 
@@ -146,8 +146,8 @@ impl Features {
 }
 
 /// Writes a feature file; it appears when it is whole. What an earlier, interrupted writer left is taken up.
-pub struct Writer {
-    header: Header,
+pub struct FeatureWriter {
+    header: FeatureHeader,
     folder: PathBuf,
     file: File,
     /// Bytes before the first map.
@@ -159,12 +159,12 @@ pub struct Writer {
 /// Bytes between two moments at which everything written so far is on the disk.
 const DURABLE: usize = 64 << 20;
 
-impl Writer {
+impl FeatureWriter {
     /// Opens the unfinished file in `folder`, which is made if need be, or begins one.
     ///
     /// # Errors
     /// When the folder cannot be written to, or another process writes the same file.
-    pub fn open(folder: &Path, header: Header) -> anyhow::Result<Writer> {
+    pub fn open(folder: &Path, header: FeatureHeader) -> anyhow::Result<FeatureWriter> {
         let path = folder.join(header.file_name() + ".part");
         let context = || format!("{} cannot be written", path.display());
         std::fs::create_dir_all(folder).with_context(context)?;
@@ -185,7 +185,7 @@ impl Writer {
         }
         let length = file.metadata().with_context(context)?.len();
         let maps = (length - offset) / (header.width() as u64).max(1);
-        let mut writer = Writer { header, folder: folder.to_owned(), file, offset, maps: 0, unsynced: 0 };
+        let mut writer = FeatureWriter { header, folder: folder.to_owned(), file, offset, maps: 0, unsynced: 0 };
         writer.keep(maps)?;
         Ok(writer)
     }
@@ -248,12 +248,12 @@ impl Writer {
 mod tests {
     use super::*;
 
-    fn header() -> Header {
-        Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 2, numbers: 3 }
+    fn header() -> FeatureHeader {
+        FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 2, numbers: 3 }
     }
 
-    fn write(folder: &Path, header: Header, bytes: &[u8]) {
-        let mut writer = Writer::open(folder, header).unwrap();
+    fn write(folder: &Path, header: FeatureHeader, bytes: &[u8]) {
+        let mut writer = FeatureWriter::open(folder, header).unwrap();
         writer.add(bytes).unwrap();
         writer.finish().unwrap();
     }
@@ -266,13 +266,13 @@ mod tests {
         let mut bytes = Vec::new();
         features.gather_all([1].into_iter(), &mut bytes).unwrap();
         assert_eq!((features.len(), bytes), (2, vec![7, 8, 9, 10, 11, 12]));
-        assert!(Features::read(folder.path(), &Header { maps: 3, ..header() }).unwrap().is_none());
+        assert!(Features::read(folder.path(), &FeatureHeader { maps: 3, ..header() }).unwrap().is_none());
     }
 
     #[test]
     fn maps_are_gathered_in_any_order_and_over_files() {
         let folder = tempfile::tempdir().unwrap();
-        let named = |dataset: &str| Header { dataset: dataset.into(), numbers: 1, ..header() };
+        let named = |dataset: &str| FeatureHeader { dataset: dataset.into(), numbers: 1, ..header() };
         write(folder.path(), named("one"), &[1, 0, 2, 0]);
         write(folder.path(), named("two"), &[3, 0, 4, 0]);
         let mut features = Features::read(folder.path(), &named("one")).unwrap().unwrap();
@@ -292,15 +292,15 @@ mod tests {
     #[test]
     fn a_short_file_is_never_put_in_place_and_is_taken_up_again() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = Writer::open(folder.path(), header()).unwrap();
+        let mut writer = FeatureWriter::open(folder.path(), header()).unwrap();
         writer.add(&[1, 2, 3, 4, 5, 6]).unwrap();
-        assert!(Writer::open(folder.path(), header()).is_err(), "one process writes at a time");
+        assert!(FeatureWriter::open(folder.path(), header()).is_err(), "one process writes at a time");
         assert!(writer.finish().is_err());
         assert!(Features::read(folder.path(), &header()).unwrap().is_none());
         // Half a map more, as a killed writer leaves it.
         let part = folder.path().join("features-e-d.bin.part");
         OpenOptions::new().append(true).open(&part).unwrap().write_all(&[7, 7, 7]).unwrap();
-        let mut writer = Writer::open(folder.path(), header()).unwrap();
+        let mut writer = FeatureWriter::open(folder.path(), header()).unwrap();
         assert_eq!(writer.maps(), 1);
         writer.add(&[7, 8, 9, 10, 11, 12]).unwrap();
         writer.finish().unwrap();
@@ -313,8 +313,8 @@ mod tests {
     #[test]
     fn what_is_left_of_other_data_is_not_taken_up() {
         let folder = tempfile::tempdir().unwrap();
-        Writer::open(folder.path(), header()).unwrap().add(&[0; 6]).unwrap();
-        let other = Header { numbers: 1, ..header() };
-        assert_eq!(Writer::open(folder.path(), other).unwrap().maps(), 0);
+        FeatureWriter::open(folder.path(), header()).unwrap().add(&[0; 6]).unwrap();
+        let other = FeatureHeader { numbers: 1, ..header() };
+        assert_eq!(FeatureWriter::open(folder.path(), other).unwrap().maps(), 0);
     }
 }

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
 use super::json::hex;
-use super::selection::{Composites, Named, Past, Selection};
+use super::selection::{Composites, DataSelection, Named, Past};
 use super::summaries::Summaries;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{ActionType, Trajectory};
@@ -18,7 +18,7 @@ use crate::language::passage::{Passage, concatenated};
 
 /// One frame's label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Label {
+pub struct ActionLabel {
     /// Position in the action head.
     pub action: u8,
     /// Position in the object head; 0 for navigation.
@@ -28,7 +28,7 @@ pub struct Label {
 }
 
 /// What items are made of.
-pub struct Source<'a> {
+pub struct ItemSource<'a> {
     /// The trajectories, in the order of their frames.
     pub trajectories: &'a [Trajectory],
     /// Which of them are kept apart from training.
@@ -67,7 +67,7 @@ impl Span {
 #[derive(Clone, Debug, Default)]
 pub struct Items {
     /// One label a frame; the last frame of a trajectory has none, nor has one from which nothing can be learned.
-    pub labels: Vec<Option<Label>>,
+    pub labels: Vec<Option<ActionLabel>>,
     /// Distinct texts, normalised.
     pub texts: Vec<String>,
     /// Spans to learn from.
@@ -100,13 +100,17 @@ pub struct Item {
 
 impl Items {
     /// All primitives, and the composites that are selected, once for each aligned annotation. Dropped are the wholes that
-    /// [`Source::held_out`] names, spans in which nothing has a label, and those of which nothing is said but white space and
-    /// marks. `labels` are those of all frames; without [`Selection::corrections`] those not taken are left out.
+    /// [`ItemSource::held_out`] names, spans in which nothing has a label, and those of which nothing is said but white space and
+    /// marks. `labels` are those of all frames; without [`DataSelection::corrections`] those not taken are left out.
     ///
     /// # Errors
     /// When composites should have labels and one has none.
-    pub fn of(source: &Source<'_>, labels: Vec<Option<Label>>, selection: &Selection) -> anyhow::Result<Items> {
-        let learned = |label: &Label| label.taken || selection.corrections;
+    pub fn of(
+        source: &ItemSource<'_>,
+        labels: Vec<Option<ActionLabel>>,
+        selection: &DataSelection,
+    ) -> anyhow::Result<Items> {
+        let learned = |label: &ActionLabel| label.taken || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
         let mut items =
             Items { labels, firsts: vec![0], past: selection.past, named: selection.named, ..Items::default() };
@@ -226,8 +230,8 @@ impl Items {
 
 /// The spans of a trajectory with what one annotator says of each.
 fn told(
-    source: &Source<'_>,
-    selection: &Selection,
+    source: &ItemSource<'_>,
+    selection: &DataSelection,
     trajectory: &Trajectory,
     annotation: &Annotation,
 ) -> anyhow::Result<Vec<(Range<usize>, String)>> {
@@ -306,13 +310,13 @@ mod tests {
 
     fn items(trajectories: &[Trajectory], composites: Composites, held_out: &[String]) -> Items {
         let summaries = Summaries::default();
-        let source = Source { trajectories, apart: &[], held_out, summaries: &summaries };
-        Items::of(&source, labels(trajectories), &Selection::of(composites)).unwrap()
+        let source = ItemSource { trajectories, apart: &[], held_out, summaries: &summaries };
+        Items::of(&source, labels(trajectories), &DataSelection::of(composites)).unwrap()
     }
 
-    fn labels(trajectories: &[Trajectory]) -> Vec<Option<Label>> {
+    fn labels(trajectories: &[Trajectory]) -> Vec<Option<ActionLabel>> {
         let of = |trajectory: &Trajectory| {
-            let label = Some(Label { action: 0, object: 0, taken: true });
+            let label = Some(ActionLabel { action: 0, object: 0, taken: true });
             std::iter::repeat_n(label, trajectory.actions.len()).chain([None])
         };
         trajectories.iter().flat_map(of).collect()
@@ -358,8 +362,8 @@ mod tests {
     fn a_span_without_its_label_is_an_error_that_says_what_to_do() {
         let summaries = Summaries::default();
         let source =
-            Source { trajectories: &[trajectory(vec![0, 2], 5)], apart: &[], held_out: &[], summaries: &summaries };
-        let error = Items::of(&source, labels(source.trajectories), &Selection::of(Composites::Labels))
+            ItemSource { trajectories: &[trajectory(vec![0, 2], 5)], apart: &[], held_out: &[], summaries: &summaries };
+        let error = Items::of(&source, labels(source.trajectories), &DataSelection::of(Composites::Labels))
             .unwrap_err()
             .to_string();
         assert!(error.contains("skills 0..2") && error.contains("sprint relabel"), "{error}");
@@ -375,8 +379,9 @@ mod tests {
     #[test]
     fn trajectories_are_kept_apart_as_wholes_and_draws_depend_on_the_step_alone() {
         let (three, summaries) = ([(); 3].map(|()| trajectory(vec![0], 4)), Summaries::default());
-        let source = Source { trajectories: &three, apart: &[false, true, true], held_out: &[], summaries: &summaries };
-        let items = Items::of(&source, labels(&three), &Selection::of(Composites::None)).unwrap();
+        let source =
+            ItemSource { trajectories: &three, apart: &[false, true, true], held_out: &[], summaries: &summaries };
+        let items = Items::of(&source, labels(&three), &DataSelection::of(Composites::None)).unwrap();
         assert_eq!((items.training.len(), items.held_out.len()), (1, 2));
         let draw = |step| items.draw(&items.training, 7, step, 20);
         assert_eq!(draw(3), draw(3));
@@ -389,11 +394,11 @@ mod tests {
         let one = [trajectory(vec![0, 2], 5)];
         let mut labels = labels(&one);
         labels[..2].fill(None);
-        labels[3] = Some(Label { action: 0, object: 0, taken: false });
+        labels[3] = Some(ActionLabel { action: 0, object: 0, taken: false });
         let drawn = |corrections| {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &one, apart: &[], held_out: &[], summaries: &summaries };
-            let selection = Selection { corrections, ..Selection::of(Composites::Whole) };
+            let source = ItemSource { trajectories: &one, apart: &[], held_out: &[], summaries: &summaries };
+            let selection = DataSelection { corrections, ..DataSelection::of(Composites::Whole) };
             let items = Items::of(&source, labels.clone(), &selection).unwrap();
             assert_eq!(edges(&items), [(0, 2, 5), (0, 0, 5)]);
             let frames = items.draw(&items.training, 1, 0, 50).iter().map(|item| item.frame).collect();
@@ -415,8 +420,8 @@ mod tests {
         let two = [trajectory(vec![0, 2], 5)];
         let firsts = |past| {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
-            let selection = Selection { past, ..Selection::of(Composites::None) };
+            let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
+            let selection = DataSelection { past, ..DataSelection::of(Composites::None) };
             let items = Items::of(&source, labels(&two), &selection).unwrap();
             let drawn = items.draw(&items.training, 1, 0, 50);
             let late = drawn.iter().filter(|item| item.frame >= 2);
@@ -430,12 +435,12 @@ mod tests {
     fn on_the_way_what_comes_next_is_named_where_the_selection_says_so() {
         let two = [trajectory(vec![0, 3], 5)];
         let mut labels = labels(&two);
-        labels[2] = Some(Label { action: 5, object: 7, taken: true });
-        labels[4] = Some(Label { action: 6, object: 9, taken: true });
+        labels[2] = Some(ActionLabel { action: 5, object: 7, taken: true });
+        labels[4] = Some(ActionLabel { action: 6, object: 9, taken: true });
         let named = |named, end| -> Vec<u8> {
             let summaries = Summaries::default();
-            let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
-            let selection = Selection { named, ..Selection::of(Composites::None) };
+            let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
+            let selection = DataSelection { named, ..DataSelection::of(Composites::None) };
             let items = Items::of(&source, labels.clone(), &selection).unwrap();
             (0..end).map(|frame| items.named_by(&Item { first: 0, frame, end, text: 0 })).collect()
         };
@@ -448,11 +453,11 @@ mod tests {
     fn an_action_has_the_share_of_the_draws_in_which_it_is_the_label() {
         let two = [trajectory(vec![0, 2], 6)];
         let summaries = Summaries::default();
-        let source = Source { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
+        let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
         let mut labels = labels(&two);
-        labels[1] = Some(Label { action: 5, object: 1, taken: true });
+        labels[1] = Some(ActionLabel { action: 5, object: 1, taken: true });
         labels[2] = None;
-        let items = Items::of(&source, labels, &Selection::of(Composites::None)).unwrap();
+        let items = Items::of(&source, labels, &DataSelection::of(Composites::None)).unwrap();
         let shares = items.action_shares();
         assert_eq!((shares[0], shares[5], shares[3]), (0.75, 0.25, 0.0), "half of the first of two skills");
         let drawn = items.draw(&items.training, 1, 0, 4000);

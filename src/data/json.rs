@@ -113,28 +113,28 @@ mod tests {
 
     #[derive(Debug, PartialEq, Serialize, serde::Deserialize)]
     #[serde(deny_unknown_fields)]
-    struct Sample {
+    struct MeasuredTable {
         format_version: u32,
-        rows: Vec<Row>,
+        rows: Vec<TableRow>,
     }
 
     #[derive(Debug, PartialEq, Serialize, serde::Deserialize)]
     #[serde(deny_unknown_fields)]
-    struct Row {
+    struct TableRow {
         at: u8,
     }
 
     fn complaint(text: &str) -> String {
-        format!("{:#}", parse::<Sample>(text.as_bytes(), 1).unwrap_err())
+        format!("{:#}", parse::<MeasuredTable>(text.as_bytes(), 1).unwrap_err())
     }
 
     #[test]
     fn what_is_written_reads_back_the_same() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deeper/sample.json");
-        let sample = Sample { format_version: 1, rows: vec![Row { at: 7 }] };
+        let sample = MeasuredTable { format_version: 1, rows: vec![TableRow { at: 7 }] };
         write(&path, &sample).unwrap();
-        let back = read::<Sample>(&path, 1).unwrap();
+        let back = read::<MeasuredTable>(&path, 1).unwrap();
         assert_eq!(back.value, sample);
         assert_eq!(back.digest.len(), 64);
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "no temporary file stays");

@@ -56,7 +56,7 @@ pub enum Named {
 /// Which spans are learned from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Selection {
+pub struct DataSelection {
     /// Spans of two or more skills.
     pub composites: Composites,
     /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
@@ -73,10 +73,10 @@ pub struct Selection {
     pub named: Named,
 }
 
-impl Selection {
+impl DataSelection {
     /// A selection of composites; with labels, of the only source there is.
-    pub fn of(composites: Composites) -> Selection {
-        Selection { composites, labels_of: None, corrections: false, past: Past::Trajectory, named: Named::Own }
+    pub fn of(composites: Composites) -> DataSelection {
+        DataSelection { composites, labels_of: None, corrections: false, past: Past::Trajectory, named: Named::Own }
     }
 }
 
@@ -86,8 +86,8 @@ mod tests {
 
     #[test]
     fn a_selection_is_written_in_kebab_case() {
-        let read: Selection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
-        assert_eq!(read, Selection { labels_of: Some("rules".into()), ..Selection::of(Composites::Labels) });
-        assert!(toml::from_str::<Selection>("composites = \"some\"").is_err());
+        let read: DataSelection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
+        assert_eq!(read, DataSelection { labels_of: Some("rules".into()), ..DataSelection::of(Composites::Labels) });
+        assert!(toml::from_str::<DataSelection>("composites = \"some\"").is_err());
     }
 }

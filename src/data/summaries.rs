@@ -13,7 +13,7 @@ use crate::language::passage::Passage;
 /// A line: the label of one span of one annotator.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Summary {
+pub struct SpanSummary {
     /// The trajectory's name.
     pub trajectory: String,
     /// Which of its annotations.
@@ -33,7 +33,7 @@ pub struct Summary {
 /// The file's first line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct SummariesHeader {
     format_version: u32,
 }
 
@@ -44,7 +44,7 @@ const FORMAT: u32 = 1;
 const NAME: &str = "labels.jsonl";
 
 /// The lines of a dataset's file and the length in bytes of its whole lines. A torn last line is left out.
-fn read(folder: &Path) -> anyhow::Result<(Vec<Summary>, usize)> {
+fn read(folder: &Path) -> anyhow::Result<(Vec<SpanSummary>, usize)> {
     let path = folder.join(NAME);
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
@@ -54,7 +54,8 @@ fn read(folder: &Path) -> anyhow::Result<(Vec<Summary>, usize)> {
     let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
     let mut lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
     if let Some(first) = lines.next() {
-        let header: Header = serde_json::from_slice(first).with_context(|| format!("{}, line 1", path.display()))?;
+        let header: SummariesHeader =
+            serde_json::from_slice(first).with_context(|| format!("{}, line 1", path.display()))?;
         ensure!(
             header.format_version == FORMAT,
             "{}: format_version: {}, but this program reads {FORMAT}",
@@ -130,7 +131,7 @@ impl Ledger {
     ///
     /// # Errors
     /// When it is malformed, in use, or cannot be written to.
-    pub fn open(folder: &Path) -> anyhow::Result<(Ledger, Vec<Summary>)> {
+    pub fn open(folder: &Path) -> anyhow::Result<(Ledger, Vec<SpanSummary>)> {
         let path = folder.join(NAME);
         let context = || format!("{} cannot be written", path.display());
         let mut file = OpenOptions::new().create(true).append(true).open(&path).with_context(context)?;
@@ -142,7 +143,7 @@ impl Ledger {
         let (lines, whole) = read(folder)?;
         file.set_len(whole as u64).with_context(context)?;
         if whole == 0 {
-            file.write_all(&line(&Header { format_version: FORMAT })?).with_context(context)?;
+            file.write_all(&line(&SummariesHeader { format_version: FORMAT })?).with_context(context)?;
         }
         Ok((Ledger { path, file }, lines))
     }
@@ -151,7 +152,7 @@ impl Ledger {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn append(&mut self, labels: &[Summary]) -> anyhow::Result<()> {
+    pub fn append(&mut self, labels: &[SpanSummary]) -> anyhow::Result<()> {
         let mut bytes = Vec::new();
         for label in labels {
             bytes.extend(line(label)?);
@@ -170,8 +171,8 @@ fn line(value: &impl Serialize) -> anyhow::Result<Vec<u8>> {
 mod tests {
     use super::*;
 
-    fn summary(input: &str, text: &str, source: &str) -> Summary {
-        Summary {
+    fn summary(input: &str, text: &str, source: &str) -> SpanSummary {
+        SpanSummary {
             trajectory: "t".into(),
             annotator: 0,
             skills: [0, 2],

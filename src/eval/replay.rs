@@ -402,7 +402,7 @@ mod tests {
     fn alfreds_demonstrations_replay_and_its_counts_and_task_sets_come_out() {
         let Some(source) = crate::needed::alfred() else { return };
         let out = tempfile::tempdir().unwrap();
-        let options = crate::data::alfred::Options::default();
+        let options = crate::data::alfred::ImportOptions::default();
         let summary = crate::data::alfred::import(&source, out.path(), &options, &|_| {}).unwrap();
         assert_eq!(summary.manifest.skipped, []);
         let train = summary.manifest.counts["train"];

@@ -11,7 +11,7 @@ use crate::domain::Class;
 /// `assets/nouns.toml`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct NounTable {
     heads: BTreeMap<Class, Vec<String>>,
     words: Words,
 }
@@ -25,8 +25,8 @@ struct Words {
     after: BTreeSet<String>,
 }
 
-fn table() -> &'static Table {
-    static TABLE: OnceLock<Table> = OnceLock::new();
+fn table() -> &'static NounTable {
+    static TABLE: OnceLock<NounTable> = OnceLock::new();
     // A test parses the table, so the default cannot be reached in a build that passed.
     TABLE.get_or_init(|| toml::from_str(include_str!("../../assets/nouns.toml")).unwrap_or_default())
 }
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn the_table_of_nouns_parses() {
-        let table: Table = toml::from_str(include_str!("../../assets/nouns.toml")).unwrap();
+        let table: NounTable = toml::from_str(include_str!("../../assets/nouns.toml")).unwrap();
         assert!(table.heads.len() > 75 && !table.words.after.is_empty());
     }
 

@@ -5,7 +5,7 @@ use crate::domain::skill::SkillKind;
 
 /// What is different in the end.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Outcome {
+pub(super) enum ChainOutcome {
     /// Things lie somewhere: which, what lies in the first of them, and where.
     Placed { things: Vec<u8>, content: Option<u8>, place: u8 },
     /// Something is in the hand, and something in that.
@@ -17,17 +17,17 @@ pub(super) enum Outcome {
 }
 
 /// The outcomes in the order in which they come about.
-pub(super) fn outcomes(story: &Story<'_>) -> Vec<Outcome> {
-    let mut found: Vec<Outcome> = Vec::new();
+pub(super) fn outcomes(story: &Story<'_>) -> Vec<ChainOutcome> {
+    let mut found: Vec<ChainOutcome> = Vec::new();
     for (step, subtask) in story.subtasks.iter().enumerate() {
         match (subtask.skill, subtask.receptacle) {
             (SkillKind::Put, Some(place)) => put(story, &mut found, subtask.object, place),
             (SkillKind::Slice, _) if !uses_slice(story, step, subtask.object) => {
-                found.push(Outcome::Cut(subtask.object));
+                found.push(ChainOutcome::Cut(subtask.object));
             }
             (SkillKind::Toggle, _) => {
                 let held = story.holds_before(step).then(|| story.subtasks[step - 1].object);
-                found.push(Outcome::Lit { lamp: subtask.object, held });
+                found.push(ChainOutcome::Lit { lamp: subtask.object, held });
             }
             _ => {}
         }
@@ -37,7 +37,7 @@ pub(super) fn outcomes(story: &Story<'_>) -> Vec<Outcome> {
         && story.holds_before(story.subtasks.len())
     {
         let content = take_content(&mut found, last.object);
-        found.push(Outcome::Held { thing: last.object, content });
+        found.push(ChainOutcome::Held { thing: last.object, content });
     }
     found
 }
@@ -49,29 +49,29 @@ fn uses_slice(story: &Story<'_>, step: usize, whole: u8) -> bool {
     later.any(|subtask| story.class(subtask.object) == class && story.is_slice(subtask.object))
 }
 
-fn put(story: &Story<'_>, found: &mut Vec<Outcome>, thing: u8, place: u8) {
+fn put(story: &Story<'_>, found: &mut Vec<ChainOutcome>, thing: u8, place: u8) {
     // What it holds was put into it before: the two go together.
     let content = take_content(found, thing);
-    let joins = |outcome: &Outcome| match outcome {
-        Outcome::Placed { things, content: None, place: at } => {
+    let joins = |outcome: &ChainOutcome| match outcome {
+        ChainOutcome::Placed { things, content: None, place: at } => {
             *at == place && things.first().is_some_and(|&first| story.alike(first, thing))
         }
         _ => false,
     };
     let mut things = vec![thing];
     if let Some(position) = found.iter().position(joins).filter(|_| content.is_none())
-        && let Outcome::Placed { things: earlier, .. } = found.remove(position)
+        && let ChainOutcome::Placed { things: earlier, .. } = found.remove(position)
     {
         things.splice(0..0, earlier);
     }
-    found.push(Outcome::Placed { things, content, place });
+    found.push(ChainOutcome::Placed { things, content, place });
 }
 
 /// What was last put into a thing; from then on it is told with the thing, and a knife that also lies there is not told.
-fn take_content(found: &mut Vec<Outcome>, holder: u8) -> Option<u8> {
+fn take_content(found: &mut Vec<ChainOutcome>, holder: u8) -> Option<u8> {
     let mut content = None;
     found.retain(|outcome| match outcome {
-        Outcome::Placed { things, place, .. } if *place == holder => {
+        ChainOutcome::Placed { things, place, .. } if *place == holder => {
             content = things.first().copied();
             false
         }

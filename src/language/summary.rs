@@ -4,7 +4,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::grammar::{Slots, grammar, with_article};
-use super::outcome::{Outcome, outcomes};
+use super::outcome::{ChainOutcome, outcomes};
 use super::place_slots::destination_slots;
 use super::story::Story;
 use crate::domain::skill::SkillKind;
@@ -23,10 +23,10 @@ pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
     text
 }
 
-fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
+fn tell(story: &Story<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rng) -> String {
     let mut slots = Slots::new();
     match outcome {
-        Outcome::Placed { things, content, place } => {
+        ChainOutcome::Placed { things, content, place } => {
             slots.extend(destination_slots(story.class(*place), rng));
             let (rule, object) = match (things.as_slice(), content) {
                 ([thing], Some(content)) => ("place_one", with_content(story, *thing, *content, rng)),
@@ -36,7 +36,7 @@ fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
             slots.insert("object", object);
             grammar().say(rule, &slots, rng)
         }
-        Outcome::Held { thing, content } => {
+        ChainOutcome::Held { thing, content } => {
             let object = match content {
                 Some(content) => with_content(story, *thing, *content, rng),
                 None => described(story, *thing, rng),
@@ -44,12 +44,12 @@ fn tell(story: &Story<'_>, outcome: &Outcome, rng: &mut ChaCha8Rng) -> String {
             slots.insert("object", object);
             grammar().say("keep", &slots, rng)
         }
-        Outcome::Cut(thing) => {
+        ChainOutcome::Cut(thing) => {
             slots.insert("object", story.thing(*thing, 0, rng));
             slots.insert("tool", "a knife".into());
             grammar().say("slice", &slots, rng)
         }
-        Outcome::Lit { lamp, held } => {
+        ChainOutcome::Lit { lamp, held } => {
             slots.insert("object", story.thing(*lamp, 0, rng));
             match held {
                 Some(held) => {

@@ -6,7 +6,7 @@ use tch::{Kind, Tensor};
 
 use super::encoder_stack::{CheckedTensors, EncoderStack, LayerNames, LayerNorm, padding_bias};
 use super::transformer_config::TransformerConfig;
-use super::weights::Form;
+use super::weights::TensorSpec;
 
 const NAMES: LayerNames = LayerNames {
     query: "attention.self.query",
@@ -27,14 +27,17 @@ pub(super) struct Bert {
 
 impl Bert {
     /// The forms of the tensors that are used.
-    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, Form> {
+    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
         let hidden = config.hidden_size;
         let mut forms = BTreeMap::from([
-            ("embeddings.word_embeddings.weight".into(), Form::float(&[config.vocab_size, hidden])),
-            ("embeddings.position_embeddings.weight".into(), Form::float(&[config.max_position_embeddings, hidden])),
-            ("embeddings.token_type_embeddings.weight".into(), Form::float(&[config.type_vocab_size, hidden])),
-            ("embeddings.LayerNorm.weight".into(), Form::float(&[hidden])),
-            ("embeddings.LayerNorm.bias".into(), Form::float(&[hidden])),
+            ("embeddings.word_embeddings.weight".into(), TensorSpec::float(&[config.vocab_size, hidden])),
+            (
+                "embeddings.position_embeddings.weight".into(),
+                TensorSpec::float(&[config.max_position_embeddings, hidden]),
+            ),
+            ("embeddings.token_type_embeddings.weight".into(), TensorSpec::float(&[config.type_vocab_size, hidden])),
+            ("embeddings.LayerNorm.weight".into(), TensorSpec::float(&[hidden])),
+            ("embeddings.LayerNorm.bias".into(), TensorSpec::float(&[hidden])),
         ]);
         forms.extend((0..config.num_hidden_layers).flat_map(|n| NAMES.forms(n, hidden, config.intermediate_size)));
         forms

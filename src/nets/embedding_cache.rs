@@ -19,7 +19,7 @@ const FORMAT_VERSION: u32 = 1;
 /// The first line of a cache file.
 #[derive(Debug, Deserialize, PartialEq, Eq, Serialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct CacheHeader {
     format_version: u32,
     encoder: String,
     width: usize,
@@ -64,7 +64,7 @@ impl EmbeddingCache {
     }
 
     fn read_header(&mut self, encoder: &str) -> anyhow::Result<()> {
-        let expected = Header { format_version: FORMAT_VERSION, encoder: encoder.into(), width: self.width };
+        let expected = CacheHeader { format_version: FORMAT_VERSION, encoder: encoder.into(), width: self.width };
         let mut line = serde_json::to_vec(&expected)?;
         line.push(b'\n');
         if self.file.metadata()?.len() == 0 {

@@ -2,7 +2,7 @@
 
 use tch::{Kind, Tensor};
 
-use super::weights::{Form, Tensors};
+use super::weights::{TensorSpec, Tensors};
 
 /// A fully connected layer, its weight kept as `[inputs, outputs]`: for the few rows of a short sentence the product
 /// is a third faster than with the published `[outputs, inputs]`.
@@ -73,14 +73,20 @@ pub(super) struct LayerNames {
 
 impl LayerNames {
     /// The forms of one layer's tensors, for `hidden` and `inner` units.
-    pub(super) fn forms(&self, layer: i64, hidden: i64, inner: i64) -> Vec<(String, Form)> {
+    pub(super) fn forms(&self, layer: i64, hidden: i64, inner: i64) -> Vec<(String, TensorSpec)> {
         let dense = |name: &str, to: i64, from: i64| {
             let name = format!("encoder.layer.{layer}.{name}");
-            [(format!("{name}.weight"), Form::float(&[to, from])), (format!("{name}.bias"), Form::float(&[to]))]
+            [
+                (format!("{name}.weight"), TensorSpec::float(&[to, from])),
+                (format!("{name}.bias"), TensorSpec::float(&[to])),
+            ]
         };
         let norm = |name: &str| {
             let name = format!("encoder.layer.{layer}.{name}");
-            [(format!("{name}.weight"), Form::float(&[hidden])), (format!("{name}.bias"), Form::float(&[hidden]))]
+            [
+                (format!("{name}.weight"), TensorSpec::float(&[hidden])),
+                (format!("{name}.bias"), TensorSpec::float(&[hidden])),
+            ]
         };
         [
             dense(self.query, hidden, hidden),

@@ -6,7 +6,7 @@ use tch::{Kind, Tensor};
 
 use super::encoder_stack::{CheckedTensors, EncoderStack, LayerNames, LayerNorm, padding_bias};
 use super::transformer_config::TransformerConfig;
-use super::weights::Form;
+use super::weights::TensorSpec;
 
 const NAMES: LayerNames = LayerNames {
     query: "attention.attn.q",
@@ -32,15 +32,18 @@ pub(super) struct Mpnet {
 
 impl Mpnet {
     /// The forms of the tensors that are used.
-    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, Form> {
+    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
         let hidden = config.hidden_size;
         let relative = [config.relative_attention_num_buckets, config.num_attention_heads];
         let mut forms = BTreeMap::from([
-            ("embeddings.word_embeddings.weight".into(), Form::float(&[config.vocab_size, hidden])),
-            ("embeddings.position_embeddings.weight".into(), Form::float(&[config.max_position_embeddings, hidden])),
-            ("embeddings.LayerNorm.weight".into(), Form::float(&[hidden])),
-            ("embeddings.LayerNorm.bias".into(), Form::float(&[hidden])),
-            ("encoder.relative_attention_bias.weight".into(), Form::float(&relative)),
+            ("embeddings.word_embeddings.weight".into(), TensorSpec::float(&[config.vocab_size, hidden])),
+            (
+                "embeddings.position_embeddings.weight".into(),
+                TensorSpec::float(&[config.max_position_embeddings, hidden]),
+            ),
+            ("embeddings.LayerNorm.weight".into(), TensorSpec::float(&[hidden])),
+            ("embeddings.LayerNorm.bias".into(), TensorSpec::float(&[hidden])),
+            ("encoder.relative_attention_bias.weight".into(), TensorSpec::float(&relative)),
         ]);
         forms.extend((0..config.num_hidden_layers).flat_map(|n| NAMES.forms(n, hidden, config.intermediate_size)));
         forms

@@ -12,13 +12,13 @@ pub fn shrink_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
 }
 
 /// The source pixels of a line that a target pixel is made of.
-struct Span {
+struct PixelSpan {
     first: usize,
     /// From the first one on; they add up to 1.
     weights: Vec<f32>,
 }
 
-fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[Span]) -> Vec<u8> {
+fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[PixelSpan]) -> Vec<u8> {
     let mut planes = vec![0u8; to * to * 3];
     if rgb.len() < from * from * 3 {
         return planes;
@@ -48,20 +48,20 @@ fn weighted(rgb: &[u8], from: usize, to: usize, spans: &[Span]) -> Vec<u8> {
 }
 
 /// For each target pixel of a line, the source pixels under it with the shares of it that they cover.
-fn areas(from: usize, to: usize) -> Vec<Span> {
+fn areas(from: usize, to: usize) -> Vec<PixelSpan> {
     let scale = from as f32 / to as f32;
     let span = |target: usize| {
         let (start, end) = (target as f32 * scale, (target + 1) as f32 * scale);
         let last = (end.ceil() as usize).min(from);
         let share = |source: usize| (end.min((source + 1) as f32) - start.max(source as f32)).max(0.0) / scale;
         let first = start.floor() as usize;
-        Span { first, weights: (first..last).map(share).collect() }
+        PixelSpan { first, weights: (first..last).map(share).collect() }
     };
     (0..to).map(span).collect()
 }
 
 /// The same with weights that fall off linearly over the width of a target pixel on either side.
-fn triangles(from: usize, to: usize) -> Vec<Span> {
+fn triangles(from: usize, to: usize) -> Vec<PixelSpan> {
     let scale = from as f32 / to as f32;
     let reach = scale.max(1.0);
     let span = |target: usize| {
@@ -70,7 +70,7 @@ fn triangles(from: usize, to: usize) -> Vec<Span> {
         let last = ((centre + reach + 0.5) as usize).min(from);
         let weight = |source: usize| (1.0 - ((source as f32 + 0.5 - centre) / reach).abs()).max(0.0);
         let total: f32 = (first..last).map(weight).sum();
-        Span { first, weights: (first..last).map(|source| weight(source) / total).collect() }
+        PixelSpan { first, weights: (first..last).map(|source| weight(source) / total).collect() }
     };
     (0..to).map(span).collect()
 }

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::frozen::{BatchNormParts, FoldedConv, FrameEncoder, stacked};
 use super::resize::shrink_bilinear;
-use super::weights::{self, Form, Tensors};
+use super::weights::{self, TensorSpec, Tensors};
 use crate::house::view::Frame;
 
 /// The side of the image it reads, in pixels.
@@ -48,12 +48,12 @@ fn blocks() -> impl Iterator<Item = (String, i64, i64, i64)> {
 }
 
 /// The name of every tensor that is used, with its form.
-pub fn forms() -> BTreeMap<String, Form> {
+pub fn forms() -> BTreeMap<String, TensorSpec> {
     let mut forms = BTreeMap::new();
     let mut layer = |conv: String, norm: String, shape: [i64; 4]| {
-        forms.insert(format!("{conv}.weight"), Form::float(&shape));
+        forms.insert(format!("{conv}.weight"), TensorSpec::float(&shape));
         for part in ["weight", "bias", "running_mean", "running_var"] {
-            forms.insert(format!("{norm}.{part}"), Form::float(&shape[..1]));
+            forms.insert(format!("{norm}.{part}"), TensorSpec::float(&shape[..1]));
         }
     };
     layer("conv1".into(), "bn1".into(), [64, 3, 7, 7]);
@@ -185,7 +185,7 @@ pub(super) mod tests {
 
     /// Weights by formula, so that none are stored.
     fn tensors() -> Tensors {
-        let make = |(name, form): (String, Form)| {
+        let make = |(name, form): (String, TensorSpec)| {
             let count: i64 = form.shape.iter().product();
             let inputs: i64 = form.shape[1..].iter().product();
             let value = |position: u32| {

@@ -17,26 +17,26 @@ pub type Tensors = BTreeMap<String, Tensor>;
 
 /// What a model expects of one tensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Form {
+pub struct TensorSpec {
     /// Element type.
     pub kind: Kind,
     /// Length of each dimension, outermost first.
     pub shape: Vec<i64>,
 }
 
-impl Form {
+impl TensorSpec {
     /// A tensor of 32-bit floats.
-    pub fn float(shape: &[i64]) -> Form {
-        Form { kind: Kind::Float, shape: shape.to_vec() }
+    pub fn float(shape: &[i64]) -> TensorSpec {
+        TensorSpec { kind: Kind::Float, shape: shape.to_vec() }
     }
 
     /// The form of an existing tensor.
-    pub fn of(tensor: &Tensor) -> Form {
-        Form { kind: tensor.kind(), shape: tensor.size() }
+    pub fn of(tensor: &Tensor) -> TensorSpec {
+        TensorSpec { kind: tensor.kind(), shape: tensor.size() }
     }
 }
 
-impl fmt::Display for Form {
+impl fmt::Display for TensorSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?}{:?}", self.kind, self.shape)
     }
@@ -48,9 +48,9 @@ pub struct Misshapen {
     /// The tensor's name.
     pub name: String,
     /// What the file holds.
-    pub found: Form,
+    pub found: TensorSpec,
     /// What the model expects.
-    pub expected: Form,
+    pub expected: TensorSpec,
 }
 
 /// Every difference between a weights file and what a model expects.
@@ -170,10 +170,10 @@ pub fn digest(tensors: impl IntoIterator<Item = (String, Tensor)>) -> anyhow::Re
 ///
 /// # Errors
 /// [`WeightsError::Unfit`], which names every missing, extra and misshapen tensor and the file.
-pub fn check(path: &Path, tensors: &Tensors, expected: &BTreeMap<String, Form>) -> Result<(), WeightsError> {
+pub fn check(path: &Path, tensors: &Tensors, expected: &BTreeMap<String, TensorSpec>) -> Result<(), WeightsError> {
     let mut differences = Differences::default();
     for (name, expected) in expected {
-        match tensors.get(name).map(Form::of) {
+        match tensors.get(name).map(TensorSpec::of) {
             None => differences.missing.push(name.clone()),
             Some(found) if found != *expected => {
                 differences.misshapen.push(Misshapen { name: name.clone(), found, expected: expected.clone() });
@@ -195,7 +195,7 @@ pub fn check(path: &Path, tensors: &Tensors, expected: &BTreeMap<String, Form>) 
 pub fn load(path: &Path, variables: &mut nn::VarStore) -> Result<BTreeMap<String, String>, WeightsError> {
     let (tensors, metadata) = read_with_metadata(path)?;
     let mut targets: Tensors = variables.variables().into_iter().collect();
-    let expected = targets.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect();
+    let expected = targets.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
     check(path, &tensors, &expected)?;
     tch::no_grad(|| {
         for (name, target) in &mut targets {
@@ -312,8 +312,8 @@ mod tests {
         .into()
     }
 
-    fn forms(tensors: &Tensors) -> BTreeMap<String, Form> {
-        tensors.iter().map(|(name, tensor)| (name.clone(), Form::of(tensor))).collect()
+    fn forms(tensors: &Tensors) -> BTreeMap<String, TensorSpec> {
+        tensors.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect()
     }
 
     #[test]
@@ -346,8 +346,8 @@ mod tests {
     #[test]
     fn every_difference_is_named_at_once() {
         let mut expected = forms(&sample());
-        expected.insert("head.weight".into(), Form::float(&[12, 4]));
-        expected.insert("conv.bias".into(), Form::float(&[3]));
+        expected.insert("head.weight".into(), TensorSpec::float(&[12, 4]));
+        expected.insert("conv.bias".into(), TensorSpec::float(&[3]));
         expected.remove("steps");
         let error = check(Path::new("shop/model.safetensors"), &sample(), &expected).unwrap_err().to_string();
         assert_eq!(
@@ -359,7 +359,7 @@ mod tests {
 
     #[test]
     fn another_element_type_is_a_difference() {
-        let expected = [("steps".to_string(), Form::float(&[]))].into();
+        let expected = [("steps".to_string(), TensorSpec::float(&[]))].into();
         let tensors = [("steps".to_string(), Tensor::from(7i64))].into();
         let error = check(Path::new("m"), &tensors, &expected).unwrap_err().to_string();
         assert!(error.contains("steps is Int64[] where Float[] is expected"), "{error}");

@@ -13,7 +13,7 @@ use tch::{Device, Kind, Tensor};
 use super::frame_store::FrameStore;
 use super::metrics::{Report, Scalars};
 use crate::data::Dataset;
-use crate::data::features::{Features, Header, Writer};
+use crate::data::features::{FeatureHeader, FeatureWriter, Features};
 use crate::house::House;
 use crate::house::render::Renderer;
 use crate::nets::device;
@@ -39,8 +39,8 @@ pub fn features(
 ) -> anyhow::Result<Option<Features>> {
     let mut all: Option<Features> = None;
     for (dataset, trajectories) in datasets.iter().zip(&frame_store.parts) {
-        let header = Header {
-            format_version: Header::FORMAT,
+        let header = FeatureHeader {
+            format_version: FeatureHeader::FORMAT,
             encoder: encoder.digest().to_string(),
             dataset: format!("{}-{}", dataset.digest()?, looks(frame_store, trajectories)?),
             maps: frame_store.frames_of(trajectories) as u64,
@@ -83,11 +83,11 @@ pub fn encode(
     frame_store: &FrameStore,
     trajectories: Range<usize>,
     folder: &Path,
-    header: &Header,
+    header: &FeatureHeader,
     report: &mut dyn Report,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
-    let mut writer = Writer::open(folder, header.clone())?;
+    let mut writer = FeatureWriter::open(folder, header.clone())?;
     let frames_until = |end: usize| frame_store.frames_of(&(trajectories.start..end)) as u64;
     let mut written = trajectories.start;
     while written < trajectories.end && frames_until(written + 1) <= writer.maps() {
@@ -181,8 +181,8 @@ mod tests {
         HouseEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
     }
 
-    fn header() -> Header {
-        Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 10, numbers: 16 * 49 }
+    fn header() -> FeatureHeader {
+        FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 10, numbers: 16 * 49 }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use anyhow::Context;
 use rayon::prelude::*;
 
 use crate::data::dataset::Dataset;
-use crate::data::items::Label;
+use crate::data::items::ActionLabel;
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Trajectory, World};
 use crate::house::{Replay, generate, validate};
@@ -137,8 +137,8 @@ impl FrameStore {
     ///
     /// # Errors
     /// Never for a footage that was opened.
-    pub fn labels(&self) -> anyhow::Result<Vec<Option<Label>>> {
-        let of = |trajectory: usize| -> anyhow::Result<Vec<Option<Label>>> {
+    pub fn labels(&self) -> anyhow::Result<Vec<Option<ActionLabel>>> {
+        let of = |trajectory: usize| -> anyhow::Result<Vec<Option<ActionLabel>>> {
             let recorded = &self.trajectories[trajectory];
             let mut labels = Vec::with_capacity(recorded.actions.len() + 1);
             self.replay(trajectory, |scene, world, step| {
@@ -146,13 +146,13 @@ impl FrameStore {
                 labels.push(taken.and(recorded.choice(step)).map(|action| {
                     let class = action.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
                     let object = if class.in_vocabulary() { class.index() as u8 } else { 0 };
-                    Label { action: action.kind.index() as u8, object, taken: taken == Some(action) }
+                    ActionLabel { action: action.kind.index() as u8, object, taken: taken == Some(action) }
                 }));
                 Ok(())
             })?;
             Ok(labels)
         };
-        let labels: Vec<Vec<Option<Label>>> =
+        let labels: Vec<Vec<Option<ActionLabel>>> =
             (0..self.trajectories.len()).into_par_iter().map(of).collect::<anyhow::Result<_>>()?;
         Ok(labels.concat())
     }
@@ -190,7 +190,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (scene, mut start) = kitchen();
         start.agent.cell = Cell::new(900, 900);
-        let mut writer = dataset::Writer::new(folder.path()).unwrap();
+        let mut writer = dataset::DatasetWriter::new(folder.path()).unwrap();
         writer.scene(&scene).unwrap();
         writer.trajectory(&Trajectory { start, ..trajectory::testing::empty("lost", &scene.name) }).unwrap();
         writer.finish(&dataset::testing::manifest(1, &[])).unwrap();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::algo::chain::{Chaining, PairSource};
 use crate::algo::iql::Iql;
 use crate::algo::learner::Optimisation;
-use crate::data::selection::Selection;
+use crate::data::selection::DataSelection;
 use crate::nets::critic::CriticSpec;
 use crate::nets::policy::PolicySpec;
 use crate::nets::precision::Precision;
@@ -31,7 +31,7 @@ pub struct Preset {
     /// Steps between two reports.
     pub report_every: u64,
     /// What is learned from.
-    pub data: Selection,
+    pub data: DataSelection,
     /// What the agent sees through.
     #[serde(default)]
     pub eyes: Sight,

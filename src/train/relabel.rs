@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::metrics::{Report, Scalars};
 use crate::data::Dataset;
 use crate::data::items::composites;
-use crate::data::summaries::{Ledger, Summary};
+use crate::data::summaries::{Ledger, SpanSummary};
 use crate::domain::Trajectory;
 use crate::language::passage::{Passage, Summarizer};
 
@@ -51,7 +51,7 @@ pub fn relabel(
     let dataset = Dataset::open(folder)?;
     let trajectories = dataset.trajectories()?.collect::<anyhow::Result<Vec<_>>>()?;
     let (mut ledger, lines) = Ledger::open(folder)?;
-    let ours = |line: &Summary| line.source == summarizer.source() && line.version == summarizer.version();
+    let ours = |line: &SpanSummary| line.source == summarizer.source() && line.version == summarizer.version();
     let mut texts: HashMap<String, String> = HashMap::new();
     let mut labelled = HashSet::new();
     for line in lines.into_iter().filter(ours) {
@@ -108,8 +108,8 @@ fn wanted<'a>(trajectory: &'a Trajectory, held_out: &[String]) -> Vec<Wanted<'a>
 }
 
 impl Wanted<'_> {
-    fn line(&self, text: String, summarizer: &dyn Summarizer) -> Summary {
-        Summary {
+    fn line(&self, text: String, summarizer: &dyn Summarizer) -> SpanSummary {
+        SpanSummary {
             trajectory: self.trajectory.id.clone(),
             annotator: self.annotator as u32,
             skills: [self.skills.start as u8, self.skills.end as u8],
@@ -127,9 +127,9 @@ mod tests {
 
     use super::*;
     use crate::data::dataset;
-    use crate::data::dataset::Writer;
-    use crate::data::items::{Items, Label, Source};
-    use crate::data::selection::{Composites, Selection};
+    use crate::data::dataset::DatasetWriter;
+    use crate::data::items::{ActionLabel, ItemSource, Items};
+    use crate::data::selection::{Composites, DataSelection};
     use crate::data::summaries::Summaries;
     use crate::domain::trajectory;
     use crate::domain::trajectory::Annotation;
@@ -167,7 +167,7 @@ mod tests {
     /// Two trajectories of three skills that two people tell alike, and a third one whose whole is held out.
     fn dataset() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = Writer::new(folder.path()).unwrap();
+        let mut writer = DatasetWriter::new(folder.path()).unwrap();
         let annotation = Annotation {
             goal: "put a clean mug on the desk".into(),
             steps: ["Take the red mug.", "Wash it.", "Put it on the desk."].map(str::to_owned).to_vec(),
@@ -223,15 +223,15 @@ mod tests {
         let trajectories: Vec<Trajectory> = dataset.trajectories().unwrap().map(Result::unwrap).collect();
         let texts = |source| {
             let summaries = Summaries::read(&[folder.path()], Some(source)).unwrap();
-            let selection = Selection { labels_of: Some(source.into()), ..Selection::of(Composites::Labels) };
-            let source = Source {
+            let selection = DataSelection { labels_of: Some(source.into()), ..DataSelection::of(Composites::Labels) };
+            let source = ItemSource {
                 apart: &[],
                 trajectories: &trajectories,
                 held_out: &dataset.manifest().held_out,
                 summaries: &summaries,
             };
             let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();
-            let labels = vec![Some(Label { action: 0, object: 0, taken: true }); frames];
+            let labels = vec![Some(ActionLabel { action: 0, object: 0, taken: true }); frames];
             let items = Items::of(&source, labels, &selection).unwrap();
             (items.training.len(), items.texts)
         };

@@ -185,8 +185,8 @@ mod tests {
 
     use super::*;
     use crate::algo::chain::PairSource;
-    use crate::data::features::{Features, Header, Writer};
-    use crate::data::items::{Items, Label};
+    use crate::data::features::{FeatureHeader, FeatureWriter, Features};
+    use crate::data::items::{ActionLabel, Items};
     use crate::data::selection::{Named, Past};
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
@@ -232,19 +232,20 @@ mod tests {
     fn features(preset: &Preset) -> Features {
         let folder = tempfile::tempdir().unwrap();
         let numbers = preset.visual.map() as u64;
-        let header = Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
+        let header =
+            FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
         tch::manual_seed(4);
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];
         maps.copy_data_u8(&mut bytes, maps.numel());
-        let mut writer = Writer::open(folder.path(), header.clone()).unwrap();
+        let mut writer = FeatureWriter::open(folder.path(), header.clone()).unwrap();
         writer.add(&bytes).unwrap();
         writer.finish().unwrap();
         Features::read(folder.path(), &header).unwrap().unwrap()
     }
 
     fn items() -> Items {
-        let label = |frame: u64| Label {
+        let label = |frame: u64| ActionLabel {
             action: (frame % 12) as u8,
             object: (frame % 2 * (frame % 12)) as u8,
             taken: !frame.is_multiple_of(5),

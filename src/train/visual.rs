@@ -147,7 +147,7 @@ pub mod testing {
     pub fn frame_store() -> FrameStore {
         let folder = tempfile::tempdir().unwrap();
         let (scene, start) = kitchen();
-        let mut writer = crate::data::dataset::Writer::new(folder.path()).unwrap();
+        let mut writer = crate::data::dataset::DatasetWriter::new(folder.path()).unwrap();
         writer.scene(&scene).unwrap();
         for (id, turn) in [("left", ActionType::RotateLeft), ("right", ActionType::RotateRight)] {
             let trajectory = Trajectory {

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use baseline::Baselines;
 use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::algo::chain::PairSource;
-use sprint_explorer::data::features::{Features, Header, Writer};
-use sprint_explorer::data::items::{Items, Label, Span};
+use sprint_explorer::data::features::{FeatureHeader, FeatureWriter, Features};
+use sprint_explorer::data::items::{ActionLabel, Items, Span};
 use sprint_explorer::data::selection::{Named, Past};
 use sprint_explorer::nets::device::best_device;
 use sprint_explorer::nets::visual_encoder::VisualEncoder;
@@ -123,8 +123,8 @@ fn features(preset: &Preset) -> anyhow::Result<Features> {
     let folder = tempfile::tempdir()?;
     let numbers = preset.visual.map() as u64;
     let header =
-        Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: u64::from(FRAMES), numbers };
-    let mut writer = Writer::open(folder.path(), header.clone())?;
+        FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: u64::from(FRAMES), numbers };
+    let mut writer = FeatureWriter::open(folder.path(), header.clone())?;
     let map = Tensor::rand([numbers as i64], (Kind::Half, Device::Cpu));
     let mut bytes = vec![0; map.numel() * 2];
     map.copy_data_u8(&mut bytes, map.numel());
@@ -137,7 +137,7 @@ fn features(preset: &Preset) -> anyhow::Result<Features> {
 }
 
 fn items() -> Items {
-    let label = |frame: u32| Label {
+    let label = |frame: u32| ActionLabel {
         action: (frame % 12) as u8,
         object: if frame.is_multiple_of(4) { 7 } else { 0 },
         taken: true,

@@ -10,8 +10,8 @@ use sprint_explorer::agent::config::Config;
 use sprint_explorer::agent::policy_source::PolicySource;
 use sprint_explorer::data::alfred::{self, tasks as lists};
 use sprint_explorer::data::features::{self, Features};
-use sprint_explorer::data::summaries::{Ledger, Summaries, Summary};
-use sprint_explorer::data::{Dataset, alfred::layout::Layout, dataset, json, taskset};
+use sprint_explorer::data::summaries::{Ledger, SpanSummary, Summaries};
+use sprint_explorer::data::{Dataset, alfred::layout::FloorPlanLayout, dataset, json, taskset};
 use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Room, TaskSet};
 use sprint_explorer::episode::scenes::Scenes;
@@ -225,7 +225,7 @@ fn packed(at: &Path) -> anyhow::Result<()> {
 }
 
 fn labels(at: &Path) -> Vec<Vec<u8>> {
-    let label = |trajectory: &str| Summary {
+    let label = |trajectory: &str| SpanSummary {
         trajectory: trajectory.into(),
         annotator: 0,
         skills: [0, 2],
@@ -243,12 +243,12 @@ fn label(at: &Path) -> anyhow::Result<()> {
     Ledger::open(at).map(drop)
 }
 
-fn header() -> features::Header {
-    features::Header { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 3, numbers: 4 }
+fn header() -> features::FeatureHeader {
+    features::FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: 3, numbers: 4 }
 }
 
 fn maps(at: &Path) -> Vec<Vec<u8>> {
-    let mut writer = features::Writer::open(at, header()).unwrap();
+    let mut writer = features::FeatureWriter::open(at, header()).unwrap();
     writer.add(&[7; 24]).unwrap();
     writer.finish().unwrap();
     vec![std::fs::read(at.join(header().file_name())).unwrap()]
@@ -331,7 +331,7 @@ fn recording() -> Vec<u8> {
 }
 
 fn imported(at: &Path) -> anyhow::Result<()> {
-    alfred::import(at, &at.join("out"), &alfred::Options::default(), &|_| {}).map(drop)
+    alfred::import(at, &at.join("out"), &alfred::ImportOptions::default(), &|_| {}).map(drop)
 }
 
 fn layouts(at: &Path) -> Vec<Vec<u8>> {
@@ -356,7 +356,7 @@ fn stands(at: &Path) -> Vec<Vec<u8>> {
 }
 
 fn layout(at: &Path) -> anyhow::Result<()> {
-    Layout::read(&at.join("gen/layouts"), "FloorPlan1")?;
+    FloorPlanLayout::read(&at.join("gen/layouts"), "FloorPlan1")?;
     imported(at)
 }
 

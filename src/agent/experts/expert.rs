@@ -46,7 +46,7 @@ impl Policy for ExpertPolicy {
     }
 
     fn reset(&mut self, _slot: usize, _seed: u64) {
-        self.expert.forget();
+        self.expert.reset();
     }
 
     fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
@@ -57,12 +57,12 @@ impl Policy for ExpertPolicy {
     }
 
     fn state(&self, _slot: usize) -> PolicyState {
-        PolicyState::Plan(Box::new(self.expert.plan()))
+        PolicyState::Plan(Box::new(self.expert.state()))
     }
 
     fn restore(&mut self, _slot: usize, state: PolicyState) {
         if let PolicyState::Plan(plan) = state {
-            self.expert.follow(*plan);
+            self.expert.restore(*plan);
         }
     }
 }

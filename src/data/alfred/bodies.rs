@@ -1,8 +1,8 @@
 //! What furniture fills: boxes from its surfaces, its pivot, how it was seen, and what class of thing it is.
 
 use super::fit::{Subject, within};
-use super::fixtures::Found;
-use super::furniture::{self, Build, Furniture, Height};
+use super::fixtures::FoundFixture;
+use super::furniture::{self, BodyKind, Furniture, MeasuredHeight};
 use super::support::{MARGIN, ahead_of};
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Cell, Fixture, Heading, Point};
@@ -24,8 +24,8 @@ const HEADROOM: i32 = 60;
 
 /// Gives a fixture its body, and cuts the surfaces that lie inside it to fit. The fixture comes with surfaces and facing;
 /// seats and toilets, which are used from any side, are turned as they were seen.
-pub fn furnish(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell]) {
-    let turnable = matches!(furniture::of(fixture.class).build, Build::Seat | Build::Toilet);
+pub fn furnish(fixture: &mut Fixture, found: &FoundFixture, agent_y: i32, cells: &[Cell]) {
+    let turnable = matches!(furniture::of(fixture.class).build, BodyKind::Seat | BodyKind::Toilet);
     let voted = fixture.facing;
     let facings = Heading::ALL.into_iter().filter(|&facing| facing == voted || turnable);
     let fitted = facings.map(|facing| {
@@ -39,12 +39,12 @@ pub fn furnish(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell
 }
 
 /// Gives a fixture its body in the direction that it faces; how badly that agrees with its views.
-fn furnish_as_turned(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: &[Cell]) -> f32 {
+fn furnish_as_turned(fixture: &mut Fixture, found: &FoundFixture, agent_y: i32, cells: &[Cell]) -> f32 {
     let floor = agent_y - 900;
     let row = furniture::of(fixture.class);
     let first = first_guess(fixture, row, floor);
     let areas = fixture.surfaces.first().map_or(0, |surface| surface.areas.len());
-    if matches!(row.build, Build::Block | Build::Slab) && areas > 1 {
+    if matches!(row.build, BodyKind::Block | BodyKind::Slab) && areas > 1 {
         // An outline of several parts: the contents tell more than any view.
         let surfaces = fixture.surfaces.iter().flat_map(|surface| &surface.areas);
         fixture.body = surfaces.map(|area| upright(*area, first.min.y, first.max.y)).collect();
@@ -57,14 +57,14 @@ fn furnish_as_turned(fixture: &mut Fixture, found: &Found, agent_y: i32, cells: 
     if high {
         subject.cells = &[];
     }
-    let on_floor = matches!(row.bottom, Height::Floor(_));
-    let top_known = matches!(row.build, Build::Block | Build::Slab | Build::Toilet);
+    let on_floor = matches!(row.bottom, MeasuredHeight::Floor(_));
+    let top_known = matches!(row.build, BodyKind::Block | BodyKind::Slab | BodyKind::Toilet);
     subject.free = [true, !on_floor, true, true, !top_known, true];
     subject.contents = contents(fixture, row);
     let (outer, cost) = subject.fit(first);
     fixture.body = parts(outer);
-    if matches!(row.build, Build::Tub | Build::Shell | Build::Board) {
-        let inset = if row.build == Build::Board { 0 } else { WALL };
+    if matches!(row.build, BodyKind::Tub | BodyKind::Shell | BodyKind::Board) {
+        let inset = if row.build == BodyKind::Board { 0 } else { WALL };
         within(&mut fixture.surfaces, &outer, inset);
     }
     cost
@@ -76,26 +76,26 @@ fn first_guess(fixture: &Fixture, row: &Furniture, floor: i32) -> Cuboid {
     let (Some(lowest), Some(highest)) = (fixture.surfaces.first(), fixture.surfaces.last()) else { return own };
     let area = outline(fixture);
     match row.build {
-        Build::Thing => own,
-        Build::Block => upright(area, floor, highest.height.max(floor + 20)),
-        Build::Toilet => {
+        BodyKind::Thing => own,
+        BodyKind::Block => upright(area, floor, highest.height.max(floor + 20)),
+        BodyKind::Toilet => {
             let front = strip(&area, fixture.facing, 350);
             upright(union(&area, &front), floor, highest.height.max(floor + 20))
         }
-        Build::Seat => {
+        BodyKind::Seat => {
             let [left, right] = [fixture.facing.left(), fixture.facing.right()].map(|side| strip(&area, side, ARM));
             let back = strip(&area, fixture.facing.right().right(), BACK);
             let all = union(&union(&area, &back), &union(&left, &right));
             upright(all, floor, lowest.height.max(floor + 20) + row.body[1] / 2)
         }
-        Build::Slab => upright(area, lowest.height - row.body[1], lowest.height),
-        Build::Board => upright(area, lowest.height - BOARD, lowest.height),
-        Build::Tub => {
+        BodyKind::Slab => upright(area, lowest.height - row.body[1], lowest.height),
+        BodyKind::Board => upright(area, lowest.height - BOARD, lowest.height),
+        BodyKind::Tub => {
             let outline = area.grown(WALL - MARGIN / 2);
-            let bottom = if matches!(row.bottom, Height::Floor(_)) { floor } else { lowest.height - 20 };
+            let bottom = if matches!(row.bottom, MeasuredHeight::Floor(_)) { floor } else { lowest.height - 20 };
             upright(outline, bottom, (bottom + row.body[1]).max(lowest.height + HEADROOM))
         }
-        Build::Shell => {
+        BodyKind::Shell => {
             let inside = area.grown(WALL - MARGIN / 2);
             let bottom = own.min.y.min(lowest.height - 20);
             upright(union(&inside, &own.footprint()), bottom, own.max.y.max(highest.height + HEADROOM))
@@ -108,13 +108,13 @@ fn contents(fixture: &Fixture, row: &Furniture) -> Option<Cuboid> {
     let (lowest, highest) = (fixture.surfaces.first()?, fixture.surfaces.last()?);
     let area = outline(fixture);
     match row.build {
-        Build::Thing | Build::Board => None,
-        Build::Block | Build::Slab | Build::Seat | Build::Toilet => {
+        BodyKind::Thing | BodyKind::Board => None,
+        BodyKind::Block | BodyKind::Slab | BodyKind::Seat | BodyKind::Toilet => {
             let points = area.grown(-MARGIN);
             let points = if points.min[0] <= points.max[0] && points.min[1] <= points.max[1] { points } else { area };
             Some(upright(points, lowest.height, lowest.height))
         }
-        Build::Tub | Build::Shell => {
+        BodyKind::Tub | BodyKind::Shell => {
             // Neighbours may have been taken for contents: only the inner part has to be inside.
             let inset = |axis: usize| (area.max[axis] - area.min[axis]) / 4;
             let min = [area.min[0] + inset(0), area.min[1] + inset(1)];
@@ -129,7 +129,7 @@ fn parts(outer: Cuboid, fixture: &Fixture, row: &Furniture, floor: i32) -> Vec<C
     let Some(lowest) = fixture.surfaces.first() else { return vec![outer] };
     let (all, area) = (outer.footprint(), outline(fixture));
     match row.build {
-        Build::Seat => {
+        BodyKind::Seat => {
             let seat = shrunk_behind(&all, &area, fixture.facing);
             let top = lowest.height.max(floor + 10);
             let mut parts = vec![upright(seat, floor, top)];
@@ -141,7 +141,7 @@ fn parts(outer: Cuboid, fixture: &Fixture, row: &Furniture, floor: i32) -> Vec<C
             }
             parts
         }
-        Build::Toilet => {
+        BodyKind::Toilet => {
             let tank = area.grown(WALL - MARGIN / 2);
             let bowl = remainder(&union(&all, &tank), &tank, fixture.facing);
             let bowl = bowl.map(|bowl| upright(bowl, floor, floor + BOWL));

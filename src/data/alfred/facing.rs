@@ -1,10 +1,10 @@
 //! Which way furniture looks: towards where the expert stood to use it.
 
-use super::fixtures::Found;
+use super::fixtures::FoundFixture;
 use crate::domain::{Cell, Heading, Point};
 
 /// The front of a fixture: opposite to how most users faced it; where nobody used it, towards the nearest cells.
-pub fn facing(found: &Found, cells: &[Cell]) -> Heading {
+pub fn facing(found: &FoundFixture, cells: &[Cell]) -> Heading {
     let mut votes = [0usize; 4];
     let users = found.uses.iter().map(|used| used.pose);
     // The vetted pose looks straight at it; a walk that ended elsewhere says less.

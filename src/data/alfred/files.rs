@@ -12,7 +12,7 @@ pub struct TrajData {
     /// Where and how it starts.
     pub scene: SceneData,
     /// What the expert did.
-    pub plan: Plan,
+    pub plan: PlanData,
     /// What people wrote.
     pub turk_annotations: TurkAnnotations,
 }
@@ -98,7 +98,7 @@ pub struct Triple {
 
 /// What the expert planned and did.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Plan {
+pub struct PlanData {
     /// The skills, GotoLocation apart.
     pub high_pddl: Vec<HighAction>,
     /// The actions.
@@ -154,7 +154,7 @@ pub struct LowAction {
     /// What was sent to the simulator.
     pub api_action: ApiAction,
     /// What was recorded with it.
-    pub discrete_action: Recorded,
+    pub discrete_action: RecordedAction,
 }
 
 /// What was sent to the simulator.
@@ -171,7 +171,7 @@ pub struct ApiAction {
 
 /// What was recorded with an action.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Recorded {
+pub struct RecordedAction {
     /// Its arguments; absent in some files.
     #[serde(default)]
     pub args: RecordedArgs,

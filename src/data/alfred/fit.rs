@@ -1,7 +1,7 @@
 //! Fitting furniture to the boxes in which recorded frames show it: the sides that its contents do not tell.
 
 use super::fixtures::Use;
-use super::furniture::Build;
+use super::furniture::BodyKind;
 use crate::domain::place::{Cuboid, Pose};
 use crate::domain::scene::Surface;
 use crate::domain::world::{FixtureState, Instance};
@@ -23,7 +23,7 @@ const THINNEST: i32 = 20;
 
 /// A view of a fixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
+pub struct FixtureView {
     pose: Pose,
     open: bool,
     bounds: [u16; 4],
@@ -31,14 +31,14 @@ pub struct Sight {
 }
 
 /// The different views of a fixture, the most frequent first.
-pub fn views(uses: &[Use]) -> Vec<Sight> {
-    let mut views: Vec<Sight> = Vec::new();
+pub fn views(uses: &[Use]) -> Vec<FixtureView> {
+    let mut views: Vec<FixtureView> = Vec::new();
     for used in uses {
         let Some(bounds) = used.bounds else { continue };
-        let same = |view: &&mut Sight| view.pose == used.pose && view.open == used.open && view.bounds == bounds;
+        let same = |view: &&mut FixtureView| view.pose == used.pose && view.open == used.open && view.bounds == bounds;
         match views.iter_mut().find(same) {
             Some(view) => view.weight += 1.0,
-            None => views.push(Sight { pose: used.pose, open: used.open, bounds, weight: 1.0 }),
+            None => views.push(FixtureView { pose: used.pose, open: used.open, bounds, weight: 1.0 }),
         }
     }
     views.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -54,7 +54,7 @@ pub fn views(uses: &[Use]) -> Vec<Sight> {
 pub struct Subject<'a> {
     scene: Scene,
     world: World,
-    views: Vec<Sight>,
+    views: Vec<FixtureView>,
     /// What the body has to contain.
     pub contents: Option<Cuboid>,
     /// Cells that it must leave free.
@@ -69,13 +69,13 @@ impl<'a> Subject<'a> {
     /// From a fixture as it is so far. Surfaces inside closed bodies do not count as seen.
     pub fn new(
         mut fixture: Fixture,
-        build: Build,
+        build: BodyKind,
         uses: &[Use],
         agent_y: i32,
         cells: &'a [Cell],
         parts: &'a dyn Fn(Cuboid) -> Vec<Cuboid>,
     ) -> Subject<'a> {
-        if !matches!(build, Build::Block | Build::Slab | Build::Seat) {
+        if !matches!(build, BodyKind::Block | BodyKind::Slab | BodyKind::Seat) {
             fixture.surfaces.clear();
         }
         let scene = Scene {
@@ -222,7 +222,7 @@ mod tests {
             stand: None,
         };
         let parts = |outer| vec![outer];
-        let seen = Subject::new(fixture(truth), Build::Thing, &[], 900, &[], &parts);
+        let seen = Subject::new(fixture(truth), BodyKind::Thing, &[], 900, &[], &parts);
         let poses = [(0, 0, Heading::North), (-5, 4, Heading::East), (5, 4, Heading::West), (0, 1, Heading::North)];
         let uses = poses.map(|(x, z, heading)| {
             let pose = Pose { cell: Cell::new(x, z), heading, horizon: 30 };
@@ -230,7 +230,7 @@ mod tests {
             Use { kind: ActionType::Put, pose, bounds: Some(bounds.map(|edge| edge.round() as u16)), open: false }
         });
         let first = Cuboid::between(Point::new(-150, 650, 1000), Point::new(250, 1100, 1250));
-        let found = Subject::new(fixture(first), Build::Thing, &uses, 900, &[], &parts).fit(first).0;
+        let found = Subject::new(fixture(first), BodyKind::Thing, &uses, 900, &[], &parts).fit(first).0;
         for (a, b) in sides(found).into_iter().zip(sides(truth)) {
             assert!((a - b).abs() <= 60, "{found:?}");
         }

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::layout::Layout;
-use super::names::{Name, Part};
-use super::recording::{Recording, Setting};
+use super::layout::FloorPlanLayout;
+use super::names::{Name, NamedPart};
+use super::recording::{RecordedStart, Recording};
 use crate::domain::place::Pose;
 use crate::domain::{ActionType, Class, Point, SkillKind};
 
@@ -31,7 +31,7 @@ pub struct Use {
 
 /// A fixture as found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct FoundFixture {
     /// Its id.
     pub name: Name,
     /// Its pivot.
@@ -50,7 +50,7 @@ pub struct Found {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inventory {
     /// The fixtures, in the order of their names.
-    pub found: Vec<Found>,
+    pub found: Vec<FoundFixture>,
     numbers: BTreeMap<Name, u16>,
 }
 
@@ -64,7 +64,7 @@ fn is_basin(class: Class) -> bool {
 
 impl Inventory {
     /// Gathers the fixtures of one floor plan from its layout and all recordings of it.
-    pub fn gather(layout: &Layout, recordings: &[&Recording]) -> Inventory {
+    pub fn gather(layout: &FloorPlanLayout, recordings: &[&Recording]) -> Inventory {
         let mut pivots: BTreeMap<Name, Option<Point>> = BTreeMap::new();
         for &name in layout.stands.keys() {
             pivots.entry(name).or_default();
@@ -87,7 +87,7 @@ impl Inventory {
                 };
                 if let Some((name, (_, point))) = placed {
                     let entry = pivots.entry(name).or_default();
-                    let basin = name.part == Part::Basin && point.floor_distance(name.at) <= BASIN;
+                    let basin = name.part == NamedPart::Basin && point.floor_distance(name.at) <= BASIN;
                     if basin || point.distance(name.at) <= ROUNDING {
                         *entry = Some(point);
                     }
@@ -118,7 +118,7 @@ impl Inventory {
 
     fn add(&mut self, name: Name, point: Option<Point>) {
         let pivot = point.unwrap_or(name.at);
-        let same = |found: &Found| found.name.class == name.class && found.pivot.distance(pivot) < SAME;
+        let same = |found: &FoundFixture| found.name.class == name.class && found.pivot.distance(pivot) < SAME;
         let known = self.numbers.get(&name).map(|&number| usize::from(number));
         let number = match known.or_else(|| self.found.iter().position(same)) {
             Some(number) => {
@@ -130,7 +130,7 @@ impl Inventory {
             }
             None => {
                 let exact = point.is_some();
-                self.found.push(Found { name, pivot, vetted: None, walked_to: vec![], uses: vec![], exact });
+                self.found.push(FoundFixture { name, pivot, vetted: None, walked_to: vec![], uses: vec![], exact });
                 self.found.len() - 1
             }
         };
@@ -139,9 +139,9 @@ impl Inventory {
 
     /// Adds a thing that is only known by class and place, if it is none of those known by id.
     fn add_loose(&mut self, class: Class, point: Point) {
-        let near = |found: &Found| {
+        let near = |found: &FoundFixture| {
             if is_basin(class) {
-                let (pivot, basin) = (found.pivot, found.name.part == Part::Basin);
+                let (pivot, basin) = (found.pivot, found.name.part == NamedPart::Basin);
                 let unsure = !found.exact && pivot.floor_distance(point) < BASIN;
                 is_basin(found.name.class) && basin && (unsure || pivot.distance(point) < SAME)
             } else {
@@ -155,7 +155,7 @@ impl Inventory {
             None => {
                 let round = |mm: i32| (mm as f32 / 10.0).round() as i32 * 10;
                 let at = Point::new(round(point.x), round(point.y), round(point.z));
-                let part = if is_basin(class) { Part::Basin } else { Part::Whole };
+                let part = if is_basin(class) { NamedPart::Basin } else { NamedPart::Whole };
                 self.add(Name { class, at, part }, Some(point));
             }
         }
@@ -201,7 +201,7 @@ impl Inventory {
 
     /// The number of the fixture of that class at that place.
     pub fn at(&self, class: Class, point: Point) -> Option<u16> {
-        let same = |found: &Found| {
+        let same = |found: &FoundFixture| {
             let kind = found.name.class == class || (is_basin(class) && is_basin(found.name.class));
             kind && found.pivot.distance(point) < SAME
         };
@@ -213,7 +213,7 @@ impl Recording {
     /// The agent's pose before each step.
     pub fn poses(&self) -> Vec<Pose> {
         let mut pose = self.setting.agent;
-        let step = |step: &super::recording::Step| {
+        let step = |step: &super::recording::RecordedStep| {
             let before = pose;
             match step.kind {
                 ActionType::MoveAhead => pose.cell = pose.cell.ahead(pose.heading),
@@ -229,7 +229,7 @@ impl Recording {
     }
 }
 
-impl Setting {
+impl RecordedStart {
     /// The number of the movable object of that name. Of several at one place, the one nearest to `precise`.
     pub fn object(&self, name: Name, precise: Option<Point>) -> Option<u16> {
         let wanted = precise.filter(|point| point.distance(name.at) <= ROUNDING).unwrap_or(name.at);

@@ -4,7 +4,7 @@ use crate::domain::Class;
 
 /// From where a height is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Height {
+pub enum MeasuredHeight {
     /// Above the fixture's pivot, in millimetres.
     Pivot(i32),
     /// Above the floor, in millimetres.
@@ -13,7 +13,7 @@ pub enum Height {
 
 /// How a fixture's body comes about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Build {
+pub enum BodyKind {
     /// From the floor to the surface: tables, counters, beds.
     Block,
     /// The top of a counter; what is below is not part of it.
@@ -38,29 +38,29 @@ pub struct Furniture {
     /// ALFRED's name of the class.
     pub class: &'static str,
     /// How its body comes about.
-    pub build: Build,
+    pub build: BodyKind,
     /// The heights of its surfaces.
-    pub supports: &'static [Height],
+    pub supports: &'static [MeasuredHeight],
     /// Width and depth of a surface.
     pub area: [i32; 2],
     /// Width, height, depth of the body.
     pub body: [i32; 3],
     /// The body's bottom.
-    pub bottom: Height,
+    pub bottom: MeasuredHeight,
     /// How far the body's middle lies behind the pivot.
     pub behind: i32,
 }
 
-use Build::{Block, Board, Seat, Shell, Slab, Thing, Toilet, Tub};
-use Height::{Floor, Pivot};
+use BodyKind::{Block, Board, Seat, Shell, Slab, Thing, Toilet, Tub};
+use MeasuredHeight::{Floor, Pivot};
 
 const fn row(
     class: &'static str,
-    build: Build,
-    supports: &'static [Height],
+    build: BodyKind,
+    supports: &'static [MeasuredHeight],
     area: [i32; 2],
     body: [i32; 3],
-    bottom: Height,
+    bottom: MeasuredHeight,
     behind: i32,
 ) -> Furniture {
     Furniture { class, build, supports, area, body, bottom, behind }
@@ -113,12 +113,12 @@ pub fn of(class: Class) -> &'static Furniture {
     TABLE.iter().find(|row| row.class == class.name()).unwrap_or(&UNKNOWN)
 }
 
-impl Height {
+impl MeasuredHeight {
     /// In the world's frame.
     pub fn above(self, pivot: i32, floor: i32) -> i32 {
         match self {
-            Height::Pivot(mm) => pivot + mm,
-            Height::Floor(mm) => floor + mm,
+            MeasuredHeight::Pivot(mm) => pivot + mm,
+            MeasuredHeight::Floor(mm) => floor + mm,
         }
     }
 }

@@ -8,24 +8,24 @@ use anyhow::{Context, bail};
 use rayon::prelude::*;
 
 use super::files::{SceneOnly, TrajData};
-use super::layout::Layout;
-use super::recording::{Recording, Setting};
+use super::layout::FloorPlanLayout;
+use super::recording::{RecordedStart, Recording};
 use super::tasks::{self, OFFICIAL};
 use super::{parents, scenes, trajectories};
-use crate::data::dataset::{Counts, Manifest, Skipped, Writer};
+use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter, Skipped};
 use crate::domain::{Scene, Trajectory};
 use crate::house::validate;
 
 /// What can be chosen about an import.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct ImportOptions {
     /// A folder with the authors' lists of the official task sets.
     pub eval_lists: Option<PathBuf>,
 }
 
 /// How far an import has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub enum ImportProgress {
     /// Files read, of how many.
     Reading(u64, u64),
     /// Scenes built, of how many.
@@ -45,14 +45,14 @@ pub struct SetBuilt {
 
 /// What an import came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Summary {
+pub struct ImportSummary {
     /// What was written.
-    pub manifest: Manifest,
+    pub manifest: DatasetManifest,
     /// The official task sets.
     pub sets: Vec<SetBuilt>,
 }
 
-struct Source {
+struct SourceFile {
     path: PathBuf,
     /// Relative to the checkout, for messages.
     shown: String,
@@ -62,7 +62,7 @@ struct Source {
 
 enum Parsed {
     Recording(Box<Recording>),
-    Setting(Setting),
+    RecordedStart(RecordedStart),
 }
 
 /// Imports the ALFRED checkout `source` into the dataset folder `out`.
@@ -73,16 +73,16 @@ enum Parsed {
 pub fn import(
     source: &Path,
     out: &Path,
-    options: &Options,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> anyhow::Result<Summary> {
+    options: &ImportOptions,
+    progress: &(dyn Fn(ImportProgress) + Sync),
+) -> anyhow::Result<ImportSummary> {
     let files = find(source)?;
     let mut entries = Vec::new();
     for set in OFFICIAL {
         let listed = options.eval_lists.as_deref().map(|folder| tasks::listed(set, folder)).transpose()?.flatten();
         entries.push(listed.unwrap_or_else(|| tasks::indexed(set)));
     }
-    let mut writer = Writer::new(out)?;
+    let mut writer = DatasetWriter::new(out)?;
     let (recordings, settings, mut skipped) = read(&files, progress);
     if recordings.is_empty() {
         let why = skipped.first().map(|skip| format!("; {}: {}", skip.file, skip.reason)).unwrap_or_default();
@@ -103,7 +103,7 @@ pub fn import(
     }
     for (number, trajectory) in found.iter().enumerate() {
         writer.trajectory(trajectory)?;
-        progress(Progress::Writing(number as u64 + 1, found.len() as u64));
+        progress(ImportProgress::Writing(number as u64 + 1, found.len() as u64));
     }
     let by_id: BTreeMap<&str, &Trajectory> = found.iter().map(|trajectory| (&*trajectory.id, trajectory)).collect();
     let by_name: BTreeMap<&str, &Scene> = plans.iter().map(|scene| (&*scene.name, scene)).collect();
@@ -116,10 +116,10 @@ pub fn import(
         sets.push(SetBuilt { name: set.name, tasks: tasks.map(|set| set.tasks.len()) });
     }
     let chain = tasks::indexed(OFFICIAL[1]);
-    let held_out = chain.iter().map(tasks::Entry::trajectory).filter(|id| by_id.contains_key(id));
+    let held_out = chain.iter().map(tasks::OfficialTask::trajectory).filter(|id| by_id.contains_key(id));
     let held_out: Vec<String> = held_out.map(str::to_owned).collect();
-    let manifest = Manifest {
-        format_version: Manifest::FORMAT,
+    let manifest = DatasetManifest {
+        format_version: DatasetManifest::FORMAT,
         source: "alfred".to_owned(),
         counts: counts(&found, &held_out),
         scenes: plans.len() as u64,
@@ -127,7 +127,7 @@ pub fn import(
         skipped,
     };
     writer.finish(&manifest)?;
-    Ok(Summary { manifest, sets })
+    Ok(ImportSummary { manifest, sets })
 }
 
 /// Order of splits in the dataset.
@@ -136,7 +136,7 @@ fn split_rank(split: &str) -> usize {
 }
 
 /// Every `traj_data.json` of the checkout.
-fn find(source: &Path) -> anyhow::Result<Vec<Source>> {
+fn find(source: &Path) -> anyhow::Result<Vec<SourceFile>> {
     let folders = ["data/json_2.1.0", "data/full_2.1.0", "data/json_feat_2.1.0"];
     let Some(data) = folders.iter().map(|folder| source.join(folder)).find(|folder| folder.is_dir()) else {
         bail!(
@@ -153,7 +153,7 @@ fn find(source: &Path) -> anyhow::Result<Vec<Source>> {
             if path.is_file() {
                 let shown = path.strip_prefix(source).unwrap_or(&path).display().to_string();
                 let id = folder.strip_prefix(&split).unwrap_or(&folder).to_string_lossy().replace('\\', "/");
-                files.push(Source { path, shown, split: name.clone(), id });
+                files.push(SourceFile { path, shown, split: name.clone(), id });
             } else if depth < 3 {
                 open.extend(folders_in(&folder)?.into_iter().map(|inner| (inner, depth + 1)));
             }
@@ -180,13 +180,16 @@ fn folders_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// Reads and checks all files, on all cores.
-fn read(files: &[Source], progress: &(dyn Fn(Progress) + Sync)) -> (Vec<Recording>, Vec<Setting>, Vec<Skipped>) {
+fn read(
+    files: &[SourceFile],
+    progress: &(dyn Fn(ImportProgress) + Sync),
+) -> (Vec<Recording>, Vec<RecordedStart>, Vec<Skipped>) {
     let done = AtomicU64::new(0);
     let parsed: Vec<Result<Parsed, Skipped>> = files
         .par_iter()
         .map(|file| {
             let parsed = parse(file).map_err(|reason| Skipped { file: file.shown.clone(), reason });
-            progress(Progress::Reading(done.fetch_add(1, Ordering::Relaxed) + 1, files.len() as u64));
+            progress(ImportProgress::Reading(done.fetch_add(1, Ordering::Relaxed) + 1, files.len() as u64));
             parsed
         })
         .collect();
@@ -194,19 +197,19 @@ fn read(files: &[Source], progress: &(dyn Fn(Progress) + Sync)) -> (Vec<Recordin
     for item in parsed {
         match item {
             Ok(Parsed::Recording(recording)) => recordings.push(*recording),
-            Ok(Parsed::Setting(setting)) => settings.push(setting),
+            Ok(Parsed::RecordedStart(setting)) => settings.push(setting),
             Err(skip) => skipped.push(skip),
         }
     }
     (recordings, settings, skipped)
 }
 
-fn parse(file: &Source) -> Result<Parsed, String> {
+fn parse(file: &SourceFile) -> Result<Parsed, String> {
     let text = std::fs::read(&file.path).map_err(|error| error.to_string())?;
     // The test splits publish no plan: further states of their scenes.
     if file.split.starts_with("tests") {
         let data: SceneOnly = read_fields(&text)?;
-        return Ok(Parsed::Setting(Setting::new(&data.scene)?));
+        return Ok(Parsed::RecordedStart(RecordedStart::new(&data.scene)?));
     }
     parse_recording(&text, &file.id, &file.split).map(|recording| Parsed::Recording(Box::new(recording)))
 }
@@ -235,10 +238,10 @@ type BuiltScene = (Option<Scene>, Vec<Trajectory>, Vec<Skipped>);
 fn build_all(
     source: &Path,
     recordings: &[Recording],
-    settings: &[Setting],
-    progress: &(dyn Fn(Progress) + Sync),
+    settings: &[RecordedStart],
+    progress: &(dyn Fn(ImportProgress) + Sync),
 ) -> Vec<BuiltScene> {
-    let mut plans: BTreeMap<&str, (Vec<&Recording>, Vec<&Setting>)> = BTreeMap::new();
+    let mut plans: BTreeMap<&str, (Vec<&Recording>, Vec<&RecordedStart>)> = BTreeMap::new();
     for recording in recordings {
         let plan = plans.entry(&recording.setting.floor_plan).or_default();
         plan.0.push(recording);
@@ -255,17 +258,17 @@ fn build_all(
         .par_iter()
         .map(|(name, (recordings, settings))| {
             let built = build_one(&folder, name, recordings, settings);
-            progress(Progress::Building(done.fetch_add(1, Ordering::Relaxed) + 1, total));
+            progress(ImportProgress::Building(done.fetch_add(1, Ordering::Relaxed) + 1, total));
             built
         })
         .collect()
 }
 
-fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&Setting]) -> BuiltScene {
+fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&RecordedStart]) -> BuiltScene {
     let mut skipped = Vec::new();
-    let layout = Layout::read(folder, name).unwrap_or_else(|error| {
+    let layout = FloorPlanLayout::read(folder, name).unwrap_or_else(|error| {
         skipped.push(Skipped { file: format!("gen/layouts/{name}"), reason: format!("{error:#}") });
-        Layout::default()
+        FloorPlanLayout::default()
     });
     let skip = |recording: &&Recording, reason: String| Skipped {
         file: format!("data/json_2.1.0/{}/{}/traj_data.json", recording.split, recording.id),
@@ -345,10 +348,10 @@ mod tests {
         folder
     }
 
-    fn import_of(files: &[(&str, String)]) -> (Summary, tempfile::TempDir) {
+    fn import_of(files: &[(&str, String)]) -> (ImportSummary, tempfile::TempDir) {
         let source = checkout(files);
         let out = tempfile::tempdir().unwrap();
-        (import(source.path(), out.path(), &Options::default(), &|_| {}).unwrap(), out)
+        (import(source.path(), out.path(), &ImportOptions::default(), &|_| {}).unwrap(), out)
     }
 
     #[test]
@@ -422,7 +425,8 @@ mod tests {
     fn what_is_no_checkout_or_holds_nothing_of_use_is_one_clear_error_and_writes_no_dataset() {
         let out = tempfile::tempdir().unwrap();
         let empty = tempfile::tempdir().unwrap();
-        let run = |source: &Path| import(source, out.path(), &Options::default(), &|_| {}).unwrap_err().to_string();
+        let run =
+            |source: &Path| import(source, out.path(), &ImportOptions::default(), &|_| {}).unwrap_err().to_string();
         assert!(run(empty.path()).contains("json_2.1.0"));
         let broken = checkout(&[("trial_1", "{".to_owned())]);
         assert!(run(broken.path()).contains("traj_data.json"));

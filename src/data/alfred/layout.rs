@@ -11,20 +11,20 @@ use crate::domain::{Cell, Heading, Point};
 
 /// The layout of one floor plan; empty where no file says anything.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Layout {
+pub struct FloorPlanLayout {
     /// Cells that the published list holds. The expert also walked on others.
     pub cells: Vec<Cell>,
     /// Fixtures with the vetted pose from which each is best seen.
     pub stands: BTreeMap<Name, Pose>,
 }
 
-impl Layout {
+impl FloorPlanLayout {
     /// Reads `<name>-layout.npy` and `<name>-openable.json` in `folder`; either may be absent.
     ///
     /// # Errors
     /// When a file is there but cannot be read.
-    pub fn read(folder: &Path, name: &str) -> anyhow::Result<Layout> {
-        let mut layout = Layout::default();
+    pub fn read(folder: &Path, name: &str) -> anyhow::Result<FloorPlanLayout> {
+        let mut layout = FloorPlanLayout::default();
         let cells = folder.join(format!("{name}-layout.npy"));
         if cells.is_file() {
             layout.cells = read_cells(&cells).with_context(|| cells.display().to_string())?;
@@ -108,9 +108,9 @@ mod tests {
     #[test]
     fn an_absent_layout_is_empty_and_a_broken_one_is_an_error_that_names_the_file() {
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(Layout::read(folder.path(), "FloorPlan1").unwrap(), Layout::default());
+        assert_eq!(FloorPlanLayout::read(folder.path(), "FloorPlan1").unwrap(), FloorPlanLayout::default());
         std::fs::write(folder.path().join("FloorPlan1-layout.npy"), b"not an array").unwrap();
-        let error = Layout::read(folder.path(), "FloorPlan1").unwrap_err();
+        let error = FloorPlanLayout::read(folder.path(), "FloorPlan1").unwrap_err();
         assert!(format!("{error:#}").contains("FloorPlan1-layout.npy"));
     }
 }

@@ -2,15 +2,15 @@
 
 /// How the steps of a plan are renumbered.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Merge {
+pub struct GotoMerge {
     gotos: Vec<usize>,
 }
 
-impl Merge {
+impl GotoMerge {
     /// From the numbers of the plan's GotoLocation steps.
-    pub fn new(mut gotos: Vec<usize>) -> Merge {
+    pub fn new(mut gotos: Vec<usize>) -> GotoMerge {
         gotos.sort_unstable();
-        Merge { gotos }
+        GotoMerge { gotos }
     }
 
     /// Whether the step of that number is a GotoLocation.
@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn a_walk_belongs_to_the_skill_that_follows_it() {
-        let merge = Merge::new(vec![0, 2, 5]);
+        let merge = GotoMerge::new(vec![0, 2, 5]);
         let skills: Vec<_> = (0..7).map(|step| merge.skill(step)).collect();
         assert_eq!(skills, [0, 0, 1, 1, 2, 3, 3]);
     }
@@ -45,6 +45,6 @@ mod tests {
     #[test]
     fn only_the_sentences_of_skills_are_kept() {
         let steps: Vec<_> = ["walk", "take it", "walk on", "put it down"].map(String::from).into();
-        assert_eq!(Merge::new(vec![0, 2]).sentences(&steps), ["take it", "put it down"]);
+        assert_eq!(GotoMerge::new(vec![0, 2]).sentences(&steps), ["take it", "put it down"]);
     }
 }

@@ -25,7 +25,7 @@ const STIFF: f32 = 0.04;
 const THINNEST: i32 = 4;
 
 /// A view of an object that nothing has moved yet.
-struct Sight<'a> {
+struct ObjectView<'a> {
     placed: &'a Placed,
     pose: Pose,
     bounds: [u16; 4],
@@ -33,7 +33,7 @@ struct Sight<'a> {
 
 /// The meshes of a scene that recordings show often enough, by name.
 pub fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
-    let mut sights: BTreeMap<&str, Vec<Sight<'_>>> = BTreeMap::new();
+    let mut sights: BTreeMap<&str, Vec<ObjectView<'_>>> = BTreeMap::new();
     for recording in recordings {
         for sight in first_touches(recording) {
             sights.entry(&sight.placed.mesh).or_default().push(sight);
@@ -43,8 +43,8 @@ pub fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
     sights.into_iter().map(|(name, sights)| fit(name, &sights, agent_y)).collect()
 }
 
-/// Pickups and slices of objects that were not touched before. A drawer's contents slide with it: they are left out.
-fn first_touches(recording: &Recording) -> Vec<Sight<'_>> {
+/// Pickups and slicings of objects that were not touched before. A drawer's contents slide with it: they are left out.
+fn first_touches(recording: &Recording) -> Vec<ObjectView<'_>> {
     let mut touched = vec![false; recording.setting.objects.len()];
     let mut sights = Vec::new();
     let mut drawer = false;
@@ -57,7 +57,7 @@ fn first_touches(recording: &Recording) -> Vec<Sight<'_>> {
                 let Some(number) = recording.object(name.whole(), None).map(usize::from) else { continue };
                 let first = !std::mem::replace(&mut touched[number], true);
                 if let Some(bounds) = step.bounds.filter(|_| first && !drawer && name.whole() == name) {
-                    sights.push(Sight { placed: &recording.setting.objects[number], pose, bounds });
+                    sights.push(ObjectView { placed: &recording.setting.objects[number], pose, bounds });
                 }
             }
             _ => {}
@@ -67,15 +67,15 @@ fn first_touches(recording: &Recording) -> Vec<Sight<'_>> {
 }
 
 /// The six lengths of a shape: width, height, depth, and the offsets of its middle.
-type Lengths = [i32; 6];
+type MeshLengths = [i32; 6];
 
-fn fit(name: &str, sights: &[Sight<'_>], agent_y: i32) -> Mesh {
+fn fit(name: &str, sights: &[ObjectView<'_>], agent_y: i32) -> Mesh {
     let class = sights.first().map_or(Class::NONE, |sight| sight.placed.class);
     let info = class.info();
-    let first: Lengths = [info.size[0], info.size[1], info.size[2], info.offset[0], info.offset[1], info.offset[2]];
+    let first: MeshLengths = [info.size[0], info.size[1], info.size[2], info.offset[0], info.offset[1], info.offset[2]];
     // Evenly over all recordings: the first ones may all be of one task.
     let every = sights.len().div_ceil(MOST).max(1);
-    let sights: Vec<&Sight<'_>> = sights.iter().step_by(every).collect();
+    let sights: Vec<&ObjectView<'_>> = sights.iter().step_by(every).collect();
     let mut trial = Trial::new(name, class, agent_y);
     let mut best = first;
     let mut least = trial.cost(best, first, &sights);
@@ -129,7 +129,7 @@ impl Trial {
         Trial { scene, world }
     }
 
-    fn cost(&mut self, lengths: Lengths, first: Lengths, sights: &[&Sight<'_>]) -> f32 {
+    fn cost(&mut self, lengths: MeshLengths, first: MeshLengths, sights: &[&ObjectView<'_>]) -> f32 {
         let [width, height, depth, right, up, ahead] = lengths;
         let wild = (0..3).any(|side| lengths[side] < THINNEST || lengths[side] > 4 * first[side].max(20));
         if wild {
@@ -162,11 +162,11 @@ mod tests {
         trial.scene.meshes[0].size[1] *= 2;
         trial.scene.meshes[0].offset[1] *= 2;
         (trial.world.objects[0].at, trial.world.objects[0].turn) = (placed.at, placed.turn);
-        let sights: Vec<Sight<'_>> = [0, -1, 1]
+        let sights: Vec<ObjectView<'_>> = [0, -1, 1]
             .map(|x| {
                 let pose = Pose { cell: Cell::new(x, 0), heading: Heading::North, horizon: 45 };
                 let bounds = projected_bounds(&trial.scene, &trial.world, pose, Instance::Object(0)).unwrap();
-                Sight { placed: &placed, pose, bounds: bounds.map(|edge| edge.round() as u16) }
+                ObjectView { placed: &placed, pose, bounds: bounds.map(|edge| edge.round() as u16) }
             })
             .into();
         let mesh = fit("Bottle_1", &sights, 900);

@@ -20,4 +20,4 @@ pub mod tasks;
 pub mod trajectories;
 pub mod walls;
 
-pub use import::{Options, Progress, SetBuilt, Summary, import};
+pub use import::{ImportOptions, ImportProgress, ImportSummary, SetBuilt, import};

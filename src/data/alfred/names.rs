@@ -10,12 +10,12 @@ pub struct Name {
     /// Where the thing stood at first; for a basin, where its sink or bathtub stands.
     pub at: Point,
     /// Which part of it is meant.
-    pub part: Part,
+    pub part: NamedPart,
 }
 
 /// Which part of a named thing is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Part {
+pub enum NamedPart {
     /// The thing itself.
     #[default]
     Whole,
@@ -43,11 +43,11 @@ impl Name {
         };
         let at = Point::from_metres(coordinate()?, coordinate()?, coordinate()?);
         let part = match fields.next() {
-            None => Part::Whole,
-            Some("SinkBasin" | "BathtubBasin") => Part::Basin,
+            None => NamedPart::Whole,
+            Some("SinkBasin" | "BathtubBasin") => NamedPart::Basin,
             Some(part) => {
                 let number = part.rsplit_once("Sliced_").and_then(|(_, number)| number.parse::<u8>().ok());
-                Part::Slice(number.ok_or_else(|| format!("{text:?} names no part that is known"))?)
+                NamedPart::Slice(number.ok_or_else(|| format!("{text:?} names no part that is known"))?)
             }
         };
         Ok(Name { class, at, part })
@@ -56,8 +56,8 @@ impl Name {
     /// The thing itself, where a slice of it is named.
     pub fn whole(self) -> Name {
         match self.part {
-            Part::Slice(_) => Name { part: Part::Whole, ..self },
-            Part::Whole | Part::Basin => self,
+            NamedPart::Slice(_) => Name { part: NamedPart::Whole, ..self },
+            NamedPart::Whole | NamedPart::Basin => self,
         }
     }
 
@@ -66,9 +66,9 @@ impl Name {
         let metres = |mm: i32| format!("{:+06.2}", f64::from(mm) / 1000.0);
         let Point { x, y, z } = self.at;
         let part = match self.part {
-            Part::Whole => String::new(),
-            Part::Basin => format!("|{}Basin", self.class.name()),
-            Part::Slice(number) => format!("|{}Sliced_{number}", self.class.name()),
+            NamedPart::Whole => String::new(),
+            NamedPart::Basin => format!("|{}Basin", self.class.name()),
+            NamedPart::Slice(number) => format!("|{}Sliced_{number}", self.class.name()),
         };
         format!("{}|{}|{}|{}{part}", self.class.name(), metres(x), metres(y), metres(z))
     }
@@ -90,7 +90,7 @@ mod tests {
             assert_eq!(Name::parse(text).unwrap().text(), text);
         }
         let slice = Name::parse("Apple|-00.30|+00.14|+00.53|AppleSliced_12").unwrap();
-        assert_eq!(slice.part, Part::Slice(12));
+        assert_eq!(slice.part, NamedPart::Slice(12));
         assert_eq!(slice.whole().text(), "Apple|-00.30|+00.14|+00.53");
     }
 

@@ -1,8 +1,8 @@
 //! What holds each object at the start: as recorded, else as its neighbours, else as the furniture under it.
 
 use super::fixtures::Inventory;
-use super::recording::{Recording, Setting};
-use super::support::{Holder, Standing, foot, nearest};
+use super::recording::{RecordedStart, Recording};
+use super::support::{Holder, StandingObject, foot, nearest};
 use crate::domain::world::{Instance, Parent};
 use crate::domain::{Fixture, Point};
 
@@ -17,7 +17,7 @@ const RIM: i32 = 60;
 pub fn parents(
     recording: &Recording,
     inventory: &Inventory,
-    recorded: &[Standing],
+    recorded: &[StandingObject],
     fixtures: &[Fixture],
 ) -> Vec<Parent> {
     let setting = &recording.setting;
@@ -43,7 +43,7 @@ pub fn parents(
 }
 
 /// The movable receptacle that an object lies in, by distance, height, and what such receptacles are used for.
-fn movable_around(setting: &Setting, number: usize) -> Option<u16> {
+fn movable_around(setting: &RecordedStart, number: usize) -> Option<u16> {
     let content = &setting.objects[number];
     let under = foot(content.class, content.at);
     let holders = setting.objects.iter().enumerate().filter(|(other, holder)| {

@@ -2,7 +2,7 @@
 
 use super::files::{Coordinate, HighAction, LowAction, SceneData, TrajData};
 use super::layout::{cell_at, heading_at};
-use super::merge::Merge;
+use super::merge::GotoMerge;
 use super::names::{FARTHEST, Name, class_named};
 use crate::domain::place::Pose;
 use crate::domain::skill::GoalKind;
@@ -11,7 +11,7 @@ use crate::domain::{ActionType, Class, Goal, Point, Room, SkillKind};
 
 /// A state of a scene: what every file holds, test splits included.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
+pub struct RecordedStart {
     /// `FloorPlan7`.
     pub floor_plan: String,
     /// The kind of room.
@@ -41,7 +41,7 @@ pub struct Placed {
 
 /// One action of the expert.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct RecordedStep {
     /// What was done.
     pub kind: ActionType,
     /// To what; the receptacle, for a Put.
@@ -79,13 +79,13 @@ pub struct Recording {
     /// `train`, ...
     pub split: String,
     /// Where it starts.
-    pub setting: Setting,
+    pub setting: RecordedStart,
     /// ALFRED's goal.
     pub goal: Goal,
     /// The merged skills.
     pub skills: Vec<Planned>,
     /// The actions, skill after skill.
-    pub steps: Vec<Step>,
+    pub steps: Vec<RecordedStep>,
     /// What people wrote, merged.
     pub annotations: Vec<Annotation>,
 }
@@ -102,12 +102,12 @@ impl Recording {
             return Err(format!("high_idx: {number} is out of range"));
         }
         let gotos = data.plan.high_pddl.iter().filter(|high| high.discrete_action.action == "GotoLocation");
-        let merge = Merge::new(gotos.map(|high| high.high_idx).collect());
+        let merge = GotoMerge::new(gotos.map(|high| high.high_idx).collect());
         let skills = skills(&data.plan.high_pddl, &merge)?;
         let mut steps = Vec::with_capacity(data.plan.low_actions.len());
         for (index, low) in data.plan.low_actions.iter().enumerate() {
             let step = step(low, &merge).map_err(|error| format!("plan.low_actions[{index}].{error}"))?;
-            let last = steps.last().map_or(0, |step: &Step| step.skill);
+            let last = steps.last().map_or(0, |step: &RecordedStep| step.skill);
             if step.skill < last || step.skill >= skills.len() {
                 return Err(format!("plan.low_actions[{index}].high_idx: {} fits no skill in order", low.high_idx));
             }
@@ -121,7 +121,7 @@ impl Recording {
         Ok(Recording {
             id,
             split,
-            setting: Setting::new(&data.scene)?,
+            setting: RecordedStart::new(&data.scene)?,
             goal: goal(&data)?,
             skills,
             steps,
@@ -130,12 +130,12 @@ impl Recording {
     }
 }
 
-impl Setting {
+impl RecordedStart {
     /// Checks a file's scene.
     ///
     /// # Errors
     /// The field that makes no sense, and why.
-    pub fn new(scene: &SceneData) -> Result<Setting, String> {
+    pub fn new(scene: &SceneData) -> Result<RecordedStart, String> {
         let room = Room::of_floor_plan(scene.scene_num)
             .filter(|_| scene.floor_plan == format!("FloorPlan{}", scene.scene_num))
             .ok_or_else(|| format!("scene.floor_plan: {:?} is no floor plan of ALFRED", scene.floor_plan))?;
@@ -167,7 +167,7 @@ impl Setting {
         if objects.len() > 10_000 {
             return Err(format!("scene.object_poses: {} objects are too many", objects.len()));
         }
-        Ok(Setting {
+        Ok(RecordedStart {
             floor_plan: scene.floor_plan.clone(),
             room,
             agent_y,
@@ -190,7 +190,7 @@ fn horizon(degrees: f64) -> Option<i16> {
 }
 
 /// The planned skills in order, GotoLocation and NoOp apart.
-fn skills(plan: &[HighAction], merge: &Merge) -> Result<Vec<Planned>, String> {
+fn skills(plan: &[HighAction], merge: &GotoMerge) -> Result<Vec<Planned>, String> {
     let mut skills = Vec::new();
     let mut walked_to = None;
     for (index, high) in plan.iter().enumerate() {
@@ -253,7 +253,7 @@ fn coordinate((kind, [x, _, z, _, y, _]): &Coordinate) -> Option<(Class, Point)>
     Some((class_named(kind)?, Point::new(mm(*x)?, mm(*y)?, mm(*z)?)))
 }
 
-fn step(low: &LowAction, merge: &Merge) -> Result<Step, String> {
+fn step(low: &LowAction, merge: &GotoMerge) -> Result<RecordedStep, String> {
     let kind = match low.api_action.action.as_str() {
         "MoveAhead" => ActionType::MoveAhead,
         "RotateLeft" => ActionType::RotateLeft,
@@ -279,7 +279,7 @@ fn step(low: &LowAction, merge: &Merge) -> Result<Step, String> {
         None => return Err(format!("api_action: missing {field}")),
     };
     let bounds = low.discrete_action.args.bbox.filter(|_| kind.is_interaction()).and_then(edges);
-    Ok(Step { kind, target, skill: merge.skill(low.high_idx), bounds })
+    Ok(RecordedStep { kind, target, skill: merge.skill(low.high_idx), bounds })
 }
 
 /// Pixel edges of a recorded box: its x are inclusive, its y are one too large.

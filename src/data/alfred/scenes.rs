@@ -2,10 +2,10 @@
 
 use super::cover::overlap;
 use super::fixtures::Inventory;
-use super::furniture::{self, Build};
-use super::layout::Layout;
-use super::recording::{Recording, Setting};
-use super::support::{self, Standing};
+use super::furniture::{self, BodyKind};
+use super::layout::FloorPlanLayout;
+use super::recording::{RecordedStart, Recording};
+use super::support::{self, StandingObject};
 use super::{bodies, facing, meshes, walls};
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Cell, Fixture, Room, Scene};
@@ -18,7 +18,7 @@ pub struct Built {
     /// Names of its fixtures.
     pub inventory: Inventory,
     /// Points that recordings assign to fixtures.
-    pub recorded: Vec<Standing>,
+    pub recorded: Vec<StandingObject>,
 }
 
 /// Builds one floor plan from its layout, its recordings, and further states of it.
@@ -28,9 +28,9 @@ pub struct Built {
 pub fn build(
     name: &str,
     room: Room,
-    layout: &Layout,
+    layout: &FloorPlanLayout,
     recordings: &[&Recording],
-    settings: &[&Setting],
+    settings: &[&RecordedStart],
 ) -> Result<Built, String> {
     let inventory = Inventory::gather(layout, recordings);
     let cells = cells(layout, recordings, settings);
@@ -46,8 +46,8 @@ pub fn build(
         let found = &inventory.found[number];
         let facing = facing::facing(found, &cells);
         let blocked = match furniture::of(found.name.class).build {
-            Build::Block | Build::Seat => walked.clone(),
-            Build::Slab => [&walked[..], basins].concat(),
+            BodyKind::Block | BodyKind::Seat => walked.clone(),
+            BodyKind::Slab => [&walked[..], basins].concat(),
             _ => Vec::new(),
         };
         let surfaces = support::surfaces(&inventory, number as u16, &assigned, &blocked, facing, floor);
@@ -68,7 +68,7 @@ pub fn build(
     let basins = fixtures.iter().filter(|fixture| matches!(fixture.class.name(), "Sink" | "Bathtub"));
     let basins: Vec<Rect> = basins.flat_map(|basin| &basin.body).map(Cuboid::footprint).collect();
     for (number, made) in fixtures.iter_mut().enumerate() {
-        let slab = furniture::of(made.class).build == Build::Slab;
+        let slab = furniture::of(made.class).build == BodyKind::Slab;
         let shared = |basin: &Rect| made.body.iter().any(|part| overlap(&part.footprint(), basin));
         if slab && basins.iter().any(shared) {
             *made = fixture(number, &basins);
@@ -90,7 +90,7 @@ pub fn build(
 }
 
 /// The published cells and all that anybody stood on.
-fn cells(layout: &Layout, recordings: &[&Recording], settings: &[&Setting]) -> Vec<Cell> {
+fn cells(layout: &FloorPlanLayout, recordings: &[&Recording], settings: &[&RecordedStart]) -> Vec<Cell> {
     let mut cells = layout.cells.clone();
     cells.extend(settings.iter().map(|setting| setting.agent.cell));
     for recording in recordings {

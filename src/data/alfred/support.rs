@@ -3,7 +3,7 @@
 use super::cover::cover;
 use super::fixtures::Inventory;
 use super::furniture;
-use super::recording::{Recording, Setting};
+use super::recording::{RecordedStart, Recording};
 use crate::domain::place::Rect;
 use crate::domain::scene::Surface;
 use crate::domain::{ActionType, Cell, Class, Heading, Point, SkillKind};
@@ -23,7 +23,7 @@ const STOREY: i32 = 120;
 
 /// A point on which something is known to stand, and the fixture that holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standing {
+pub struct StandingObject {
     /// The support under the object.
     pub at: Point,
     /// What stands there.
@@ -63,7 +63,8 @@ impl Recording {
                 && !moved[usize::from(object)]
                 && let Some((class, place)) = skill.receptacle_at
             {
-                let here = |step: &&super::recording::Step| step.skill == number && step.kind == ActionType::Open;
+                let here =
+                    |step: &&super::recording::RecordedStep| step.skill == number && step.kind == ActionType::Open;
                 let opens = self.steps.iter().filter(here).filter_map(|step| inventory.number(step.target?));
                 opened.extend(opens);
                 let fixture = inventory.at(class, place).map(|fixture| match class.info().openable {
@@ -105,7 +106,7 @@ impl Recording {
 }
 
 /// The points that the recordings themselves assign to fixtures.
-pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standing> {
+pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<StandingObject> {
     let mut standings = Vec::new();
     for recording in recordings {
         for (object, holder) in recording.recorded_holders(inventory) {
@@ -121,7 +122,7 @@ pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standin
                     _ => LIMIT,
                 };
                 let at = foot(placed.class, placed.at);
-                standings.push(Standing { at, class: placed.class, fixture, limit });
+                standings.push(StandingObject { at, class: placed.class, fixture, limit });
             }
         }
     }
@@ -129,8 +130,8 @@ pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standin
 }
 
 /// The fixture of the nearest known point, if one is near enough.
-pub fn nearest(known: &[Standing], at: Point) -> Option<u16> {
-    let distance = |standing: &Standing| {
+pub fn nearest(known: &[StandingObject], at: Point) -> Option<u16> {
+    let distance = |standing: &StandingObject| {
         let floor = standing.at.floor_distance(at);
         let height = (standing.at.y - at.y) as f32 * HEIGHT_WEIGHT;
         (floor * floor + height * height).sqrt()
@@ -140,12 +141,12 @@ pub fn nearest(known: &[Standing], at: Point) -> Option<u16> {
 }
 
 /// Every point at which anything stood, assigned to fixtures: as recorded, else as its nearest recorded neighbour.
-pub fn assigned(settings: &[&Setting], recorded: &[Standing]) -> Vec<Standing> {
+pub fn assigned(settings: &[&RecordedStart], recorded: &[StandingObject]) -> Vec<StandingObject> {
     let mut all = recorded.to_vec();
     for object in settings.iter().flat_map(|setting| &setting.objects) {
         let at = foot(object.class, object.at);
         if let Some(fixture) = nearest(recorded, at) {
-            all.push(Standing { at, class: object.class, fixture, limit: 0.0 });
+            all.push(StandingObject { at, class: object.class, fixture, limit: 0.0 });
         }
     }
     all
@@ -156,7 +157,7 @@ pub fn assigned(settings: &[&Setting], recorded: &[Standing]) -> Vec<Standing> {
 pub fn surfaces(
     inventory: &Inventory,
     number: u16,
-    assigned: &[Standing],
+    assigned: &[StandingObject],
     blocked: &[Rect],
     facing: Heading,
     floor: i32,
@@ -169,8 +170,10 @@ pub fn surfaces(
     }
     if mine.is_empty() {
         let area = ahead_of(found.pivot, facing, row.area, -row.behind);
-        let level =
-            |height: &furniture::Height| Surface { height: height.above(found.pivot.y, floor), areas: vec![area] };
+        let level = |height: &furniture::MeasuredHeight| Surface {
+            height: height.above(found.pivot.y, floor),
+            areas: vec![area],
+        };
         return row.supports.iter().map(level).collect();
     }
     let outline = extent(&mine);
@@ -254,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_nearest_known_point_decides_unless_it_is_too_far_above_or_below() {
-        let known = |at, fixture| Standing { at, class: Class::default(), fixture, limit: LIMIT };
+        let known = |at, fixture| StandingObject { at, class: Class::default(), fixture, limit: LIMIT };
         let known = [known(Point::new(0, 900, 0), 1), known(Point::new(300, 900, 0), 2)];
         assert_eq!(nearest(&known, Point::new(200, 905, 0)), Some(2));
         assert_eq!(nearest(&known, Point::new(0, 700, 0)), None);

@@ -33,7 +33,7 @@ pub const OFFICIAL: [Official; 3] = [
 
 /// Which text tells the agent what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Wording {
+enum TaskText {
     /// The annotator's sentence for the whole trajectory.
     Goal,
     /// The annotator's sentences for the skills.
@@ -46,15 +46,15 @@ enum Wording {
 
 /// One task of an official set.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct OfficialTask {
     trajectory: String,
     annotator: usize,
     first: usize,
     skills: usize,
-    wording: Wording,
+    wording: TaskText,
 }
 
-impl Entry {
+impl OfficialTask {
     /// The trajectory's id.
     pub fn trajectory(&self) -> &str {
         &self.trajectory
@@ -62,19 +62,19 @@ impl Entry {
 }
 
 /// The entries of a set by the index that the program carries.
-pub fn indexed(set: Official) -> Vec<Entry> {
+pub fn indexed(set: Official) -> Vec<OfficialTask> {
     let index = include_str!("../../../assets/eval_index.tsv");
     let rows = index.lines().map(|line| line.split('\t').collect::<Vec<_>>());
     let entry = |row: Vec<&str>| match row[..] {
-        [name, _, trajectory, annotator, first, skills, wording] if name == set.name => Some(Entry {
+        [name, _, trajectory, annotator, first, skills, wording] if name == set.name => Some(OfficialTask {
             trajectory: trajectory.to_owned(),
             annotator: annotator.parse().ok()?,
             first: first.parse().ok()?,
             skills: skills.parse().ok()?,
             wording: match wording {
-                "task_desc" => Wording::Goal,
-                "high_desc" => Wording::Steps,
-                _ => Wording::Elsewhere,
+                "task_desc" => TaskText::Goal,
+                "high_desc" => TaskText::Steps,
+                _ => TaskText::Elsewhere,
             },
         }),
         _ => None,
@@ -95,7 +95,7 @@ struct Listed {
 ///
 /// # Errors
 /// When the file is there but malformed.
-pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Entry>>> {
+pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<OfficialTask>>> {
     let path = folder.join(set.list);
     if !path.is_file() {
         return Ok(None);
@@ -110,12 +110,12 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Entry>>
         let first = first.filter(|_| adjacent).with_context(|| {
             format!("{}: item {number}: subgoal_ids: {:?} is no span", path.display(), item.subgoal_ids)
         })?;
-        Ok(Entry {
+        Ok(OfficialTask {
             trajectory: item.task,
             annotator: item.repeat_id,
             first,
             skills: item.subgoal_ids.len(),
-            wording: Wording::Given(item.annotation.trim().to_owned()),
+            wording: TaskText::Given(item.annotation.trim().to_owned()),
         })
     };
     items.into_iter().enumerate().map(entry).collect::<anyhow::Result<Vec<_>>>().map(Some)
@@ -127,11 +127,11 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Entry>>
 /// Names the first entry that cannot be built.
 pub fn build<'a>(
     set: Official,
-    entries: &[Entry],
+    entries: &[OfficialTask],
     trajectories: &BTreeMap<&str, &'a Trajectory>,
     scenes: &BTreeMap<&str, &'a Scene>,
 ) -> Result<TaskSet, String> {
-    let task = |(number, entry): (usize, &Entry)| {
+    let task = |(number, entry): (usize, &OfficialTask)| {
         let wrong = |what: &str| format!("task {number} ({}): {what}", entry.trajectory);
         let trajectory =
             trajectories.get(entry.trajectory.as_str()).ok_or_else(|| wrong("its trajectory is absent"))?;
@@ -152,7 +152,7 @@ pub fn build<'a>(
 }
 
 /// An official task: a span with the words that the index names.
-fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Result<Task, String> {
+fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &OfficialTask) -> Result<Task, String> {
     let span = entry.first..entry.first.saturating_add(entry.skills);
     let task = span_task(id, trajectory, scene, span.clone())?;
     let annotation = trajectory.annotations.get(entry.annotator);
@@ -160,10 +160,10 @@ fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &Entry) -> Res
     let sentences = annotation.steps.get(span).map(<[String]>::to_vec).unwrap_or_default();
     let joined = || sentences.join(" ");
     let (instruction, reworded) = match &entry.wording {
-        Wording::Goal => (annotation.goal.clone(), false),
-        Wording::Steps => (joined(), false),
-        Wording::Elsewhere => (joined(), true),
-        Wording::Given(text) => (text.clone(), false),
+        TaskText::Goal => (annotation.goal.clone(), false),
+        TaskText::Steps => (joined(), false),
+        TaskText::Elsewhere => (joined(), true),
+        TaskText::Given(text) => (text.clone(), false),
     };
     if instruction.is_empty() {
         return Err(format!("annotator {} has no sentence for it", entry.annotator));
@@ -262,7 +262,7 @@ mod tests {
     fn the_index_holds_the_three_sets_with_25_instructions_elsewhere() {
         let counts = OFFICIAL.map(|set| indexed(set).len());
         assert_eq!(counts, [100, 20, 10]);
-        let elsewhere = indexed(OFFICIAL[0]).iter().filter(|entry| entry.wording == Wording::Elsewhere).count();
+        let elsewhere = indexed(OFFICIAL[0]).iter().filter(|entry| entry.wording == TaskText::Elsewhere).count();
         assert_eq!(elsewhere, 25);
     }
 

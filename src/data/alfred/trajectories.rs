@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
 use super::fixtures::Inventory;
-use super::names::{Name, Part};
-use super::recording::{Planned, Recording, Step};
+use super::names::{Name, NamedPart};
+use super::recording::{Planned, RecordedStep, Recording};
 use crate::domain::skill::{Literal, Original};
 use crate::domain::task::SceneRef;
 use crate::domain::world::{Instance, Object, Parent, World};
@@ -51,7 +51,7 @@ pub fn resolve(
     let mut skills = Vec::with_capacity(recording.skills.len());
     for (number, planned) in recording.skills.iter().enumerate() {
         let following = recording.skills.get(number + 1);
-        let steps: Vec<Step> = recording.steps.iter().copied().filter(|step| step.skill == number).collect();
+        let steps: Vec<RecordedStep> = recording.steps.iter().copied().filter(|step| step.skill == number).collect();
         let skill = subtask(recording, inventory, &start, planned, following, &steps, &mut roles);
         skills.push(skill.ok_or_else(|| format!("plan: skill {number} names something that does not exist"))?);
     }
@@ -98,8 +98,8 @@ fn scene_slices(start: &World, whole: u16) -> u8 {
 /// What a name means at the start: an instance, or a slice that will be cut from one.
 fn original(recording: &Recording, inventory: &Inventory, name: Name) -> Option<Original> {
     let slice = match name.part {
-        Part::Slice(number) => Some(number),
-        Part::Whole | Part::Basin => None,
+        NamedPart::Slice(number) => Some(number),
+        NamedPart::Whole | NamedPart::Basin => None,
     };
     let fixture = inventory.number(name).map(Instance::Fixture);
     let instance = fixture.or_else(|| recording.object(name.whole(), None).map(Instance::Object))?;
@@ -131,7 +131,7 @@ fn subtask(
     start: &World,
     planned: &Planned,
     following: Option<&Planned>,
-    steps: &[Step],
+    steps: &[RecordedStep],
     roles: &mut Vec<Role>,
 ) -> Option<Subtask> {
     let find = |name: Name| original(recording, inventory, name);

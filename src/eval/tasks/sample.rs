@@ -267,7 +267,7 @@ fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
 mod tests {
     use super::*;
     use crate::data::dataset;
-    use crate::data::dataset::Writer;
+    use crate::data::dataset::DatasetWriter;
     use crate::data::taskset;
     use crate::domain::skill::Original;
     use crate::domain::trajectory;
@@ -329,7 +329,7 @@ mod tests {
         let expert = |number| Original { instance: grader.binding(number).unwrap(), slice: None };
         let roles: Vec<Role> =
             (0..).zip(roles).map(|(number, role)| Role { expert: Some(expert(number)), ..role }).collect();
-        let mut writer = Writer::new(folder).unwrap();
+        let mut writer = DatasetWriter::new(folder).unwrap();
         writer.scene(&scene).unwrap();
         let trajectory = Trajectory {
             start,

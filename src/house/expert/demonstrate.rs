@@ -1,6 +1,7 @@
 //! The expert left alone with a task, for whoever needs to know how it is done before an agent tries.
 
-use super::{Expert, NoWay};
+use super::Expert;
+use super::no_way::NoWay;
 use crate::domain::Action;
 use crate::house::grading::Grader;
 use crate::house::outcome::Outcome;

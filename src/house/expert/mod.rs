@@ -1,10 +1,10 @@
 //! The expert: shortest paths and interactions for any task in any scene, from any state.
 
 pub mod demonstrate;
+pub mod interaction_pose;
 pub mod no_way;
 pub mod paths;
 pub mod plan;
-pub mod stands;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -15,10 +15,10 @@ use super::session::House;
 use super::view;
 use crate::domain::{Action, ActionType, Pose, Scene, World};
 pub use demonstrate::{ExpertStep, Unfinished, demonstrate};
+use interaction_pose::{InteractionPose, PoseSearch, WELL_SEEN};
 use no_way::NoWay;
-use paths::{Floor, Paths, Turning};
+use paths::{Paths, Turning, WalkableCells};
 use plan::Intent;
-use stands::{Scout, Stand, WELL_SEEN};
 
 /// How far the expert goes out of its way to shut what stands open, in steps.
 const TIDY_STEPS: u32 = 3;
@@ -35,9 +35,9 @@ pub enum TurnTiming {
 
 /// Plans from the present state, keeps to the plan while the world goes as expected, and plans anew when it does not.
 pub struct Expert {
-    pace: TurnTiming,
-    scout: Scout,
-    scene: Option<(Arc<Scene>, Floor)>,
+    timing: TurnTiming,
+    poses: PoseSearch,
+    scene: Option<(Arc<Scene>, WalkableCells)>,
     plan: VecDeque<Action>,
     /// The world in which the next step of the plan is to be taken, and how far the task was.
     expected: Option<(World, usize)>,
@@ -45,9 +45,9 @@ pub struct Expert {
     last: Option<Action>,
 }
 
-/// What an expert is about to do, to come back to.
+/// What an expert is about to do, so that it can be restored.
 #[derive(Clone, Debug, Default)]
-pub struct Plan {
+pub struct ExpertState {
     steps: VecDeque<Action>,
     expected: Option<(World, usize)>,
     last: Option<Action>,
@@ -60,30 +60,30 @@ impl Default for Expert {
 }
 
 impl Expert {
-    /// A steady expert without a plan.
+    /// An expert without a plan that turns late.
     pub fn new() -> Expert {
         Expert::of(TurnTiming::Late)
     }
 
     /// An expert without a plan.
-    pub fn of(pace: TurnTiming) -> Expert {
-        Expert { pace, scout: Scout::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
+    pub fn of(timing: TurnTiming) -> Expert {
+        Expert { timing, poses: PoseSearch::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
     }
 
     /// Drops the plan: a new episode starts.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.plan.clear();
         self.expected = None;
     }
 
-    /// What it is about to do.
-    pub fn plan(&self) -> Plan {
-        Plan { steps: self.plan.clone(), expected: self.expected.clone(), last: self.last }
+    /// Its plan, to be restored later.
+    pub fn state(&self) -> ExpertState {
+        ExpertState { steps: self.plan.clone(), expected: self.expected.clone(), last: self.last }
     }
 
-    /// Goes on with what it was about to do at another time in this scene.
-    pub fn follow(&mut self, plan: Plan) {
-        Plan { steps: self.plan, expected: self.expected, last: self.last } = plan;
+    /// Continues with a plan that it had at another time in this scene.
+    pub fn restore(&mut self, state: ExpertState) {
+        ExpertState { steps: self.plan, expected: self.expected, last: self.last } = state;
     }
 
     /// The next action for the grader's current subtask.
@@ -97,10 +97,10 @@ impl Expert {
             if *completed == grader.completed() && expected == world);
         let same_scene = self.enter(&scene);
         if !(as_expected && same_scene) || self.plan.is_empty() {
-            self.scout.visit(world, same_scene);
+            self.poses.set_world(world, same_scene);
             self.plan = self.plan_from(&scene, world, grader)?.into();
         }
-        if self.pace == TurnTiming::Early
+        if self.timing == TurnTiming::Early
             && let Some(&aim) = self.plan.back()
             && is_at_hand(house, aim)
         {
@@ -124,7 +124,7 @@ impl Expert {
     fn enter(&mut self, scene: &Arc<Scene>) -> bool {
         let same = matches!(&self.scene, Some((known, _)) if Arc::ptr_eq(known, scene));
         if !same {
-            self.scene = Some((Arc::clone(scene), Floor::of(scene)));
+            self.scene = Some((Arc::clone(scene), WalkableCells::of(scene)));
             self.plan.clear();
         }
         same
@@ -134,11 +134,11 @@ impl Expert {
     fn plan_from(&mut self, scene: &Scene, world: &World, grader: &Grader) -> Result<Vec<Action>, NoWay> {
         let intent = plan::intent(scene, world, grader)?;
         let Some((_, floor)) = &self.scene else { return Err(NoWay::Finished) };
-        let turning = if self.pace == TurnTiming::Early { Turning::Early } else { Turning::Late };
+        let turning = if self.timing == TurnTiming::Early { Turning::Early } else { Turning::Late };
         let paths = Paths::from(floor, world.agent, turning);
         let left = plan::left_open(scene, world, &intent);
         if !left.is_empty()
-            && let Some(stand) = self.scout.find(scene, floor, &paths, &left, Some(TIDY_STEPS))
+            && let Some(stand) = self.poses.find(scene, floor, &paths, &left, Some(TIDY_STEPS))
         {
             return Ok(actions(&paths, &left, stand));
         }
@@ -146,7 +146,7 @@ impl Expert {
         if aims.is_empty() {
             return Ok(vec![Action::navigate(any_look(world.agent))]);
         }
-        let Some(stand) = self.scout.find(scene, floor, &paths, &aims, None) else {
+        let Some(stand) = self.poses.find(scene, floor, &paths, &aims, None) else {
             let subtask = grader.subtask().map(|subtask| describe(grader.roles(), subtask)).unwrap_or_default();
             return Err(NoWay::NoStand { subtask });
         };
@@ -168,7 +168,7 @@ fn any_look(pose: Pose) -> ActionType {
     if pose.horizon < Pose::DOWN { ActionType::LookDown } else { ActionType::LookUp }
 }
 
-fn actions(paths: &Paths, aims: &[plan::Aim], stand: Stand) -> Vec<Action> {
+fn actions(paths: &Paths, aims: &[plan::Aim], stand: InteractionPose) -> Vec<Action> {
     let way = paths.to(stand.cell, stand.pose).into_iter().map(Action::navigate);
     let aim = &aims[stand.aim];
     way.chain([Action::interact(aim.kind, aim.target)]).collect()
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn a_path_is_as_long_as_the_walk_around_the_table() {
         let (scene, world) = kitchen();
-        let floor = Floor::of(&scene);
+        let floor = WalkableCells::of(&scene);
         let paths = Paths::from(&floor, world.agent, Turning::Late);
         let steps_to = |x, z| {
             let cell = floor.cells().binary_search(&crate::domain::Cell::new(x, z)).unwrap();
@@ -328,9 +328,9 @@ mod tests {
     }
 
     #[test]
-    fn a_prompt_expert_turns_at_the_first_of_equally_short_ways() {
+    fn an_early_turning_expert_turns_at_the_first_of_equally_short_ways() {
         let (scene, world) = kitchen();
-        let floor = Floor::of(&scene);
+        let floor = WalkableCells::of(&scene);
         let end = Pose { cell: crate::domain::Cell::new(7, 8), ..world.agent };
         let cell = floor.cells().binary_search(&end.cell).unwrap();
         let ways =
@@ -341,11 +341,11 @@ mod tests {
     }
 
     #[test]
-    fn a_prompt_expert_walks_less_far_before_its_first_turn() {
+    fn an_early_turning_expert_walks_less_far_before_its_first_turn() {
         use crate::domain::{Room, task::SceneRef};
         use crate::house::generate;
         use rand::SeedableRng;
-        let walked = |pace: TurnTiming| {
+        let walked = |timing: TurnTiming| {
             let ahead = |seed: u64| {
                 let (scene, world) = generate::house(Room::LivingRoom, seed);
                 let (scene, reference) = (Arc::new(scene), SceneRef::Generated { room: Room::LivingRoom, seed });
@@ -353,9 +353,9 @@ mod tests {
                 let task = generate::task(&scene, &world, reference, 1, &mut rng).unwrap();
                 let mut house = House::new(scene, task.start.clone().unwrap_or(world));
                 let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
-                let mut expert = Expert::of(pace);
+                let mut expert = Expert::of(timing);
                 let first = expert.next(&mut house, &grader).unwrap();
-                let way = std::iter::once(first).chain(expert.plan().steps);
+                let way = std::iter::once(first).chain(expert.state().steps);
                 way.take_while(|action| action.kind == ActionType::MoveAhead).count()
             };
             (0..8).map(ahead).sum::<usize>()

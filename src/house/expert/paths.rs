@@ -8,18 +8,18 @@ const NONE: u32 = u32::MAX;
 
 /// A scene's cells with their neighbours.
 #[derive(Clone, Debug)]
-pub struct Floor {
+pub struct WalkableCells {
     cells: Vec<Cell>,
     /// For each cell and heading, the number of the cell ahead.
     ahead: Vec<[u32; 4]>,
 }
 
-impl Floor {
+impl WalkableCells {
     /// The floor of a scene.
-    pub fn of(scene: &Scene) -> Floor {
+    pub fn of(scene: &Scene) -> WalkableCells {
         let number = |cell: Cell| scene.cells.binary_search(&cell).map_or(NONE, |index| index as u32);
         let ahead = scene.cells.iter().map(|cell| Heading::ALL.map(|heading| number(cell.ahead(heading)))).collect();
-        Floor { cells: scene.cells.clone(), ahead }
+        WalkableCells { cells: scene.cells.clone(), ahead }
     }
 
     /// The cells, sorted.
@@ -50,7 +50,7 @@ pub struct Paths {
 impl Paths {
     /// A shortest way from `start` to every state; none when it is not on the floor. What is explored first comes first on
     /// the way.
-    pub fn from(floor: &Floor, start: Pose, turning: Turning) -> Paths {
+    pub fn from(floor: &WalkableCells, start: Pose, turning: Turning) -> Paths {
         let states = 4 * floor.cells.len();
         let mut paths = Paths { start, steps: vec![NONE; states], from: vec![(NONE, ActionType::MoveAhead); states] };
         let Ok(cell) = floor.cells.binary_search(&start.cell) else { return paths };

@@ -49,7 +49,7 @@ pub fn intent(scene: &Scene, world: &World, grader: &Grader) -> Result<Intent, N
     if grader.is_cut_short() {
         return Err(NoWay::CutShort);
     }
-    let plan = Plan { scene, world, grader, subtask };
+    let plan = Planner { scene, world, grader, subtask };
     let intent = if plan.awaits_close() { plan.close() } else { plan.skill() }?;
     Ok(intent)
 }
@@ -69,14 +69,14 @@ pub fn left_open(scene: &Scene, world: &World, intent: &Intent) -> Vec<Aim> {
     .collect()
 }
 
-struct Plan<'a> {
+struct Planner<'a> {
     scene: &'a Scene,
     world: &'a World,
     grader: &'a Grader,
     subtask: &'a Subtask,
 }
 
-impl Plan<'_> {
+impl Planner<'_> {
     fn no_way(&self) -> NoWay {
         NoWay::Nothing { subtask: describe(self.grader.roles(), self.subtask) }
     }

@@ -11,7 +11,7 @@ use crate::domain::{Class, Scene, World};
 
 /// Roles and subtasks under construction.
 #[derive(Clone, Debug, Default)]
-pub struct Chain {
+pub struct SkillChain {
     /// The parts.
     pub roles: Vec<Role>,
     /// The steps; `closes` is not known yet.
@@ -20,7 +20,7 @@ pub struct Chain {
 
 /// ALFRED's task types, with the lamp alone and slicing alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum TaskKind {
     Place,
     PlaceTwo,
     Movable,
@@ -29,15 +29,15 @@ enum Kind {
     Light,
 }
 
-const KINDS: [Kind; 8] = [
-    Kind::Place,
-    Kind::PlaceTwo,
-    Kind::Movable,
-    Kind::Change(SkillKind::Clean),
-    Kind::Change(SkillKind::Heat),
-    Kind::Change(SkillKind::Cool),
-    Kind::Examine,
-    Kind::Light,
+const KINDS: [TaskKind; 8] = [
+    TaskKind::Place,
+    TaskKind::PlaceTwo,
+    TaskKind::Movable,
+    TaskKind::Change(SkillKind::Clean),
+    TaskKind::Change(SkillKind::Heat),
+    TaskKind::Change(SkillKind::Cool),
+    TaskKind::Examine,
+    TaskKind::Light,
 ];
 
 /// What there is to make chains of.
@@ -110,7 +110,7 @@ impl<'a> Stock<'a> {
     }
 }
 
-impl Chain {
+impl SkillChain {
     fn role(&mut self, class: Class, slice: bool) -> u8 {
         self.roles.push(Role { class, slice, bound: None, expert: None });
         (self.roles.len() - 1) as u8
@@ -138,8 +138,8 @@ impl Chain {
     }
 
     /// A chain of exactly `length` skills, if this draw gives one. With `in_hand`, the first pickup is done already.
-    pub fn draw(stock: &Stock<'_>, length: usize, in_hand: bool, rng: &mut ChaCha8Rng) -> Option<Chain> {
-        let mut chain = Chain::default();
+    pub fn draw(stock: &Stock<'_>, length: usize, in_hand: bool, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
+        let mut chain = SkillChain::default();
         let wanted = length + usize::from(in_hand);
         while chain.subtasks.len() < wanted {
             // Somebody who looks at a thing under a lamp still holds it: nothing can follow.
@@ -162,14 +162,14 @@ impl Chain {
     }
 
     /// A chain of one skill; whatever it needs in the hand is there at the start.
-    pub fn single(stock: &Stock<'_>, skill: SkillKind, rng: &mut ChaCha8Rng) -> Option<Chain> {
+    pub fn single(stock: &Stock<'_>, skill: SkillKind, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
         let lit_alone = rng.random_bool(0.5);
         let mut chain = match skill {
-            SkillKind::Pickup | SkillKind::Put => Chain::default().with(stock, Kind::Place, false, rng)?,
-            SkillKind::Slice => Chain::default().with(stock, Kind::Place, true, rng)?,
-            SkillKind::Toggle if lit_alone => Chain::default().with(stock, Kind::Light, false, rng)?,
-            SkillKind::Toggle => Chain::default().with(stock, Kind::Examine, false, rng)?,
-            change => Chain::default().with(stock, Kind::Change(change), false, rng)?,
+            SkillKind::Pickup | SkillKind::Put => SkillChain::default().with(stock, TaskKind::Place, false, rng)?,
+            SkillKind::Slice => SkillChain::default().with(stock, TaskKind::Place, true, rng)?,
+            SkillKind::Toggle if lit_alone => SkillChain::default().with(stock, TaskKind::Light, false, rng)?,
+            SkillKind::Toggle => SkillChain::default().with(stock, TaskKind::Examine, false, rng)?,
+            change => SkillChain::default().with(stock, TaskKind::Change(change), false, rng)?,
         };
         let place = chain.subtasks.iter().position(|subtask| subtask.skill == skill)?;
         chain.subtasks.truncate(place + 1);
@@ -177,7 +177,7 @@ impl Chain {
     }
 
     /// The chain without its first `done` skills, which are one pickup or none.
-    fn start_holding(mut self, stock: &Stock<'_>, done: usize, rng: &mut ChaCha8Rng) -> Option<Chain> {
+    fn start_holding(mut self, stock: &Stock<'_>, done: usize, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
         match (done, self.subtasks.first()?.skill) {
             (0, _) => {}
             (1, SkillKind::Pickup) => {
@@ -192,51 +192,51 @@ impl Chain {
     }
 
     /// The chain with a further part of that kind.
-    fn with(mut self, stock: &Stock<'_>, kind: Kind, sliced: bool, rng: &mut ChaCha8Rng) -> Option<Chain> {
-        let is_new = |chain: &Chain, class: Class| !chain.uses(class);
+    fn with(mut self, stock: &Stock<'_>, kind: TaskKind, sliced: bool, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
+        let is_new = |chain: &SkillChain, class: Class| !chain.uses(class);
         let works = |class: Class| match kind {
-            Kind::Change(SkillKind::Heat) => Class::named("Microwave").is_some_and(|oven| oven.holds(class)),
-            Kind::Change(SkillKind::Cool) => Class::named("Fridge").is_some_and(|fridge| fridge.holds(class)),
-            Kind::Change(_) => Class::named("Sink").is_some_and(|sink| sink.holds(class)),
+            TaskKind::Change(SkillKind::Heat) => Class::named("Microwave").is_some_and(|oven| oven.holds(class)),
+            TaskKind::Change(SkillKind::Cool) => Class::named("Fridge").is_some_and(|fridge| fridge.holds(class)),
+            TaskKind::Change(_) => Class::named("Sink").is_some_and(|sink| sink.holds(class)),
             _ => true,
         };
         let machine = match kind {
-            Kind::Change(SkillKind::Heat) => Some("Microwave"),
-            Kind::Change(SkillKind::Cool) => Some("Fridge"),
-            Kind::Change(_) => Some("Faucet"),
+            TaskKind::Change(SkillKind::Heat) => Some("Microwave"),
+            TaskKind::Change(SkillKind::Cool) => Some("Fridge"),
+            TaskKind::Change(_) => Some("Faucet"),
             _ => None,
         };
         if let Some(machine) = machine {
             stock.fixture(&[machine], rng)?;
         }
-        if kind == Kind::Light {
+        if kind == TaskKind::Light {
             let lamp = stock.fixture(&["DeskLamp", "FloorLamp"], rng).filter(|&lamp| is_new(&self, lamp))?;
             let lamp = self.role(lamp, false);
             self.step(SkillKind::Toggle, lamp);
             return Some(self);
         }
-        let needed = if kind == Kind::PlaceTwo && !sliced { 2 } else { 1 };
+        let needed = if kind == TaskKind::PlaceTwo && !sliced { 2 } else { 1 };
         let class = stock.movable(rng, |class| {
             is_new(&self, class)
                 && works(class)
                 && stock.count(class) >= needed
-                && (!sliced || class.info().slices > 1 && kind != Kind::Examine)
+                && (!sliced || class.info().slices > 1 && kind != TaskKind::Examine)
         })?;
         if sliced {
             self.cut(stock, class, rng)?;
         }
         match kind {
-            Kind::Place | Kind::Change(_) => {
+            TaskKind::Place | TaskKind::Change(_) => {
                 let thing = self.role(class, sliced);
                 self.step(SkillKind::Pickup, thing);
-                if let Kind::Change(skill) = kind {
+                if let TaskKind::Change(skill) = kind {
                     self.step(skill, thing);
                 }
                 let place = stock.place(rng, class)?;
                 let place = self.furniture(place);
                 self.put(thing, place);
             }
-            Kind::PlaceTwo => {
+            TaskKind::PlaceTwo => {
                 let place = stock.place(rng, class)?;
                 let place = self.furniture(place);
                 for _ in 0..2 {
@@ -245,7 +245,7 @@ impl Chain {
                     self.put(thing, place);
                 }
             }
-            Kind::Movable => {
+            TaskKind::Movable => {
                 let holder = stock.movable(rng, |holder| {
                     holder != class && is_new(&self, holder) && holder.info().receptacle && holder.holds(class)
                 })?;
@@ -257,13 +257,13 @@ impl Chain {
                 self.step(SkillKind::Pickup, holder);
                 self.put(holder, place);
             }
-            Kind::Examine => {
+            TaskKind::Examine => {
                 let lamp = stock.fixture(&["DeskLamp", "FloorLamp"], rng).filter(|&lamp| is_new(&self, lamp))?;
                 let (thing, lamp) = (self.role(class, false), self.role(lamp, false));
                 self.step(SkillKind::Pickup, thing);
                 self.step(SkillKind::Toggle, lamp);
             }
-            Kind::Light => {}
+            TaskKind::Light => {}
         }
         Some(self)
     }

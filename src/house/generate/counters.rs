@@ -5,7 +5,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::builder::{Builder, INSET, inset, surface};
-use super::floor::{Floor, Wall, before, pick};
+use super::floor::{RoomFloor, Wall, before, pick};
 use super::site::Site;
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::scene::Surface;
@@ -42,7 +42,7 @@ impl Unit {
 
 /// How a counter is built, in millimetres.
 #[derive(Clone, Copy)]
-struct Build {
+struct CounterDimensions {
     height: i32,
     depth: i32,
     /// Where wall cabinets start; 0 for none.
@@ -50,11 +50,12 @@ struct Build {
 }
 
 /// Builds a kitchen's counters, fridge, sink, stove, microwave and coffee machine; `false` when no wall is long enough.
-pub fn kitchen(floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+pub fn kitchen(floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     let count = floor.walls.len();
     let mut order: Vec<usize> = (0..count).collect();
     order.shuffle(rng);
-    let build = Build { height: pick(rng, [880, 960], 10), depth: 600, wall_cabinets: pick(rng, [1380, 1480], 20) };
+    let build =
+        CounterDimensions { height: pick(rng, [880, 960], 10), depth: 600, wall_cabinets: pick(rng, [1380, 1480], 20) };
     // Run A ends in the corner in which run B starts.
     order.into_iter().any(|a| {
         let (wall_a, wall_b) = (floor.walls[a], floor.walls[(a + 1) % count]);
@@ -63,7 +64,14 @@ pub fn kitchen(floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bo
     })
 }
 
-fn runs(floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng, build: Build, a: Wall, b: Wall) -> bool {
+fn runs(
+    floor: &mut RoomFloor,
+    out: &mut Builder,
+    rng: &mut ChaCha8Rng,
+    build: CounterDimensions,
+    a: Wall,
+    b: Wall,
+) -> bool {
     let fridge = pick(rng, [680, 860], 20);
     let mut wanted = vec![Unit::Sink, Unit::Stove, Unit::Microwave, Unit::Coffee, Unit::Plain, Unit::Plain];
     wanted.extend(std::iter::repeat_n(Unit::Plain, rng.random_range(0..=3)));
@@ -113,7 +121,7 @@ fn runs(floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng, build: Build
 }
 
 /// Reserves the floor before every unit that people use.
-fn aprons(floor: &mut Floor, site: &Site, units: &[(Unit, i32)], depth: i32) -> bool {
+fn aprons(floor: &mut RoomFloor, site: &Site, units: &[(Unit, i32)], depth: i32) -> bool {
     let mut u = 0;
     units.iter().all(|&(unit, width)| {
         let front = before(&site.moved(u, 0), width, depth);
@@ -135,11 +143,11 @@ fn fridge(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32) {
 }
 
 /// Builds one straight counter with what stands on it, under it and over it.
-fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: Build, site: Site, units: &[(Unit, i32)]) {
+fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: CounterDimensions, site: Site, units: &[(Unit, i32)]) {
     if units.is_empty() {
         return;
     }
-    let Build { height, depth, .. } = build;
+    let CounterDimensions { height, depth, .. } = build;
     let place = out.fixtures.len();
     let (mut body, mut areas) = (Vec::new(), Vec::<[i32; 2]>::new());
     let mut u = 0;
@@ -200,9 +208,9 @@ fn below(
     unit: Unit,
     width: i32,
     top: i32,
-    build: Build,
+    build: CounterDimensions,
 ) -> Vec<Cuboid> {
-    let Build { height, depth, .. } = build;
+    let CounterDimensions { height, depth, .. } = build;
     let carcass = site.cuboid([0, width], [0, top], [0, depth - FRONT]);
     let inside = [10, width - 10];
     let all_drawers = matches!(unit, Unit::Plain | Unit::Coffee | Unit::Microwave) && rng.random_bool(0.3);
@@ -299,5 +307,5 @@ pub fn vanity(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32, d
         left -= take;
     }
     units.shuffle(rng);
-    counter(out, rng, Build { height, depth: depth - 20, wall_cabinets: 0 }, site, &units);
+    counter(out, rng, CounterDimensions { height, depth: depth - 20, wall_cabinets: 0 }, site, &units);
 }

@@ -3,8 +3,8 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::floor::{Floor, overlap};
-use super::rooms::{Form, RoomPlan, rooms};
+use super::floor::{RoomFloor, overlap};
+use super::rooms::{GeneratedShape, RoomPlan, rooms};
 use crate::domain::class::Shape;
 use crate::domain::place::Rect;
 use crate::domain::scene::Mesh;
@@ -20,7 +20,7 @@ const ARM: f32 = 1250.0;
 const GAP: i32 = 8;
 
 /// What lies around already: where, between which heights, and in which fixture.
-struct Taken {
+struct OccupiedVolume {
     holder: Option<usize>,
     ground: Rect,
     low: i32,
@@ -31,11 +31,11 @@ struct Taken {
 struct Space {
     /// The height above which nothing may reach, for each fixture and each of its surfaces.
     ceilings: Vec<Vec<i32>>,
-    taken: Vec<Taken>,
+    taken: Vec<OccupiedVolume>,
 }
 
 /// Makes the room's objects; adds their shapes to the scene.
-pub fn fill(plan: &RoomPlan, floor: &Floor, scene: &mut Scene, rng: &mut ChaCha8Rng) -> Vec<Object> {
+pub fn fill(plan: &RoomPlan, floor: &RoomFloor, scene: &mut Scene, rng: &mut ChaCha8Rng) -> Vec<Object> {
     let mut wanted: Vec<Class> = Vec::new();
     for (&class, &[chance, mean]) in &plan.objects {
         if rng.random_bool(chance) {
@@ -73,8 +73,11 @@ fn mesh(scene: &mut Scene, class: Class, rng: &mut ChaCha8Rng) -> u16 {
         return known[rng.random_range(0..known.len() as u32) as usize] as u16;
     }
     let info = class.info();
-    let Form { shape, size, hangs } =
-        rooms().shapes.get(&class).copied().unwrap_or(Form { shape: info.shape, size: info.size, hangs: false });
+    let GeneratedShape { shape, size, hangs } = rooms().shapes.get(&class).copied().unwrap_or(GeneratedShape {
+        shape: info.shape,
+        size: info.size,
+        hangs: false,
+    });
     let scale = rng.random_range(90..=110);
     let size = size.map(|side| if side > 40 { side * scale / 100 * rng.random_range(95..=105) / 100 } else { side });
     // The lower end is on the support, the pivot the table's rest offset above it.
@@ -183,7 +186,7 @@ fn lay(scene: &Scene, space: &mut Space, object: &Object, holder: usize, rng: &m
     if blocked || !(stays || is_point && high < ceiling) || !near() {
         return None;
     }
-    space.taken.push(Taken { holder: Some(holder), ground, low, high });
+    space.taken.push(OccupiedVolume { holder: Some(holder), ground, low, high });
     Some(object)
 }
 
@@ -210,7 +213,13 @@ fn ceiling(scene: &Scene, holder: usize, level: usize) -> i32 {
 }
 
 /// Stands an object on the floor, by the wall where nobody walks.
-fn on_floor(floor: &Floor, scene: &Scene, space: &mut Space, object: Object, rng: &mut ChaCha8Rng) -> Option<Object> {
+fn on_floor(
+    floor: &RoomFloor,
+    scene: &Scene,
+    space: &mut Space,
+    object: Object,
+    rng: &mut ChaCha8Rng,
+) -> Option<Object> {
     for _ in 0..TRIES {
         let wall = floor.walls[rng.random_range(0..floor.walls.len() as u32) as usize];
         let turn = [0, (wall.site.facing.quarters() * 900 + 900 * rng.random_range(0..2)) as i16, 0];
@@ -239,7 +248,7 @@ fn on_floor(floor: &Floor, scene: &Scene, space: &mut Space, object: Object, rng
             .flat_map(|fixture| &fixture.body)
             .any(|body| overlap(&ground, &body.footprint()) && body.min.y < high + 300);
         if floor.is_free(&ground) && near && !walked && !blocked && !hung {
-            space.taken.push(Taken { holder: None, ground, low, high });
+            space.taken.push(OccupiedVolume { holder: None, ground, low, high });
             return Some(Object { at, ..object });
         }
     }

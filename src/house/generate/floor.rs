@@ -27,7 +27,7 @@ pub struct Wall {
 
 /// The floor of a room.
 #[derive(Clone, Debug)]
-pub struct Floor {
+pub struct RoomFloor {
     /// The walls, anticlockwise.
     pub walls: Vec<Wall>,
     bounds: Rect,
@@ -47,9 +47,9 @@ pub fn overlap(a: &Rect, b: &Rect) -> bool {
     (0..2).all(|axis| a.min[axis] < b.max[axis] && b.min[axis] < a.max[axis])
 }
 
-impl Floor {
+impl RoomFloor {
     /// An empty room: a rectangle, or an L.
-    pub fn new(plan: &RoomPlan, rng: &mut ChaCha8Rng) -> Floor {
+    pub fn new(plan: &RoomPlan, rng: &mut ChaCha8Rng) -> RoomFloor {
         let (mut width, mut depth) = (pick(rng, plan.width, Cell::SIDE), pick(rng, plan.depth, Cell::SIDE));
         if rng.random_bool(0.5) {
             std::mem::swap(&mut width, &mut depth);
@@ -69,7 +69,7 @@ impl Floor {
             notch
         });
         let cells = open_cells(&bounds, notch.as_ref());
-        Floor { walls: walls(&bounds, notch.as_ref()), bounds, notch, solids: vec![], aprons: vec![], cells }
+        RoomFloor { walls: walls(&bounds, notch.as_ref()), bounds, notch, solids: vec![], aprons: vec![], cells }
     }
 
     /// The cells where somebody can stand, sorted; all connected.

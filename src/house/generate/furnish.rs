@@ -5,9 +5,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::builder::Builder;
 use super::counters;
-use super::floor::{Floor, Wall, before, overlap, pick};
-use super::pieces::{self, Build};
-use super::rooms::{Piece, RoomPlan};
+use super::floor::{RoomFloor, Wall, before, overlap, pick};
+use super::pieces::{self, PieceDimensions};
+use super::rooms::{FurniturePiece, RoomPlan};
 use super::site::Site;
 use crate::domain::place::Rect;
 use crate::domain::{Cell, Heading, Point};
@@ -16,7 +16,7 @@ use crate::domain::{Cell, Heading, Point};
 const TRIES: usize = 24;
 
 /// Puts the room's furniture on the floor; `false` when a piece that every such room has found no place.
-pub fn furnish(plan: &RoomPlan, floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+pub fn furnish(plan: &RoomPlan, floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     for piece in &plan.pieces {
         if !rng.random_bool(piece.chance) {
             continue;
@@ -38,10 +38,10 @@ pub fn furnish(plan: &RoomPlan, floor: &mut Floor, out: &mut Builder, rng: &mut 
 }
 
 /// Places one piece that stands on the floor.
-fn one(piece: &Piece, floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+fn one(piece: &FurniturePiece, floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     let drawers = if piece.kind == "Shelves" { piece.count } else { piece.drawers };
     for _ in 0..TRIES {
-        let build = Build {
+        let build = PieceDimensions {
             width: pick(rng, piece.width, 10),
             depth: pick(rng, piece.depth, 10),
             height: pick(rng, piece.height, 10),
@@ -60,7 +60,7 @@ fn one(piece: &Piece, floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng
 }
 
 /// A place along a wall, often in a corner or next to what stands there.
-fn along(floor: &Floor, rng: &mut ChaCha8Rng, build: Build) -> Site {
+fn along(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> Site {
     let wall = floor.walls[rng.random_range(0..floor.walls.len() as u32) as usize];
     let room = (wall.length - build.width).max(0);
     let u = match rng.random_range(0..4) {
@@ -72,7 +72,7 @@ fn along(floor: &Floor, rng: &mut ChaCha8Rng, build: Build) -> Site {
 }
 
 /// A place away from the walls.
-fn middle(floor: &Floor, rng: &mut ChaCha8Rng, build: Build) -> Site {
+fn middle(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> Site {
     let bounds = floor.bounds();
     let facing = Heading::ALL[rng.random_range(0..4u32) as usize];
     let origin = [0, 1].map(|axis| pick(rng, [bounds.min[axis] + 300, bounds.max[axis] - 300], 25));
@@ -81,7 +81,7 @@ fn middle(floor: &Floor, rng: &mut ChaCha8Rng, build: Build) -> Site {
 }
 
 /// Hangs a holder on a free stretch of wall that somebody can stand before.
-fn hang(piece: &Piece, floor: &mut Floor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+fn hang(piece: &FurniturePiece, floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     let half = if piece.kind == "TowelHolder" { 300 } else { 180 };
     for _ in 0..2 * TRIES {
         let wall: Wall = floor.walls[rng.random_range(0..floor.walls.len() as u32) as usize];

@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::domain::{Heading, Pose, Room, Scene, World};
 use builder::Builder;
-use floor::{FLOOR, Floor};
+use floor::{FLOOR, RoomFloor};
 
 /// How many layouts are tried before the last one is taken as it is; one in some thousands of seeds needs more than five.
 const ATTEMPTS: u64 = 64;
@@ -30,7 +30,7 @@ pub fn house(room: Room, seed: u64) -> (Scene, World) {
         let mut rng = source(room, seed, attempt);
         attempt += 1;
         let plan = rooms::rooms().plan(room);
-        let mut floor = Floor::new(plan, &mut rng);
+        let mut floor = RoomFloor::new(plan, &mut rng);
         let mut built = Builder::default();
         if furnish::furnish(plan, &mut floor, &mut built, &mut rng) || attempt == ATTEMPTS {
             return finish(room, seed, &floor, built, &mut rng);
@@ -57,7 +57,7 @@ fn label(room: Room) -> &'static str {
     }
 }
 
-fn finish(room: Room, seed: u64, floor: &Floor, built: Builder, rng: &mut ChaCha8Rng) -> (Scene, World) {
+fn finish(room: Room, seed: u64, floor: &RoomFloor, built: Builder, rng: &mut ChaCha8Rng) -> (Scene, World) {
     let mut scene = Scene {
         format_version: Scene::FORMAT,
         name: format!("{}-{seed}", label(room)),

@@ -10,7 +10,7 @@ use crate::domain::scene::Surface;
 
 /// How large a piece is, in millimetres, and what its front and top have.
 #[derive(Clone, Copy, Debug)]
-pub struct Build {
+pub struct PieceDimensions {
     /// Along the wall.
     pub width: i32,
     /// Out of the wall.
@@ -24,7 +24,7 @@ pub struct Build {
 }
 
 /// Builds a piece that stands on the floor.
-pub fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: Build) {
+pub fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
     match kind {
         "Vanity" => vanity(out, rng, site, build.width, build.depth, build.height),
         "Bed" => bed(out, site, build),
@@ -42,8 +42,8 @@ pub fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, bu
 }
 
 /// A box with a top to put things on: tables, desks, dressers, stands.
-fn table(kind: &str, out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, drawers, lamp: lit } = build;
+fn table(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, drawers, lamp: lit } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let mut surface = top(&body);
     if lit {
@@ -75,8 +75,8 @@ fn table(kind: &str, out: &mut Builder, site: Site, build: Build) {
 }
 
 /// A seat with a back, and with arms.
-fn seat(kind: &str, out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn seat(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let back = 200;
     let arm = 130;
     let body = vec![
@@ -90,39 +90,39 @@ fn seat(kind: &str, out: &mut Builder, site: Site, build: Build) {
     out.add(kind, site.point(width / 2, 0, depth / 2), site.facing, body, vec![seat]);
 }
 
-fn bed(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn bed(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let body =
         vec![site.cuboid([0, width], [0, height], [60, depth]), site.cuboid([0, width], [0, height + 400], [0, 60])];
     let lying = surface(site.floor + height, inset(site.rect([0, width], [60, depth]), 130));
     out.add("Bed", site.point(width / 2, 0, depth / 2), site.facing, body, vec![lying]);
 }
 
-fn toilet(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn toilet(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let body =
         vec![site.cuboid([30, width - 30], [0, 420], [180, depth]), site.cuboid([0, width], [0, height], [0, 190])];
     let tank = surface(site.floor + height, site.rect([90, width - 90], [80, 110]));
     out.add("Toilet", site.point(width / 2, 0, depth / 2), site.facing, body, vec![tank]);
 }
 
-fn tub(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn tub(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 130, inset(site.rect([0, width], [0, depth]), 200));
     out.add("Bathtub", site.point(width / 2, 140, depth / 2), site.facing, vec![body], vec![ground]);
 }
 
-fn bin(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn bin(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 60, inset(site.rect([0, width], [0, depth]), 80));
     out.add("GarbageCan", site.point(width / 2, 0, depth / 2), site.facing, vec![body], vec![ground]);
 }
 
 /// A box with a door: a safe.
-fn shell(kind: &str, out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn shell(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 50, site.rect([110, width - 110], [depth / 2, depth - 100]));
     out.add(kind, site.point(width / 2, height / 2, depth / 2), site.facing, vec![body], vec![ground]);
@@ -140,8 +140,8 @@ fn lamp_at(out: &mut Builder, site: Site, kind: &str, [u, v]: [i32; 2], y: i32, 
 }
 
 /// A rack: one Shelf for each board.
-fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let boards = (build.drawers.max(1)).min(height / 250 + 1);
     let low = if boards == 1 { height } else { pick(rng, [150, 300], 25).min(height) };
     for board in 0..boards {
@@ -154,8 +154,8 @@ fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: Build) {
 }
 
 /// A tall cupboard with two doors.
-fn wardrobe(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn wardrobe(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     for half in 0..2 {
         let u = [width * half / 2 + 5, width * (half + 1) / 2 - 5];
         cabinet(out, site, u, [60, height / 2], [0, depth]);
@@ -163,8 +163,8 @@ fn wardrobe(out: &mut Builder, site: Site, build: Build) {
     }
 }
 
-fn cart(out: &mut Builder, site: Site, build: Build) {
-    let Build { width, depth, height, .. } = build;
+fn cart(out: &mut Builder, site: Site, build: PieceDimensions) {
+    let PieceDimensions { width, depth, height, .. } = build;
     let boards = [230, height];
     let body = boards.map(|y| site.cuboid([0, width], [y - 30, y], [0, depth]));
     let levels = boards

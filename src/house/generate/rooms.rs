@@ -22,7 +22,7 @@ pub struct RoomPlan {
     /// The chance that a corner is cut out of it.
     pub notch: f64,
     /// Its furniture, in the order in which it is placed.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<FurniturePiece>,
     /// For each movable class: the chance that the room holds any, and the mean count when it does.
     pub objects: BTreeMap<Class, [f64; 2]>,
 }
@@ -30,7 +30,7 @@ pub struct RoomPlan {
 /// A kind of furniture. Lengths in millimetres.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Piece {
+pub struct FurniturePiece {
     /// A class, or a built-in group (`Run`, `Vanity`, `Shelves`, `Wardrobe`).
     pub kind: String,
     /// The chance that the room has any.
@@ -51,10 +51,10 @@ pub struct Piece {
     pub middle: bool,
 }
 
-impl Default for Piece {
-    fn default() -> Piece {
+impl Default for FurniturePiece {
+    fn default() -> FurniturePiece {
         let none = [0, 0];
-        Piece {
+        FurniturePiece {
             kind: String::new(),
             chance: 1.0,
             count: [1, 1],
@@ -71,7 +71,7 @@ impl Default for Piece {
 /// The shape of a generated object. Lengths in millimetres.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Form {
+pub struct GeneratedShape {
     /// Which primitive.
     pub shape: Shape,
     /// Width, height, depth.
@@ -90,7 +90,7 @@ pub struct Rooms {
     bedroom: RoomPlan,
     bathroom: RoomPlan,
     /// Shapes that differ from the object table's.
-    pub shapes: BTreeMap<Class, Form>,
+    pub shapes: BTreeMap<Class, GeneratedShape>,
 }
 
 impl Rooms {

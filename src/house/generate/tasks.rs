@@ -6,7 +6,7 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::chain::{Chain, Stock};
+use super::chain::{SkillChain, Stock};
 use crate::domain::skill::{Original, SkillKind};
 use crate::domain::task::SceneRef;
 use crate::domain::world::{Instance, Parent};
@@ -33,10 +33,10 @@ pub fn task(scene: &Scene, world: &World, reference: SceneRef, length: usize, rn
     let shared = Arc::new(scene.clone());
     (0..DRAWS).find_map(|_| {
         let chain = match length {
-            1 => Chain::single(&stock, *SINGLES.choose(rng)?, rng)?,
+            1 => SkillChain::single(&stock, *SINGLES.choose(rng)?, rng)?,
             _ => {
                 let in_hand = rng.random_bool(0.2);
-                Chain::draw(&stock, length, in_hand, rng)?
+                SkillChain::draw(&stock, length, in_hand, rng)?
             }
         };
         let start = start(scene, world, &chain, rng)?;
@@ -62,7 +62,7 @@ pub fn task(scene: &Scene, world: &World, reference: SceneRef, length: usize, rn
 }
 
 /// The house with the agent anywhere and in its hand what the chain starts with.
-fn start(scene: &Scene, world: &World, chain: &Chain, rng: &mut ChaCha8Rng) -> Option<World> {
+fn start(scene: &Scene, world: &World, chain: &SkillChain, rng: &mut ChaCha8Rng) -> Option<World> {
     let mut world = world.clone();
     let cell = *scene.cells.choose(rng)?;
     let heading = Heading::from_quarters(rng.random_range(0..4));
@@ -78,12 +78,12 @@ fn start(scene: &Scene, world: &World, chain: &Chain, rng: &mut ChaCha8Rng) -> O
 }
 
 struct Solved {
-    chain: Chain,
+    chain: SkillChain,
     steps: u32,
 }
 
 /// Lets the expert do the chain, or says why it cannot. Fills in the expert's instances, and which subtasks it ended with a Close.
-fn solve(scene: &Arc<Scene>, start: World, mut chain: Chain) -> Result<Solved, String> {
+fn solve(scene: &Arc<Scene>, start: World, mut chain: SkillChain) -> Result<Solved, String> {
     // Everything that was opened has to be closed, as ALFRED's expert does; what was not opened need not be.
     for subtask in &mut chain.subtasks {
         subtask.closes = subtask.skill != SkillKind::Toggle;

@@ -2,8 +2,8 @@
 
 use glam::{Mat3, Vec3};
 
-use super::looks::{Look, Place, Variant};
-use super::solid::{Colour, Kind, Solid};
+use super::looks::{FilledBox, Look, Variant};
+use super::solid::{Rgb, Solid, SolidKind};
 use crate::domain::place::Cuboid;
 use crate::domain::scene::{Fixture, Scene};
 use crate::domain::world::FixtureState;
@@ -64,13 +64,13 @@ pub fn build(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Solid> {
 }
 
 /// A closed box.
-fn plain(place: &Place, colour: Colour, inner: Colour) -> Solid {
-    let kind = Kind::Box { missing: 0 };
+fn plain(place: &FilledBox, colour: Rgb, inner: Rgb) -> Solid {
+    let kind = SolidKind::Box { missing: 0 };
     Solid { kind, centre: place.centre, axes: place.axes, colour, inner, glows: false }
 }
 
 /// A piece of a counter: a slab, or a carcass that carries the slab's colour only where its top is.
-fn counter(look: &Look, place: &Place, variant: Variant, flat: bool, out: &mut Vec<Solid>) {
+fn counter(look: &Look, place: &FilledBox, variant: Variant, flat: bool, out: &mut Vec<Solid>) {
     let top = place.centre.y + place.axes.y_axis.length();
     match (flat, look.slab) {
         (true, Some(slab)) => out.push(plain(place, slab, slab)),
@@ -84,7 +84,7 @@ fn open_up(fixture: &Fixture, look: &Look, variant: Variant, out: &mut Vec<Solid
     let Some(door) = doors::open_door(fixture) else { return };
     let (main, inner) = (look.main(variant.seed), look.inner(variant.seed));
     out.push(Solid {
-        kind: Kind::Box { missing: 0 },
+        kind: SolidKind::Box { missing: 0 },
         centre: door.centre,
         axes: door.axes,
         colour: main,
@@ -115,10 +115,10 @@ fn boards(fixture: &Fixture) -> impl Iterator<Item = Cuboid> {
 }
 
 /// A box as seen from the front of its furniture.
-fn place(facing: Heading, cuboid: &Cuboid, surface: Option<f32>) -> Place {
+fn place(facing: Heading, cuboid: &Cuboid, surface: Option<f32>) -> FilledBox {
     let (sides, half) = (doors::front(facing), doors::half_sides(facing, cuboid));
     let centre = (cuboid.min.metres() + cuboid.max.metres()) / 2.0;
-    Place { centre, axes: sides * Mat3::from_diagonal(half), surface }
+    FilledBox { centre, axes: sides * Mat3::from_diagonal(half), surface }
 }
 
 /// The boxes of a body, without the holes for what is built into it.

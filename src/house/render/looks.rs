@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use glam::{Mat3, Vec3};
 use serde::Deserialize;
 
-use super::solid::{CYLINDER, Colour, Kind, Lathe, Solid};
+use super::solid::{CYLINDER, Lathe, Rgb, Solid, SolidKind};
 use crate::domain::Class;
 
 /// When a part is drawn.
@@ -20,7 +20,7 @@ enum When {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Shape {
+enum PartShape {
     #[default]
     Box,
     Tub,
@@ -32,7 +32,7 @@ enum Shape {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Row {
+struct LookRow {
     class: Class,
     piece: Option<usize>,
     #[serde(default)]
@@ -47,7 +47,7 @@ struct Row {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct PartRow {
-    shape: Shape,
+    shape: PartShape,
     x: String,
     y: String,
     z: String,
@@ -63,37 +63,37 @@ impl Default for PartRow {
     fn default() -> PartRow {
         let (all, main) = (|| "0 1".to_string(), "main".to_string());
         let (x, y, z) = (all(), all(), all());
-        let (shape, rings, hollow) = (Shape::Box, Vec::new(), false);
+        let (shape, rings, hollow) = (PartShape::Box, Vec::new(), false);
         PartRow { shape, x, y, z, rings, hollow, colour: main, lit: None, glow: false, when: None }
     }
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
-    look: Vec<Row>,
+struct LookTable {
+    look: Vec<LookRow>,
 }
 
 /// A place along a side of the box: a fraction of the side, or the lowest surface, plus metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Mark {
+enum SidePosition {
     Fraction(f32, f32),
     Surface(f32),
 }
 
 /// Where a part's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Paint {
+enum PartColour {
     Main(f32),
-    Own(Colour),
+    Own(Rgb),
 }
 
 #[derive(Debug)]
-struct Part {
-    kind: Kind,
-    spans: [[Mark; 2]; 3],
-    paint: Paint,
-    lit: Option<Colour>,
+struct LookPart {
+    kind: SolidKind,
+    spans: [[SidePosition; 2]; 3],
+    paint: PartColour,
+    lit: Option<Rgb>,
     glow: bool,
     when: Option<When>,
 }
@@ -105,13 +105,13 @@ pub struct Look {
     piece: Option<usize>,
     /// Every box of a body of several looks like this.
     pub each: bool,
-    palette: Vec<Colour>,
-    inner: Option<Colour>,
+    palette: Vec<Rgb>,
+    inner: Option<Rgb>,
     /// The colour inside, where it was cut.
-    pub flesh: Option<Colour>,
+    pub flesh: Option<Rgb>,
     /// The colour of flat pieces of a body of many boxes: counter tops.
-    pub slab: Option<Colour>,
-    parts: Vec<Part>,
+    pub slab: Option<Rgb>,
+    parts: Vec<LookPart>,
 }
 
 /// What a look depends on besides the class.
@@ -128,7 +128,7 @@ pub struct Variant {
 /// A box of space to be filled: its middle, its half axes (columns), and the height of the lowest surface in metres of the
 /// scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct FilledBox {
     /// The middle.
     pub centre: Vec3,
     /// The half axes.
@@ -138,53 +138,57 @@ pub struct Place {
 }
 
 /// A colour written as `#rrggbb`, or `None`.
-fn hex(text: &str) -> Option<Colour> {
+fn hex(text: &str) -> Option<Rgb> {
     let number = u32::from_str_radix(text.strip_prefix('#').filter(|digits| digits.len() == 6)?, 16).ok()?;
     Some([16, 8, 0].map(|shift| (number >> shift & 255) as f32 / 255.0))
 }
 
-fn mark(text: &str) -> Option<Mark> {
+fn mark(text: &str) -> Option<SidePosition> {
     let split = text.find(['+', '-']).unwrap_or(text.len());
     let (base, offset) = text.split_at(split);
     let metres = if offset.is_empty() { 0.0 } else { offset.parse::<f32>().ok()? / 1000.0 };
-    if base == "s" { Some(Mark::Surface(metres)) } else { Some(Mark::Fraction(base.parse().ok()?, metres)) }
+    if base == "s" {
+        Some(SidePosition::Surface(metres))
+    } else {
+        Some(SidePosition::Fraction(base.parse().ok()?, metres))
+    }
 }
 
-fn span(text: &str) -> Option<[Mark; 2]> {
+fn span(text: &str) -> Option<[SidePosition; 2]> {
     let (from, to) = text.split_once(' ')?;
     Some([mark(from)?, mark(to)?])
 }
 
-fn part(row: PartRow) -> Option<Part> {
+fn part(row: PartRow) -> Option<LookPart> {
     let kind = match row.shape {
-        Shape::Box => Kind::Box { missing: 0 },
-        Shape::Tub => Kind::Box { missing: 1 << 3 },
-        Shape::Case => Kind::Box { missing: 1 << 4 },
-        Shape::Ball => Kind::Ellipsoid,
-        Shape::Rod => Kind::Lathe(CYLINDER),
+        PartShape::Box => SolidKind::Box { missing: 0 },
+        PartShape::Tub => SolidKind::Box { missing: 1 << 3 },
+        PartShape::Case => SolidKind::Box { missing: 1 << 4 },
+        PartShape::Ball => SolidKind::Ellipsoid,
+        PartShape::Rod => SolidKind::Lathe(CYLINDER),
         // Heights in the table run from 0 to 1, those of a lathe from -1 to 1. The table lives as long as the program.
-        Shape::Turned => {
+        PartShape::Turned => {
             let rings = row.rings.iter().map(|&[height, radius]| [2.0 * height - 1.0, radius]).collect::<Vec<_>>();
-            Kind::Lathe(Lathe { rings: rings.leak(), hollow: row.hollow })
+            SolidKind::Lathe(Lathe { rings: rings.leak(), hollow: row.hollow })
         }
     };
     let paint = match row.colour.as_str() {
-        "main" => Paint::Main(1.0),
-        "dark" => Paint::Main(0.72),
-        "light" => Paint::Main(1.22),
-        own => Paint::Own(hex(own)?),
+        "main" => PartColour::Main(1.0),
+        "dark" => PartColour::Main(0.72),
+        "light" => PartColour::Main(1.22),
+        own => PartColour::Own(hex(own)?),
     };
     let lit = match row.lit {
         Some(text) => Some(hex(&text)?),
         None => None,
     };
     let spans = [span(&row.x)?, span(&row.y)?, span(&row.z)?];
-    Some(Part { kind, spans, paint, lit, glow: row.glow, when: row.when })
+    Some(LookPart { kind, spans, paint, lit, glow: row.glow, when: row.when })
 }
 
-fn look(row: Row) -> Option<Look> {
+fn look(row: LookRow) -> Option<Look> {
     let optional = |text: Option<String>| text.map(|text| hex(&text));
-    let Row { class, piece, each, palette, inner, flesh, slab, parts } = row;
+    let LookRow { class, piece, each, palette, inner, flesh, slab, parts } = row;
     Some(Look {
         class,
         piece,
@@ -201,7 +205,7 @@ fn table() -> &'static [Look] {
     static TABLE: OnceLock<Vec<Look>> = OnceLock::new();
     TABLE.get_or_init(|| {
         // The table is part of the program: a test reads it strictly, so nothing is left out in a build that passed.
-        let rows = toml::from_str::<Table>(include_str!("../../../assets/looks.toml")).map(|table| table.look);
+        let rows = toml::from_str::<LookTable>(include_str!("../../../assets/looks.toml")).map(|table| table.look);
         rows.unwrap_or_default().into_iter().filter_map(look).collect()
     })
 }
@@ -218,7 +222,7 @@ impl Look {
     }
 
     /// The main colour of an instance: one of the palette, a little lighter or darker.
-    pub fn main(&self, seed: u32) -> Colour {
+    pub fn main(&self, seed: u32) -> Rgb {
         let colour = self.palette[seed as usize % self.palette.len()];
         let shift = |bits: u32, span: f32| 1.0 + span * ((seed >> bits & 15) as f32 / 7.5 - 1.0);
         let bright = shift(8, 0.06);
@@ -227,12 +231,12 @@ impl Look {
     }
 
     /// The colour of insides.
-    pub fn inner(&self, seed: u32) -> Colour {
+    pub fn inner(&self, seed: u32) -> Rgb {
         self.inner.unwrap_or_else(|| self.main(seed).map(|part| 0.6 * part))
     }
 
     /// Fills a box with the bodies of this look.
-    pub fn fill(&self, place: &Place, variant: Variant, out: &mut Vec<Solid>) {
+    pub fn fill(&self, place: &FilledBox, variant: Variant, out: &mut Vec<Solid>) {
         let (main, inner) = (self.main(variant.seed), self.inner(variant.seed));
         for part in &self.parts {
             let shown = match part.when {
@@ -250,8 +254,8 @@ impl Look {
             let (at, sides) = ((low + high) / 2.0, place.unit_axes());
             let lit = part.lit.filter(|_| variant.on);
             let colour = match part.paint {
-                Paint::Main(factor) => main.map(|c| (c * factor).min(1.0)),
-                Paint::Own(colour) => colour,
+                PartColour::Main(factor) => main.map(|c| (c * factor).min(1.0)),
+                PartColour::Own(colour) => colour,
             };
             out.push(Solid {
                 kind: part.kind,
@@ -265,7 +269,7 @@ impl Look {
     }
 }
 
-impl Place {
+impl FilledBox {
     /// The directions of the axes.
     fn unit_axes(&self) -> Mat3 {
         let unit = |axis: Vec3| axis.normalize_or_zero();
@@ -273,13 +277,13 @@ impl Place {
     }
 }
 
-impl Part {
+impl LookPart {
     /// Two opposite corners in metres from the middle of the box.
-    fn corners(&self, place: &Place) -> (Vec3, Vec3) {
+    fn corners(&self, place: &FilledBox) -> (Vec3, Vec3) {
         let half = [place.axes.x_axis, place.axes.y_axis, place.axes.z_axis].map(Vec3::length);
-        let at = |axis: usize, mark: Mark| match mark {
-            Mark::Fraction(fraction, metres) => half[axis] * (2.0 * fraction - 1.0) + metres,
-            Mark::Surface(metres) => {
+        let at = |axis: usize, mark: SidePosition| match mark {
+            SidePosition::Fraction(fraction, metres) => half[axis] * (2.0 * fraction - 1.0) + metres,
+            SidePosition::Surface(metres) => {
                 let height = place.surface.map(|height| height - place.centre.y);
                 height.unwrap_or(0.0).clamp(-half[axis], half[axis]) + metres
             }
@@ -301,7 +305,7 @@ mod tests {
 
     #[test]
     fn every_row_of_the_table_is_understood_and_every_class_has_a_look() {
-        let rows: Table = toml::from_str(include_str!("../../../assets/looks.toml")).unwrap();
+        let rows: LookTable = toml::from_str(include_str!("../../../assets/looks.toml")).unwrap();
         for row in rows.look {
             let class = row.class;
             assert!(look(row).is_some(), "{}", class.name());
@@ -313,8 +317,8 @@ mod tests {
 
     #[test]
     fn a_mark_is_a_fraction_and_millimetres() {
-        assert_eq!(mark("0.5-20"), Some(Mark::Fraction(0.5, -0.02)));
-        assert_eq!(mark("s+3"), Some(Mark::Surface(0.003)));
+        assert_eq!(mark("0.5-20"), Some(SidePosition::Fraction(0.5, -0.02)));
+        assert_eq!(mark("s+3"), Some(SidePosition::Surface(0.003)));
         assert_eq!(mark("left"), None);
     }
 }

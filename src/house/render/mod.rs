@@ -1,17 +1,17 @@
 //! Draws what the agent sees: colour, depth and instances in one pass, on one core.
 
-pub mod cast;
 pub mod draw;
 pub mod furniture;
 pub mod looks;
 pub mod objects;
 pub mod raster;
 pub mod resolve;
+pub mod scene_bodies;
 pub mod solid;
 
-use cast::{Cast, Figure};
 use draw::Brush;
 use raster::Raster;
+use scene_bodies::{Figure, SceneBodies};
 
 use super::camera::Camera;
 use super::view::{self, Frame, View};
@@ -22,7 +22,7 @@ use crate::domain::{Point, Scene};
 pub struct Renderer {
     frame: Frame,
     raster: Raster,
-    cast: Cast,
+    bodies: SceneBodies,
 }
 
 impl Renderer {
@@ -36,7 +36,7 @@ impl Renderer {
             depth: vec![0.0; pixels],
             ids: vec![0; pixels],
         };
-        Renderer { frame, raster: Raster::new(size), cast: Cast::default() }
+        Renderer { frame, raster: Raster::new(size), bodies: SceneBodies::default() }
     }
 
     /// The frame that was drawn last.
@@ -66,24 +66,24 @@ impl Renderer {
         let camera = Camera::of(scene, world.agent);
         let metres = |height: i32| Point::new(0, height, 0).metres().y;
         let ceiling = scene.walls.iter().map(|wall| wall.max.y).max().map(metres);
-        self.cast.follow(scene, world);
+        self.bodies.update(scene, world);
         self.raster.clear();
         resolve::backdrop(&mut self.raster, &camera, scene.room, metres(scene.floor()), ceiling);
         let mut brush = Brush::new(&mut self.raster, camera);
-        for wall in &self.cast.walls.solids {
+        for wall in &self.bodies.walls.solids {
             brush.solid(wall, 0);
         }
-        for (index, figure) in (0u16..).zip(&self.cast.fixtures) {
+        for (index, figure) in (0u16..).zip(&self.bodies.fixtures) {
             figure.draw(&mut brush, view::code(Instance::Fixture(index)));
         }
-        for ((index, object), figure) in (0u16..).zip(&world.objects).zip(&self.cast.things) {
+        for ((index, object), figure) in (0u16..).zip(&world.objects).zip(&self.bodies.things) {
             let instance = Instance::Object(index);
             let gone = object.sliced || !figure.is_in_view(&brush);
             if !gone && !world.in_hand(index) && world.shut_in(scene, instance).is_none() {
                 figure.draw(&mut brush, view::code(instance));
             }
         }
-        if let Some(held) = world.held.and_then(|held| self.cast.things.get(usize::from(held))) {
+        if let Some(held) = world.held.and_then(|held| self.bodies.things.get(usize::from(held))) {
             brush.bring_forward(camera.eye(), 0.0);
             for (solid, (centre, axes)) in held.solids.iter().zip(objects::held(&held.solids, held.radius)) {
                 brush.local(solid, centre, axes, 0);

@@ -3,8 +3,8 @@
 use glam::{Mat3, Vec3};
 
 use super::furniture::mix;
-use super::looks::{Look, Place, Variant};
-use super::solid::{CYLINDER, Kind, Solid};
+use super::looks::{FilledBox, Look, Variant};
+use super::solid::{CYLINDER, Solid, SolidKind};
 use crate::domain::Scene;
 use crate::domain::class::Shape;
 use crate::domain::world::Object;
@@ -22,7 +22,7 @@ pub fn build(scene: &Scene, index: u16, object: &Object) -> Vec<Solid> {
         slice(look, &extent, seed, &mut out);
         return out;
     }
-    let place = Place { centre: extent.centre, axes: extent.axes, surface: None };
+    let place = FilledBox { centre: extent.centre, axes: extent.axes, surface: None };
     look.fill(&place, Variant { seed, open: object.open, on: false }, &mut out);
     if let Some(lid) = doors::open_lid(scene, object) {
         let shell = Solid::filling(&lid, look.main(seed));
@@ -39,8 +39,8 @@ fn slice(look: &Look, extent: &Extent, seed: u32, out: &mut Vec<Solid>) {
     let flesh = look.flesh.unwrap_or_else(|| look.main(seed).map(|part| (1.3 * part).min(1.0)));
     let (x, y, z) = (extent.axes.x_axis, extent.axes.y_axis, extent.axes.z_axis);
     let (kind, round) = match extent.shape {
-        Shape::Box => (Kind::Box { missing: 0 }, 0.9),
-        Shape::Cylinder | Shape::Ellipsoid => (Kind::Lathe(CYLINDER), 0.8),
+        Shape::Box => (SolidKind::Box { missing: 0 }, 0.9),
+        Shape::Cylinder | Shape::Ellipsoid => (SolidKind::Lathe(CYLINDER), 0.8),
     };
     let skin = Solid { kind, ..Solid::filling(extent, look.main(seed)) };
     // Round bodies turn about their second axis, which is therefore the slice's x.

@@ -4,26 +4,26 @@ use glam::Vec4;
 
 use super::draw::{dimming, pack};
 use super::raster::{GROUP, Material, Raster, mark, unmark};
-use super::solid::Colour;
+use super::solid::Rgb;
 use crate::domain::Room;
 use crate::house::camera::Camera;
 use crate::house::view::Frame;
 
 /// How the floor of a room looks: two colours in tiles of so many metres, or in planks when `planks`.
-struct Ground {
-    colours: [Colour; 2],
+struct FloorPattern {
+    colours: [Rgb; 2],
     side: f32,
     planks: bool,
 }
 
-fn ground(room: Room) -> Ground {
+fn ground(room: Room) -> FloorPattern {
     let (colours, side, planks) = match room {
         Room::Kitchen => ([[0.80, 0.76, 0.70], [0.70, 0.66, 0.60]], 0.5, false),
         Room::LivingRoom => ([[0.62, 0.45, 0.30], [0.56, 0.40, 0.26]], 0.25, true),
         Room::Bedroom => ([[0.66, 0.52, 0.38], [0.61, 0.47, 0.34]], 0.25, true),
         Room::Bathroom => ([[0.70, 0.76, 0.78], [0.58, 0.65, 0.68]], 0.25, false),
     };
-    Ground { colours, side, planks }
+    FloorPattern { colours, side, planks }
 }
 
 /// Sets every pixel to the floor, the ceiling, or nothing. Heights are in metres of the scene.
@@ -102,12 +102,12 @@ pub fn resolve(raster: &Raster, frame: &mut Frame) {
         }
         let (rgb, rgb_rest) = rgb.as_chunks_mut::<{ 3 * GROUP }>();
         let (ids, ids_rest) = ids.as_chunks_mut::<GROUP>();
-        let mut paint = Paint::of(0, materials[0]);
+        let mut paint = PixelPaint::of(0, materials[0]);
         for ((rgb, ids), shows) in rgb.iter_mut().zip(ids).zip(shows) {
             if shows.cmpeq(Vec4::splat(shows.x)).all() {
                 let number = unmark(shows.x);
                 if number != paint.number {
-                    paint = Paint::of(number, materials[number]);
+                    paint = PixelPaint::of(number, materials[number]);
                 }
                 (*rgb, *ids) = (paint.rgb, paint.ids);
             } else {
@@ -139,14 +139,14 @@ fn packed([a, b, c, d]: [u32; GROUP]) -> [u8; 3 * GROUP] {
 }
 
 /// Four pixels of one material, ready to be copied.
-struct Paint {
+struct PixelPaint {
     number: usize,
     rgb: [u8; 3 * GROUP],
     ids: [u16; GROUP],
 }
 
-impl Paint {
-    fn of(number: usize, material: Material) -> Paint {
-        Paint { number, rgb: packed([material.rgb; GROUP]), ids: [material.id; GROUP] }
+impl PixelPaint {
+    fn of(number: usize, material: Material) -> PixelPaint {
+        PixelPaint { number, rgb: packed([material.rgb; GROUP]), ids: [material.id; GROUP] }
     }
 }

@@ -6,7 +6,7 @@ use crate::domain::class::Shape;
 use crate::house::extent::Extent;
 
 /// A colour before lighting: red, green, blue from 0 to 1.
-pub type Colour = [f32; 3];
+pub type Rgb = [f32; 3];
 
 /// The outline that a round body turns about its y axis: rings of (height, radius) from bottom to top, each from -1 or 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Lathe {
 
 /// What kind of body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum SolidKind {
     /// A box; the bits of `missing` leave out faces (-x, +x, -y, +y, -z, +z from the lowest), and then one looks inside.
     Box {
         /// Which faces are left out.
@@ -35,15 +35,15 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
     /// What kind.
-    pub kind: Kind,
+    pub kind: SolidKind,
     /// Its middle.
     pub centre: Vec3,
     /// Columns: its half axes, at right angles to each other.
     pub axes: Mat3,
     /// Outside.
-    pub colour: Colour,
+    pub colour: Rgb,
     /// Inside, where one can look inside.
-    pub inner: Colour,
+    pub inner: Rgb,
     /// It shines: no shading.
     pub glows: bool,
 }
@@ -53,11 +53,11 @@ pub const CYLINDER: Lathe = Lathe { rings: &[[-1.0, 1.0], [1.0, 1.0]], hollow: f
 
 impl Solid {
     /// A closed body of the given extent in one colour.
-    pub fn filling(extent: &Extent, colour: Colour) -> Solid {
+    pub fn filling(extent: &Extent, colour: Rgb) -> Solid {
         let kind = match extent.shape {
-            Shape::Box => Kind::Box { missing: 0 },
-            Shape::Cylinder => Kind::Lathe(CYLINDER),
-            Shape::Ellipsoid => Kind::Ellipsoid,
+            Shape::Box => SolidKind::Box { missing: 0 },
+            Shape::Cylinder => SolidKind::Lathe(CYLINDER),
+            Shape::Ellipsoid => SolidKind::Ellipsoid,
         };
         Solid { kind, centre: extent.centre, axes: extent.axes, colour, inner: colour.map(|c| 0.6 * c), glows: false }
     }

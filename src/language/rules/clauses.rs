@@ -2,13 +2,13 @@
 
 use rand::Rng;
 
-use super::Telling;
+use super::SummaryBuilder;
 use crate::domain::skill::SkillKind;
 use crate::language::grammar::grammar;
 use crate::language::nouns::{Noun, Number};
-use crate::language::outcome::Outcome;
+use crate::language::outcome::ChainOutcome;
 
-impl Telling<'_> {
+impl SummaryBuilder<'_> {
     /// "rinse a mug in the sink", for what was last done to a thing.
     pub(super) fn change(&self, skill: SkillKind, object: &str, with_place: bool) -> String {
         let (verbs, place): (&[&str], &str) = match skill {
@@ -21,17 +21,17 @@ impl Telling<'_> {
         format!("{verb} {object}{place}")
     }
 
-    pub(super) fn clause(&self, outcome: &Outcome) -> String {
+    pub(super) fn clause(&self, outcome: &ChainOutcome) -> String {
         match outcome {
-            Outcome::Placed { things, content, place } => match (things.as_slice(), content) {
+            ChainOutcome::Placed { things, content, place } => match (things.as_slice(), content) {
                 ([thing], Some(content)) => self.filled(*thing, *content, *place),
                 ([thing], None) => self.placed(*thing, *place),
                 _ => {
                     format!("{} {} {}", self.one_of(&["put", "put", "place"]), self.several(things), self.place(*place))
                 }
             },
-            Outcome::Held { thing, content } => self.held(*thing, *content),
-            Outcome::Cut(thing) => {
+            ChainOutcome::Held { thing, content } => self.held(*thing, *content),
+            ChainOutcome::Cut(thing) => {
                 let verb = self.one_of(&["slice", "slice", "cut", "cut up"]);
                 let tool =
                     self.story.subtasks.iter().map(|step| step.object).find(|&role| self.story.class(role).is_knife());
@@ -40,7 +40,7 @@ impl Telling<'_> {
                     None => format!("{verb} {}", self.thing(*thing, &[])),
                 }
             }
-            Outcome::Lit { lamp, held } => self.lit(*lamp, *held),
+            ChainOutcome::Lit { lamp, held } => self.lit(*lamp, *held),
         }
     }
 

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::nouns::Noun;
-use super::outcome::{Outcome, outcomes};
+use super::outcome::{ChainOutcome, outcomes};
 use super::passage::{Passage, Summarizer};
 use super::story::Story;
 use crate::domain::skill::SkillKind;
@@ -40,8 +40,8 @@ pub fn summary(passage: &Passage<'_>) -> String {
     let digest = u64::from_str_radix(&passage.digest(), 16).unwrap_or_default();
     // Each manner is shorter than the one before.
     let mut sentence = String::new();
-    for manner in [Manner::Full, Manner::Plain, Manner::Last] {
-        let telling = Telling::new(passage, manner, ChaCha8Rng::seed_from_u64(digest));
+    for manner in [DetailLevel::Full, DetailLevel::Plain, DetailLevel::Last] {
+        let telling = SummaryBuilder::new(passage, manner, ChaCha8Rng::seed_from_u64(digest));
         sentence = finish(&telling.tell());
         if sentence.split(' ').count() <= LONGEST {
             break;
@@ -52,7 +52,7 @@ pub fn summary(passage: &Passage<'_>) -> String {
 
 /// How much is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Manner {
+enum DetailLevel {
     Full,
     /// Without words of looks.
     Plain,
@@ -60,17 +60,17 @@ enum Manner {
     Last,
 }
 
-struct Telling<'a> {
+struct SummaryBuilder<'a> {
     story: Story<'a>,
     nouns: Vec<Noun>,
-    manner: Manner,
+    manner: DetailLevel,
     rng: RefCell<ChaCha8Rng>,
 }
 
-impl<'a> Telling<'a> {
-    fn new(passage: &Passage<'a>, manner: Manner, rng: ChaCha8Rng) -> Telling<'a> {
+impl<'a> SummaryBuilder<'a> {
+    fn new(passage: &Passage<'a>, manner: DetailLevel, rng: ChaCha8Rng) -> SummaryBuilder<'a> {
         let story = Story { roles: passage.roles, subtasks: passage.subtasks, origins: &[] };
-        let mut telling = Telling { story, nouns: Vec::new(), manner, rng: RefCell::new(rng) };
+        let mut telling = SummaryBuilder { story, nouns: Vec::new(), manner, rng: RefCell::new(rng) };
         telling.nouns = (0..passage.roles.len() as u8).map(|role| telling.noun(passage, role)).collect();
         telling
     }
@@ -95,9 +95,9 @@ impl<'a> Telling<'a> {
     }
 
     /// The knife that cut is put somewhere: nobody mentions that, unless it is all that is left to say.
-    fn is_aside(&self, outcome: &Outcome) -> bool {
+    fn is_aside(&self, outcome: &ChainOutcome) -> bool {
         match outcome {
-            Outcome::Placed { things, .. } => {
+            ChainOutcome::Placed { things, .. } => {
                 self.cuts() && things.iter().all(|&thing| self.story.class(thing).is_knife())
             }
             _ => false,
@@ -111,7 +111,7 @@ impl<'a> Telling<'a> {
         told.retain(|outcome| {
             position += 1;
             position > last
-                || self.manner != Manner::Last && (!self.is_aside(outcome) || last == 1 && self.chance(0.15))
+                || self.manner != DetailLevel::Last && (!self.is_aside(outcome) || last == 1 && self.chance(0.15))
         });
         let mut clauses: Vec<String> = Vec::new();
         for (number, outcome) in told.iter().enumerate() {

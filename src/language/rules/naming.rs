@@ -1,11 +1,11 @@
 //! What things and places are called: the annotator's nouns, and what was done to a thing as adjectives.
 
-use super::{Manner, Telling};
+use super::{DetailLevel, SummaryBuilder};
 use crate::domain::skill::SkillKind;
 use crate::language::nouns::{Noun, Number};
 use crate::language::passage::Passage;
 
-impl Telling<'_> {
+impl SummaryBuilder<'_> {
     /// What the annotator calls a role: mostly as first named, at times as named later.
     pub(super) fn noun(&self, passage: &Passage<'_>, role: u8) -> Noun {
         let class = self.story.class(role);
@@ -19,7 +19,7 @@ impl Telling<'_> {
         let later = found.flatten().next();
         let chosen = if self.chance(0.3) { later.or(first) } else { first };
         let mut noun = chosen.unwrap_or_else(|| Noun::usual(class));
-        if self.manner != Manner::Full || self.chance(0.35) {
+        if self.manner != DetailLevel::Full || self.chance(0.35) {
             noun.modifiers.clear();
         }
         if self.story.is_slice(role) {

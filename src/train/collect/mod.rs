@@ -18,7 +18,7 @@ use self::demonstration::{Demonstration, own_words, phrasings};
 pub use self::demonstration::{Demonstrator, Manner};
 use super::metrics::{Report, Scalars};
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
-use crate::data::dataset::{Counts, Manifest, Writer};
+use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter};
 use crate::data::ensure_free;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Task, Trajectory};
@@ -88,7 +88,7 @@ impl Collection {
             scenes.check(tasks)?;
         }
         ensure_free::check(&self.out)?;
-        let mut writer = Writer::new(&self.out)?;
+        let mut writer = DatasetWriter::new(&self.out)?;
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();
         let (mut next, mut stopped) = (0u64, false);
@@ -115,8 +115,8 @@ impl Collection {
             }
             report.step(&Scalars::new("episodes", self.source.done(next, &counts), self.source.most() as u64))?;
         }
-        writer.finish(&Manifest {
-            format_version: Manifest::FORMAT,
+        writer.finish(&DatasetManifest {
+            format_version: DatasetManifest::FORMAT,
             source: self.source.name().into(),
             counts: [("train".to_string(), counts)].into(),
             scenes: scenes.len() as u64,
@@ -127,7 +127,12 @@ impl Collection {
     }
 
     /// Writes a scene that comes from a file beside the trajectories, once.
-    fn keep_scene(&self, reference: &SceneRef, writer: &Writer, kept: &mut BTreeSet<String>) -> anyhow::Result<()> {
+    fn keep_scene(
+        &self,
+        reference: &SceneRef,
+        writer: &DatasetWriter,
+        kept: &mut BTreeSet<String>,
+    ) -> anyhow::Result<()> {
         if let (SceneRef::Named(name), Source::Tasks { scenes, .. }) = (reference, &self.source)
             && kept.insert(name.clone())
         {

@@ -28,7 +28,7 @@ use crate::agent::logit_adjustment::LogitAdjustment;
 use crate::algo::chain::PairSource;
 use crate::data::dataset::Dataset;
 use crate::data::features::Features;
-use crate::data::items::{Items, Source};
+use crate::data::items::{ItemSource, Items};
 use crate::data::selection::Composites;
 use crate::data::summaries::Summaries;
 use crate::language::vocabulary::Vocabulary;
@@ -103,7 +103,7 @@ impl Pretraining {
             return Ok(Trained::Stopped);
         };
         let summaries = self.summaries()?;
-        let source = Source {
+        let source = ItemSource {
             trajectories: &frame_store.trajectories,
             apart: &frame_store.kept_apart(self.preset.hold_out),
             held_out: &frame_store.held_out,

@@ -11,7 +11,7 @@ use super::super::render::Renderer;
 use super::super::session::House;
 use super::super::view::{self, REACH, View};
 use super::super::{placing, rules};
-use super::paths::{Floor, Paths};
+use super::paths::{Paths, WalkableCells};
 use super::plan::Aim;
 use crate::domain::world::Instance;
 use crate::domain::{Action, Cell, Heading, Pose, Scene, World};
@@ -27,7 +27,7 @@ const RIVAL: f32 = 4.0;
 
 /// A pose from which an aim may be carried out.
 #[derive(Clone, Copy, Debug)]
-pub struct Stand {
+pub struct InteractionPose {
     /// Which aim, by position.
     pub aim: usize,
     /// The number of the pose's cell.
@@ -42,7 +42,7 @@ pub struct Stand {
 type Hidden = HashSet<(usize, usize)>;
 
 /// How a pose serves an aim.
-enum Sight {
+enum Visibility {
     /// The target is the one that the action would choose by its class; with so many pixels.
     Good(u32),
     /// The target is seen, but something nearer of its class would be chosen.
@@ -54,26 +54,26 @@ enum Sight {
 }
 
 /// Draws what would be seen from poses, and remembers it while nothing but the agent moves.
-pub struct Scout {
+pub struct PoseSearch {
     renderer: Renderer,
     world: World,
     views: HashMap<Pose, View>,
 }
 
-impl Default for Scout {
-    fn default() -> Scout {
-        Scout::new()
+impl Default for PoseSearch {
+    fn default() -> PoseSearch {
+        PoseSearch::new()
     }
 }
 
-impl Scout {
-    /// A scout that has seen nothing.
-    pub fn new() -> Scout {
-        Scout { renderer: Renderer::new(House::FRAME), world: World::default(), views: HashMap::new() }
+impl PoseSearch {
+    /// A search that has drawn nothing.
+    pub fn new() -> PoseSearch {
+        PoseSearch { renderer: Renderer::new(House::FRAME), world: World::default(), views: HashMap::new() }
     }
 
-    /// Turns to a world; what was seen of another one is forgotten. Where the agent stands does not matter.
-    pub fn visit(&mut self, world: &World, same_scene: bool) {
+    /// Searches in `world`; views of another one are dropped. Where the agent stands does not matter.
+    pub fn set_world(&mut self, world: &World, same_scene: bool) {
         let known = &self.world;
         let same = known.objects == world.objects && known.fixtures == world.fixtures && known.held == world.held;
         if !(same && same_scene) {
@@ -82,20 +82,20 @@ impl Scout {
         }
     }
 
-    fn sight(&mut self, scene: &Scene, pose: Pose, aim: &Aim) -> Sight {
+    fn sight(&mut self, scene: &Scene, pose: Pose, aim: &Aim) -> Visibility {
         self.world.agent = pose;
         let world = &self.world;
         let action = |instance| Action::interact(aim.kind, instance);
         if rules::check(scene, world, action(aim.target)).is_err() {
-            return Sight::Forbidden;
+            return Visibility::Forbidden;
         }
         let view = match self.views.entry(pose) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::hash_map::Entry::Vacant(entry) => entry.insert(self.renderer.look(scene, world)),
         };
-        let Some(sighting) = view.sighting(aim.target).copied() else { return Sight::Unseen };
+        let Some(sighting) = view.sighting(aim.target).copied() else { return Visibility::Unseen };
         if view::reachable(scene, world, view, aim.target).is_err() {
-            return Sight::Unseen;
+            return Visibility::Unseen;
         }
         let class = world.class_of(scene, aim.target);
         let near = view::nearness(scene, world, aim.target);
@@ -106,18 +106,18 @@ impl Scout {
                 && view::reachable(scene, world, view, other.instance).is_ok()
                 && rules::check(scene, world, action(other.instance)).is_ok()
         });
-        if rivalled { Sight::Rivalled } else { Sight::Good(sighting.pixels) }
+        if rivalled { Visibility::Rivalled } else { Visibility::Good(sighting.pixels) }
     }
 
-    /// The best stand for any of the aims, no further than `limit` steps away if one is given.
+    /// The best pose for any of the aims, no further than `limit` steps away if one is given.
     pub fn find(
         &mut self,
         scene: &Scene,
-        floor: &Floor,
+        floor: &WalkableCells,
         paths: &Paths,
         aims: &[Aim],
         limit: Option<u32>,
-    ) -> Option<Stand> {
+    ) -> Option<InteractionPose> {
         let mut stands = Vec::new();
         for (index, aim) in aims.iter().enumerate() {
             propose(scene, &self.world, floor, paths, (index, aim), limit, &mut stands);
@@ -142,28 +142,34 @@ impl Scout {
             return Some(stand);
         }
         let mut rest = all.into_iter().filter(|stand| !hidden.contains(&(stand.aim, stand.cell)));
-        rest.find(|stand| matches!(self.sight(scene, stand.pose, &aims[stand.aim]), Sight::Rivalled))
+        rest.find(|stand| matches!(self.sight(scene, stand.pose, &aims[stand.aim]), Visibility::Rivalled))
     }
 
     /// The first stand from which its target is well seen, or else the first from which it is seen at all.
-    fn first_good(&mut self, scene: &Scene, aims: &[Aim], stands: &[Stand], hidden: &mut Hidden) -> Option<Stand> {
-        let mut poor: Option<(Stand, u32)> = None;
+    fn first_good(
+        &mut self,
+        scene: &Scene,
+        aims: &[Aim],
+        stands: &[InteractionPose],
+        hidden: &mut Hidden,
+    ) -> Option<InteractionPose> {
+        let mut poor: Option<(InteractionPose, u32)> = None;
         let mut patience = PATIENCE;
         for &stand in stands {
             if hidden.contains(&(stand.aim, stand.cell)) {
                 continue;
             }
             match self.sight(scene, stand.pose, &aims[stand.aim]) {
-                Sight::Good(pixels) if pixels >= WELL_SEEN => return Some(stand),
-                Sight::Good(pixels) => {
+                Visibility::Good(pixels) if pixels >= WELL_SEEN => return Some(stand),
+                Visibility::Good(pixels) => {
                     if poor.is_none_or(|(_, fewer)| pixels > 2 * fewer) {
                         poor = Some((stand, pixels));
                     }
                 }
-                Sight::Unseen => {
+                Visibility::Unseen => {
                     hidden.insert((stand.aim, stand.cell));
                 }
-                Sight::Rivalled | Sight::Forbidden => {}
+                Visibility::Rivalled | Visibility::Forbidden => {}
             }
             if poor.is_some() {
                 patience -= 1;
@@ -184,11 +190,11 @@ fn horizons() -> impl Iterator<Item = i16> {
 fn propose(
     scene: &Scene,
     world: &World,
-    floor: &Floor,
+    floor: &WalkableCells,
     paths: &Paths,
     (index, aim): (usize, &Aim),
     limit: Option<u32>,
-    stands: &mut Vec<Stand>,
+    stands: &mut Vec<InteractionPose>,
 ) {
     let class = world.class_of(scene, aim.target);
     let rivals: Vec<Instance> = world
@@ -234,7 +240,7 @@ fn propose(
                 if hint == Some(pose) {
                     score -= 0.5;
                 }
-                stands.push(Stand { aim: index, cell: number, pose, score });
+                stands.push(InteractionPose { aim: index, cell: number, pose, score });
             }
         }
     }
@@ -244,10 +250,10 @@ fn propose(
 fn every_pose(
     scene: &Scene,
     world: &World,
-    floor: &Floor,
+    floor: &WalkableCells,
     paths: &Paths,
     (index, aim): (usize, &Aim),
-    stands: &mut Vec<Stand>,
+    stands: &mut Vec<InteractionPose>,
 ) {
     for (number, &cell) in floor.cells().iter().enumerate() {
         if view::distance_from(scene, world, cell, aim.target).is_none_or(|away| away > REACH) {
@@ -262,7 +268,7 @@ fn every_pose(
                 }
                 let looks = (horizon - paths.start().horizon).unsigned_abs() / Pose::LOOK.unsigned_abs();
                 let score = (steps + u32::from(looks) + aim.toll) as f32;
-                stands.push(Stand { aim: index, cell: number, pose, score });
+                stands.push(InteractionPose { aim: index, cell: number, pose, score });
             }
         }
     }

@@ -56,8 +56,8 @@ impl Figure {
 
 /// The bodies of a scene and of the world in it.
 #[derive(Default)]
-pub struct Cast {
-    known: Option<Known>,
+pub struct SceneBodies {
+    known: Option<SceneGeometry>,
     states: Vec<FixtureState>,
     objects: Vec<Object>,
     /// The walls.
@@ -70,7 +70,7 @@ pub struct Cast {
 
 /// The parts of a scene that its bodies follow from.
 #[derive(PartialEq)]
-struct Known {
+struct SceneGeometry {
     room: Room,
     agent_y: i32,
     fixtures: Vec<Fixture>,
@@ -78,7 +78,7 @@ struct Known {
     meshes: Vec<Mesh>,
 }
 
-impl Known {
+impl SceneGeometry {
     fn is(&self, scene: &Scene) -> bool {
         self.room == scene.room
             && self.agent_y == scene.agent_y
@@ -88,12 +88,12 @@ impl Known {
     }
 }
 
-impl Cast {
+impl SceneBodies {
     /// Brings the bodies up to date. The result depends on the scene and the world only.
-    pub fn follow(&mut self, scene: &Scene, world: &World) {
+    pub fn update(&mut self, scene: &Scene, world: &World) {
         if !self.known.as_ref().is_some_and(|known| known.is(scene)) {
-            *self = Cast {
-                known: Some(Known {
+            *self = SceneBodies {
+                known: Some(SceneGeometry {
                     room: scene.room,
                     agent_y: scene.agent_y,
                     fixtures: scene.fixtures.clone(),
@@ -101,7 +101,7 @@ impl Cast {
                     meshes: scene.meshes.clone(),
                 }),
                 walls: Figure::of(walls(scene)),
-                ..Cast::default()
+                ..SceneBodies::default()
             };
         }
         self.follow_fixtures(scene, &world.fixtures);
