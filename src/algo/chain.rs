@@ -8,7 +8,7 @@ use tch::Tensor;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chaining {
-    /// Where pairs come from.
+    /// Drawn from the batch, or from a pool.
     pub pairs: PairSource,
     /// Pairs in a step; the paper's is the batch.
     pub batch: usize,
@@ -77,7 +77,7 @@ pub enum Bootstrap {
 /// A transition's reward and whether it ends the episode, both `[n]`.
 #[derive(Debug)]
 pub struct RewardDone {
-    /// r.
+    /// r, 0 to 1.
     pub reward: Tensor,
     /// d, 0 or 1.
     pub terminal: Tensor,

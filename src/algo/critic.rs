@@ -12,7 +12,7 @@ use super::loss_terms::LossTerms;
 use crate::nets::critic::{Critic, CriticValues};
 use crate::nets::weights::{self, Tensors};
 
-/// The critic under training.
+/// Twin Q and V, their target and their optimiser.
 pub struct CriticLearner<'a> {
     online: &'a Critic,
     target: &'a Critic,
@@ -109,13 +109,13 @@ pub(super) struct CriticBatch {
 }
 
 impl CriticBatch {
-    /// The loss of V.
+    /// Expectile regression of V towards Q̄.
     pub fn v_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
         let loss = iql::value_loss(&self.values.value, &self.target_q, self.expectile);
         self.averaged("value_loss", &loss, segments, terms)
     }
 
-    /// The loss of both Q.
+    /// Squared error of both Q to r + (1 − d) γ V(s′).
     pub fn q_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
         let [one, other] = [0, 1].map(|k| iql::q_loss(&self.values.q[k], &self.q_target));
         self.averaged("q_loss", &(one + other), segments, terms)

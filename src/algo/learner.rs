@@ -9,7 +9,7 @@ use super::adamw::{AdamW, AdamWConfig};
 use super::schedule::Schedule;
 use crate::nets::weights::{self, TensorSpec, Tensors};
 
-/// How weights are optimised.
+/// Length, batch size and optimiser of a training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Optimisation {
@@ -51,7 +51,7 @@ impl Optimisation {
     }
 }
 
-/// Weights under training.
+/// The weights of a store with their AdamW.
 pub struct Learner<'a> {
     store: &'a nn::VarStore,
     optimiser: AdamW,

@@ -38,7 +38,7 @@ pub struct Counts {
 pub struct Skipped {
     /// The file, relative to what was imported.
     pub file: String,
-    /// Why.
+    /// What was wrong with it.
     pub reason: String,
 }
 
@@ -50,7 +50,7 @@ pub struct DatasetManifest {
     pub format_version: u32,
     /// Where it came from: `alfred`, `generated`.
     pub source: String,
-    /// By split.
+    /// Counts by split.
     pub counts: BTreeMap<String, Counts>,
     /// How many scenes there are.
     pub scenes: u64,
@@ -109,7 +109,7 @@ impl Dataset {
         &self.manifest
     }
 
-    /// The folder.
+    /// Where it lies.
     pub fn folder(&self) -> &Path {
         &self.folder
     }

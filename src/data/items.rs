@@ -16,14 +16,14 @@ use crate::domain::{ActionType, Trajectory};
 use crate::language::instruction::normalise;
 use crate::language::passage::{Passage, concatenated};
 
-/// One frame's label.
+/// What a policy should do at a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ActionLabel {
     /// Position in the action head.
     pub action: u8,
     /// Position in the object head; 0 for navigation.
     pub object: u8,
-    /// Whether it was done and led to the next frame; otherwise it is what would have been right.
+    /// Whether it was executed and led to the next frame; otherwise it is a correction.
     pub taken: bool,
 }
 
@@ -94,7 +94,7 @@ pub struct Item {
     pub frame: u32,
     /// The frame after the span's last step: the transition into it is rewarded and ends the span.
     pub end: u32,
-    /// The text.
+    /// Position in [`Items::texts`].
     pub text: u32,
 }
 

@@ -15,7 +15,7 @@ const LARGEST: u64 = 1 << 30;
 
 /// A file as it was read, with the fingerprint of its bytes.
 pub struct Document<T> {
-    /// What it says.
+    /// The parsed document.
     pub value: T,
     /// SHA-256 of the bytes, in hexadecimal.
     pub digest: String,

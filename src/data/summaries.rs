@@ -20,7 +20,7 @@ pub struct SpanSummary {
     pub annotator: u32,
     /// The span's first skill, and the one after its last.
     pub skills: [u8; 2],
-    /// The label.
+    /// The summary, as an instruction.
     pub text: String,
     /// Who made it: `rules`, `concat`, a model.
     pub source: String,

@@ -94,7 +94,7 @@ pub struct Action {
 }
 
 impl Action {
-    /// A navigation action.
+    /// An action without a target.
     pub fn navigate(kind: ActionType) -> Action {
         Action { kind, target: None }
     }

@@ -77,7 +77,7 @@ pub struct Surface {
 pub struct Fixture {
     /// A name that is unique in the scene: ALFRED's object id, or the generator's.
     pub id: String,
-    /// Its class.
+    /// A class that cannot be picked up.
     pub class: Class,
     /// The pivot, from which distances are measured.
     pub pivot: Point,
@@ -98,7 +98,7 @@ pub struct Fixture {
 pub struct Mesh {
     /// ALFRED's `objectName`.
     pub name: String,
-    /// Its shape.
+    /// The body that stands for the mesh.
     pub shape: Shape,
     /// Width, height, depth.
     pub size: [i32; 3],
@@ -114,7 +114,7 @@ pub struct Scene {
     pub format_version: u32,
     /// `FloorPlan7`, or `kitchen-42` for a generated one.
     pub name: String,
-    /// The kind of room.
+    /// Decides floor pattern, and which tasks are asked.
     pub room: Room,
     /// The agent's y in millimetres: 900 above the floor, 675 below the camera.
     pub agent_y: i32,
@@ -122,7 +122,7 @@ pub struct Scene {
     pub cells: Vec<Cell>,
     /// The fixed furniture.
     pub fixtures: Vec<Fixture>,
-    /// The walls.
+    /// The walls' bodies, floor to ceiling.
     pub walls: Vec<Cuboid>,
     /// Shapes of meshes that were measured in this scene.
     #[serde(default)]

@@ -27,12 +27,12 @@ impl House {
         House { scene, world, renderer: Renderer::new(House::FRAME), view: None, drawn: false }
     }
 
-    /// The floor plan.
+    /// The floor plan, which no action changes.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// The present state.
+    /// The state after the last step.
     pub fn world(&self) -> &World {
         &self.world
     }

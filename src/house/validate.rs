@@ -23,12 +23,12 @@ pub const MOST_FIXTURES: usize = 4_000;
 pub struct Misfit {
     /// The path of the field, as in the file: `objects[3].parent`.
     pub field: String,
-    /// What is wrong with it.
+    /// The message, without the field.
     pub problem: String,
 }
 
 impl Misfit {
-    /// A misfit of that field.
+    /// `field` as a path, such as `fixtures[3].body[0]`.
     pub fn new(field: impl Into<String>, problem: impl Into<String>) -> Misfit {
         Misfit { field: field.into(), problem: problem.into() }
     }

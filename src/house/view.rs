@@ -46,7 +46,7 @@ pub fn decode(code: u16) -> Option<Instance> {
 /// An instance in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sighting {
-    /// What is seen.
+    /// The thing whose pixels these are.
     pub instance: Instance,
     /// How many pixels show it.
     pub pixels: u32,
@@ -57,7 +57,7 @@ pub struct Sighting {
 /// Everything in a frame that counts as seen, in the order of instances.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// The sightings.
+    /// One for each instance with a pixel.
     pub sightings: Vec<Sighting>,
 }
 
@@ -144,18 +144,18 @@ pub fn reachable(scene: &Scene, world: &World, view: &View, instance: Instance) 
 /// An interaction that is possible now.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// What would be done.
+    /// The interaction.
     pub kind: ActionType,
-    /// To what.
+    /// Its target.
     pub instance: Instance,
-    /// Its class.
+    /// The target's class, by which a policy chooses it.
     pub class: Class,
     /// From the agent's own point to its pivot, in millimetres.
     pub distance: f32,
 }
 
 impl Candidate {
-    /// The action.
+    /// As the house takes it.
     pub fn action(&self) -> Action {
         Action::interact(self.kind, self.instance)
     }

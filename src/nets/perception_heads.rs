@@ -1,4 +1,4 @@
-//! What the visual encoder is trained by: heads that read marks, depth and the held class off a feature map.
+//! The visual encoder's training heads: classes and states of each place (marks), depth, and the held class.
 
 use tch::nn::{self, Module};
 use tch::{Kind, Reduction, Tensor};
@@ -26,7 +26,7 @@ pub struct PerceptionLoss {
 }
 
 impl PerceptionLoss {
-    /// All together.
+    /// The sum, unweighted.
     pub fn total(&self) -> Tensor {
         &self.marks + &self.depth + &self.held
     }

@@ -111,7 +111,7 @@ impl PolicyNet {
         }
     }
 
-    /// Its size.
+    /// The size that it was built with.
     pub fn spec(&self) -> &PolicySpec {
         &self.spec
     }

@@ -11,7 +11,7 @@ use super::visual::SIDE;
 /// The convolutions of a trunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Convolutions<'a> {
-    /// Their channels.
+    /// Output channels of each.
     pub channels: &'a [i64; 4],
     /// Whether the second one reads every other place, so that those after it see 4 x 4 places instead of 7 x 7.
     pub halved: bool,
@@ -67,7 +67,7 @@ impl Trunk {
         Trunk { stages, width: from * convolutions.side().pow(2) }
     }
 
-    /// How many numbers come out.
+    /// Features of an item.
     pub fn width(&self) -> i64 {
         self.width
     }
@@ -106,7 +106,7 @@ impl DenseLayers {
         DenseLayers { layers, dropout, width }
     }
 
-    /// How many numbers come out.
+    /// Features of an item.
     pub fn width(&self) -> i64 {
         self.width
     }

@@ -127,12 +127,12 @@ impl HouseEncoder {
         }
     }
 
-    /// Its size.
+    /// The size that it was built with.
     pub fn spec(&self) -> &VisualSpec {
         &self.spec
     }
 
-    /// Where it computes.
+    /// The device of its weights.
     pub fn device(&self) -> Device {
         self.device
     }

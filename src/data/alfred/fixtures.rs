@@ -19,9 +19,9 @@ pub const ROUNDING: f32 = 11.0;
 /// A recorded use of a fixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Use {
-    /// What was done.
+    /// The interaction.
     pub kind: ActionType,
-    /// From where.
+    /// The agent's pose before it.
     pub pose: Pose,
     /// Its box in the frame before it.
     pub bounds: Option<[u16; 4]>,

@@ -11,7 +11,7 @@ pub enum MeasuredHeight {
     Floor(i32),
 }
 
-/// How a fixture's body comes about.
+/// How a fixture's body is constructed from its surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyKind {
     /// From the floor to the surface: tables, counters, beds.
@@ -37,7 +37,7 @@ pub enum BodyKind {
 pub struct Furniture {
     /// ALFRED's name of the class.
     pub class: &'static str,
-    /// How its body comes about.
+    /// The construction of its body.
     pub build: BodyKind,
     /// The heights of its surfaces.
     pub supports: &'static [MeasuredHeight],

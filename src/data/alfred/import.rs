@@ -34,16 +34,16 @@ pub enum ImportProgress {
     Writing(u64, u64),
 }
 
-/// What became of an official task set.
+/// The result for one official task set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SetBuilt {
-    /// Its name.
+    /// As reports call it.
     pub name: &'static str,
     /// How many tasks it has, or why it was left out.
     pub tasks: Result<usize, String>,
 }
 
-/// What an import came to.
+/// The result of an import.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportSummary {
     /// What was written.

@@ -24,14 +24,14 @@ pub struct Official {
     pub list: &'static str,
 }
 
-/// The three sets.
+/// The paper's three task sets.
 pub const OFFICIAL: [Official; 3] = [
     Official { name: "EVAL_100", file: "eval_100", list: "eval_instruct_ann_human.json" },
     Official { name: "EVAL_CHAIN", file: "eval_chain", list: "eval_length_ann_human.json" },
     Official { name: "EVAL_UNSEEN", file: "eval_unseen", list: "eval_scene_ann_human.json" },
 ];
 
-/// Which text tells the agent what to do.
+/// Where the task's instruction comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum TaskText {
     /// The annotator's sentence for the whole trajectory.

@@ -28,11 +28,11 @@ const RIVAL: f32 = 4.0;
 /// A pose from which an aim may be carried out.
 #[derive(Clone, Copy, Debug)]
 pub struct InteractionPose {
-    /// Which aim, by position.
+    /// Position of the aim among those asked for.
     pub aim: usize,
     /// The number of the pose's cell.
     pub cell: usize,
-    /// The pose.
+    /// Where to stand and look.
     pub pose: Pose,
     /// Steps to it, plus what speaks against it in steps.
     pub score: f32,

@@ -15,9 +15,9 @@ use crate::domain::{Action, ActionType, Scene, World};
 /// An interaction that would bring a subtask forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Aim {
-    /// What to do.
+    /// The interaction.
     pub kind: ActionType,
-    /// To what.
+    /// What it acts on.
     pub target: Instance,
     /// What comes next, and should be in view already.
     pub then: Option<Instance>,

@@ -39,7 +39,7 @@ impl std::str::FromStr for Grading {
     }
 }
 
-/// Follows a task's subtasks.
+/// How far a task is, and which instances play its roles.
 #[derive(Clone, Debug)]
 pub struct Grader {
     pub(super) grading: Grading,
@@ -144,7 +144,7 @@ impl Grader {
         self.subtasks.get(self.completed)
     }
 
-    /// The roles.
+    /// The task's roles; subtasks name them by position.
     pub fn roles(&self) -> &[Role] {
         &self.roles
     }
@@ -154,7 +154,7 @@ impl Grader {
         self.bindings.get(usize::from(role)).copied().flatten()
     }
 
-    /// How subtasks are graded.
+    /// By class, or strictly.
     pub fn grading(&self) -> Grading {
         self.grading
     }

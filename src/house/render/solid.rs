@@ -17,7 +17,7 @@ pub struct Lathe {
     pub hollow: bool,
 }
 
-/// What kind of body.
+/// The body's surface in its own frame, from -1 to 1 along each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SolidKind {
     /// A box; the bits of `missing` leave out faces (-x, +x, -y, +y, -z, +z from the lowest), and then one looks inside.
@@ -34,15 +34,15 @@ pub enum SolidKind {
 /// A body in space. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// What kind.
+    /// The surface that is stretched along the axes.
     pub kind: SolidKind,
     /// Its middle.
     pub centre: Vec3,
     /// Columns: its half axes, at right angles to each other.
     pub axes: Mat3,
-    /// Outside.
+    /// The colour outside.
     pub colour: Rgb,
-    /// Inside, where one can look inside.
+    /// The colour inside, where one can look inside.
     pub inner: Rgb,
     /// It shines: no shading.
     pub glows: bool,
