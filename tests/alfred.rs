@@ -58,7 +58,7 @@ fn the_train_split_has_as_many_spans_as_are_known_of_it() {
     let held_out: Vec<String> = chain.iter().map(|entry| entry.trajectory().to_owned()).collect();
     assert_eq!(held_out.len(), 20);
     let summaries = Summaries::default();
-    let label = Some(ActionLabel { action: 0, object: 0, taken: true });
+    let label = Some(ActionLabel { action: 0, object: 0, executed: true });
     let of_one = |one: &Trajectory| std::iter::repeat_n(label, one.actions.len()).chain([None]).collect::<Vec<_>>();
     let labels: Vec<Option<ActionLabel>> = trajectories.iter().flat_map(of_one).collect();
     let items = |held_out: &[String]| {

@@ -157,5 +157,5 @@ impl Batch {
 
 /// Observations as the networks take them: [n, channels, 7, 7].
 pub fn network_input(observation: &Tensor, precision: Precision) -> Tensor {
-    precision.shown(&observation.reshape([observation.size()[0], -1, SIDE, SIDE]))
+    precision.cast(&observation.reshape([observation.size()[0], -1, SIDE, SIDE]))
 }

@@ -24,7 +24,7 @@ pub struct ActionLabel {
     /// Position in the object head; 0 for navigation.
     pub object: u8,
     /// Whether it was executed and led to the next frame; otherwise it is a correction.
-    pub taken: bool,
+    pub executed: bool,
 }
 
 /// What items are made of.
@@ -39,7 +39,7 @@ pub struct ItemSource<'a> {
     pub summaries: &'a Summaries,
 }
 
-/// A run of adjacent skills as one annotator tells it.
+/// A run of adjacent skills in one annotator's words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Span {
     /// The trajectory's position.
@@ -101,7 +101,7 @@ pub struct Item {
 impl Items {
     /// All primitives, and the composites that are selected, once for each aligned annotation. Dropped are the wholes that
     /// [`ItemSource::held_out`] names, spans in which nothing has a label, and those of which nothing is said but white space and
-    /// marks. `labels` are those of all frames; without [`DataSelection::corrections`] those not taken are left out.
+    /// marks. `labels` are those of all frames; without [`DataSelection::corrections`] corrections are left out.
     ///
     /// # Errors
     /// When composites should have labels and one has none.
@@ -110,7 +110,7 @@ impl Items {
         labels: Vec<Option<ActionLabel>>,
         selection: &DataSelection,
     ) -> anyhow::Result<Items> {
-        let learned = |label: &ActionLabel| label.taken || selection.corrections;
+        let learned = |label: &ActionLabel| label.executed || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
         let mut items =
             Items { labels, firsts: vec![0], past: selection.past, named: selection.named, ..Items::default() };
@@ -177,7 +177,7 @@ impl Items {
     }
 
     /// The class that the object head learns to name at an item's frame; 0 where there is none.
-    pub fn named_by(&self, item: &Item) -> u8 {
+    pub fn object_target(&self, item: &Item) -> u8 {
         let last = match self.named {
             Named::Own => item.frame + 1,
             Named::Ahead => item.end,
@@ -186,7 +186,7 @@ impl Items {
         labels.iter().flatten().map(|label| label.object).find(|&object| object > 0).unwrap_or(0)
     }
 
-    /// Identifies what is learned and how it is told: the first 16 digits of the sha256 of all spans and texts.
+    /// Identifies what is learned, and under which texts: the first 16 digits of the sha256 of all spans and texts.
     pub fn digest(&self) -> String {
         let mut hash = Sha256::new();
         for span in self.training.iter().chain(&self.held_out) {
@@ -316,7 +316,7 @@ mod tests {
 
     fn labels(trajectories: &[Trajectory]) -> Vec<Option<ActionLabel>> {
         let of = |trajectory: &Trajectory| {
-            let label = Some(ActionLabel { action: 0, object: 0, taken: true });
+            let label = Some(ActionLabel { action: 0, object: 0, executed: true });
             std::iter::repeat_n(label, trajectory.actions.len()).chain([None])
         };
         trajectories.iter().flat_map(of).collect()
@@ -394,7 +394,7 @@ mod tests {
         let one = [trajectory(vec![0, 2], 5)];
         let mut labels = labels(&one);
         labels[..2].fill(None);
-        labels[3] = Some(ActionLabel { action: 0, object: 0, taken: false });
+        labels[3] = Some(ActionLabel { action: 0, object: 0, executed: false });
         let drawn = |corrections| {
             let summaries = Summaries::default();
             let source = ItemSource { trajectories: &one, apart: &[], held_out: &[], summaries: &summaries };
@@ -435,14 +435,14 @@ mod tests {
     fn on_the_way_what_comes_next_is_named_where_the_selection_says_so() {
         let two = [trajectory(vec![0, 3], 5)];
         let mut labels = labels(&two);
-        labels[2] = Some(ActionLabel { action: 5, object: 7, taken: true });
-        labels[4] = Some(ActionLabel { action: 6, object: 9, taken: true });
+        labels[2] = Some(ActionLabel { action: 5, object: 7, executed: true });
+        labels[4] = Some(ActionLabel { action: 6, object: 9, executed: true });
         let named = |named, end| -> Vec<u8> {
             let summaries = Summaries::default();
             let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
             let selection = DataSelection { named, ..DataSelection::of(Composites::None) };
             let items = Items::of(&source, labels.clone(), &selection).unwrap();
-            (0..end).map(|frame| items.named_by(&Item { first: 0, frame, end, text: 0 })).collect()
+            (0..end).map(|frame| items.object_target(&Item { first: 0, frame, end, text: 0 })).collect()
         };
         assert_eq!(named(Named::Own, 5), [0, 0, 7, 0, 9]);
         assert_eq!(named(Named::Ahead, 5), [7, 7, 7, 9, 9]);
@@ -455,7 +455,7 @@ mod tests {
         let summaries = Summaries::default();
         let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
         let mut labels = labels(&two);
-        labels[1] = Some(ActionLabel { action: 5, object: 1, taken: true });
+        labels[1] = Some(ActionLabel { action: 5, object: 1, executed: true });
         labels[2] = None;
         let items = Items::of(&source, labels, &DataSelection::of(Composites::None)).unwrap();
         let shares = items.action_shares();

@@ -1,4 +1,4 @@
-//! What a person typed, as the agent is told it.
+//! Instructions: typed text in the form that agents are trained on.
 
 /// The longest instruction that is accepted, in characters; a sentence encoder reads some 1,000 at most.
 pub const LONGEST: usize = 2_000;
@@ -25,7 +25,7 @@ pub enum InstructionError {
     },
 }
 
-/// Brings a text into the form in which the paper's agents are told it: trimmed, lower case, single spaces, ending in a full
+/// Brings a text into the form of the paper's instructions: trimmed, lower case, single spaces, ending in a full
 /// stop unless it ends in one of `.?!`, with a capital first letter. Control and invisible formatting characters are dropped.
 /// Empty text stays empty. Applying it twice changes nothing more.
 pub fn normalise(text: &str) -> String {

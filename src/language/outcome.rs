@@ -67,7 +67,7 @@ fn put(story: &Story<'_>, found: &mut Vec<ChainOutcome>, thing: u8, place: u8) {
     found.push(ChainOutcome::Placed { things, content, place });
 }
 
-/// What was last put into a thing; from then on it is told with the thing, and a knife that also lies there is not told.
+/// What was last put into a thing; from then on it is mentioned with the thing, and a knife that also lies there is not.
 fn take_content(found: &mut Vec<ChainOutcome>, holder: u8) -> Option<u8> {
     let mut content = None;
     found.retain(|outcome| match outcome {

@@ -19,7 +19,7 @@ pub struct Passage<'a> {
 }
 
 impl<'a> Passage<'a> {
-    /// Some skills of a trajectory as one annotator tells them; nothing when the annotation is not aligned or there are no such skills.
+    /// Some skills of a trajectory in one annotator's words; nothing when the annotation is not aligned or there are no such skills.
     pub fn of(trajectory: &'a Trajectory, annotation: &'a Annotation, skills: Range<usize>) -> Option<Passage<'a>> {
         if annotation.steps.len() != trajectory.skills.len() {
             return None;
@@ -74,8 +74,8 @@ pub struct Concatenation;
 
 /// The sentences one after the other, each brought into the form of an instruction.
 pub fn concatenated(sentences: &[String]) -> String {
-    let told: Vec<String> = sentences.iter().map(|sentence| super::instruction::normalise(sentence)).collect();
-    told.join(" ")
+    let instructions: Vec<String> = sentences.iter().map(|sentence| super::instruction::normalise(sentence)).collect();
+    instructions.join(" ")
 }
 
 impl Summarizer for Concatenation {
@@ -101,22 +101,22 @@ mod tests {
 
     #[test]
     fn sentences_follow_each_other_as_instructions() {
-        let told = ["pick up the Mug ".to_string(), "Put it down!".to_string()];
-        assert_eq!(concatenated(&told), "Pick up the mug. Put it down!");
+        let texts = ["pick up the Mug ".to_string(), "Put it down!".to_string()];
+        assert_eq!(concatenated(&texts), "Pick up the mug. Put it down!");
     }
 
     #[test]
     fn a_passage_is_identified_by_what_it_says_and_not_by_where_it_stands() {
         let roles = [role("Mug"), role("Desk"), role("Mug"), role("Desk"), role("Shelf")];
-        let told = ["take a mug".to_string(), "put it down".to_string()];
+        let texts = ["take a mug".to_string(), "put it down".to_string()];
         let digest = |object, place| {
             let subtasks = [subtask(SkillKind::Pickup, object), put_subtask(object, place)];
-            Passage { roles: &roles, subtasks: &subtasks, sentences: &told }.digest()
+            Passage { roles: &roles, subtasks: &subtasks, sentences: &texts }.digest()
         };
         assert_eq!(digest(0, 1), digest(2, 3));
         assert_ne!(digest(0, 1), digest(0, 4));
         let subtasks = [subtask(SkillKind::Pickup, 0), put_subtask(2, 1)];
-        let another = Passage { roles: &roles, subtasks: &subtasks, sentences: &told };
+        let another = Passage { roles: &roles, subtasks: &subtasks, sentences: &texts };
         assert_ne!(digest(0, 1), another.digest(), "another mug is put down than was taken");
     }
 

@@ -9,7 +9,7 @@ use super::place_slots::destination_slots;
 use super::story::Story;
 use crate::domain::skill::SkillKind;
 
-/// The chain's outcomes, told together.
+/// The chain's outcomes in one sentence.
 pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
     let outcomes = outcomes(story);
     let mut text = String::new();
@@ -18,12 +18,12 @@ pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
             let joint = if index + 1 == outcomes.len() { "last" } else { "then" };
             text.push_str(&grammar().say(joint, &Slots::new(), rng));
         }
-        text.push_str(&tell(story, outcome, rng));
+        text.push_str(&outcome_clause(story, outcome, rng));
     }
     text
 }
 
-fn tell(story: &Story<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rng) -> String {
+fn outcome_clause(story: &Story<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rng) -> String {
     let mut slots = Slots::new();
     match outcome {
         ChainOutcome::Placed { things, content, place } => {

@@ -26,10 +26,10 @@ pub(super) struct Bert {
 }
 
 impl Bert {
-    /// The forms of the tensors that are used.
-    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
+    /// Names, shapes and types of the tensors that are used.
+    pub(super) fn tensor_specs(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
         let hidden = config.hidden_size;
-        let mut forms = BTreeMap::from([
+        let mut specs = BTreeMap::from([
             ("embeddings.word_embeddings.weight".into(), TensorSpec::float(&[config.vocab_size, hidden])),
             (
                 "embeddings.position_embeddings.weight".into(),
@@ -39,17 +39,19 @@ impl Bert {
             ("embeddings.LayerNorm.weight".into(), TensorSpec::float(&[hidden])),
             ("embeddings.LayerNorm.bias".into(), TensorSpec::float(&[hidden])),
         ]);
-        forms.extend((0..config.num_hidden_layers).flat_map(|n| NAMES.forms(n, hidden, config.intermediate_size)));
-        forms
+        specs.extend(
+            (0..config.num_hidden_layers).flat_map(|n| NAMES.tensor_specs(n, hidden, config.intermediate_size)),
+        );
+        specs
     }
 
-    pub(super) fn take(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Bert> {
+    pub(super) fn load(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Bert> {
         let segments = tensors.tensor("embeddings.token_type_embeddings.weight")?;
         Ok(Bert {
             words: tensors.tensor("embeddings.word_embeddings.weight")?,
             positions: tensors.tensor("embeddings.position_embeddings.weight")? + segments.get(0),
             norm: tensors.norm("embeddings.LayerNorm")?,
-            stack: EncoderStack::take(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
+            stack: EncoderStack::load(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
         })
     }
 

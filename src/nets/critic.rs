@@ -87,7 +87,7 @@ impl QHead {
     fn forward(&self, input: &Tensor, actions: &Tensor, objects: &Tensor, train: bool) -> Tensor {
         let chosen = [self.action.forward(actions), self.object.forward(objects)].map(|x| x.to_kind(input.kind()));
         let joined = Tensor::cat(&[input, &chosen[0], &chosen[1]], 1);
-        precision::answer(&self.out, &self.dense.forward(joined, train)).squeeze_dim(1)
+        precision::linear_f32(&self.out, &self.dense.forward(joined, train)).squeeze_dim(1)
     }
 }
 

@@ -39,7 +39,7 @@ impl LayerNorm {
     }
 }
 
-/// Hands out the tensors of a weights file by name. The file was checked against the model's forms before.
+/// Hands out the tensors of a weights file by name. The file was checked against the model's specifications before.
 pub(super) struct CheckedTensors<'a> {
     pub(super) tensors: &'a Tensors,
     pub(super) epsilon: f64,
@@ -72,8 +72,8 @@ pub(super) struct LayerNames {
 }
 
 impl LayerNames {
-    /// The forms of one layer's tensors, for `hidden` and `inner` units.
-    pub(super) fn forms(&self, layer: i64, hidden: i64, inner: i64) -> Vec<(String, TensorSpec)> {
+    /// The tensors of one layer, for `hidden` and `inner` units.
+    pub(super) fn tensor_specs(&self, layer: i64, hidden: i64, inner: i64) -> Vec<(String, TensorSpec)> {
         let dense = |name: &str, to: i64, from: i64| {
             let name = format!("encoder.layer.{layer}.{name}");
             [
@@ -119,7 +119,7 @@ pub(super) struct EncoderStack {
 }
 
 impl EncoderStack {
-    pub(super) fn take(
+    pub(super) fn load(
         tensors: &CheckedTensors<'_>,
         names: &LayerNames,
         layers: i64,

@@ -138,7 +138,7 @@ impl Episodic {
             self.language.iter().fold(read, |tokens, layer| layer.forward(&tokens, &bias(&present), kind, train));
         let frames = observation.reshape([n * self.history, -1, SIDE, SIDE]);
         let seen =
-            precision::answer(&self.frame, &self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
+            precision::linear_f32(&self.frame, &self.trunk.forward(&frames, None, train)).view([n, self.history, -1]);
         // Frames come after the longest text, so that their places do not depend on the instruction.
         let tokens = Tensor::cat(&[&read, &(&seen + self.places(1000, self.history, words))], 1);
         let mask = Tensor::cat(&[&present, &present.new_ones([n, self.history], (Kind::Float, present.device()))], 1);

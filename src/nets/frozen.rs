@@ -22,7 +22,7 @@ pub trait FrameEncoder: Send {
     fn digest(&self) -> &str;
 
     /// The same encoder for another thread; the weights are shared.
-    fn twin(&self) -> Box<dyn FrameEncoder>;
+    fn share(&self) -> Box<dyn FrameEncoder>;
 }
 
 /// Images of one size as a tensor `[n, 3, side, side]` of bytes, laid out with the channels last: convolutions run faster so.
@@ -85,7 +85,7 @@ impl FoldedConv {
         self.forward(x).relu_()
     }
 
-    pub(super) fn twin(&self) -> FoldedConv {
+    pub(super) fn share(&self) -> FoldedConv {
         FoldedConv { weight: self.weight.shallow_clone(), bias: self.bias.shallow_clone(), ..*self }
     }
 }

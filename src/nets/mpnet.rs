@@ -31,11 +31,11 @@ pub(super) struct Mpnet {
 }
 
 impl Mpnet {
-    /// The forms of the tensors that are used.
-    pub(super) fn forms(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
+    /// Names, shapes and types of the tensors that are used.
+    pub(super) fn tensor_specs(config: &TransformerConfig) -> BTreeMap<String, TensorSpec> {
         let hidden = config.hidden_size;
         let relative = [config.relative_attention_num_buckets, config.num_attention_heads];
-        let mut forms = BTreeMap::from([
+        let mut specs = BTreeMap::from([
             ("embeddings.word_embeddings.weight".into(), TensorSpec::float(&[config.vocab_size, hidden])),
             (
                 "embeddings.position_embeddings.weight".into(),
@@ -45,18 +45,20 @@ impl Mpnet {
             ("embeddings.LayerNorm.bias".into(), TensorSpec::float(&[hidden])),
             ("encoder.relative_attention_bias.weight".into(), TensorSpec::float(&relative)),
         ]);
-        forms.extend((0..config.num_hidden_layers).flat_map(|n| NAMES.forms(n, hidden, config.intermediate_size)));
-        forms
+        specs.extend(
+            (0..config.num_hidden_layers).flat_map(|n| NAMES.tensor_specs(n, hidden, config.intermediate_size)),
+        );
+        specs
     }
 
-    pub(super) fn take(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Mpnet> {
+    pub(super) fn load(tensors: &CheckedTensors<'_>, config: &TransformerConfig) -> anyhow::Result<Mpnet> {
         Ok(Mpnet {
             words: tensors.tensor("embeddings.word_embeddings.weight")?,
             positions: tensors.tensor("embeddings.position_embeddings.weight")?,
             padding: config.padding(),
             norm: tensors.norm("embeddings.LayerNorm")?,
             relative: tensors.tensor("encoder.relative_attention_bias.weight")?,
-            stack: EncoderStack::take(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
+            stack: EncoderStack::load(tensors, &NAMES, config.num_hidden_layers, config.num_attention_heads)?,
         })
     }
 

@@ -127,7 +127,7 @@ impl PolicyNet {
             }
         };
         let x = self.dense.forward(features, train);
-        Logits { actions: precision::answer(&self.actions, &x), objects: precision::answer(&self.objects, &x) }
+        Logits { actions: precision::linear_f32(&self.actions, &x), objects: precision::linear_f32(&self.objects, &x) }
     }
 }
 

@@ -18,7 +18,7 @@ pub enum Precision {
 impl Precision {
     /// `maps` [n, channels, h, w] as a network in training is to see them. Narrow ones lie channel by channel in memory, as the
     /// kernels for them read it.
-    pub fn shown(self, maps: &Tensor) -> Tensor {
+    pub fn cast(self, maps: &Tensor) -> Tensor {
         match self {
             Precision::Full => maps.to_kind(Kind::Float),
             Precision::Mixed => maps.permute([0, 2, 3, 1]).to_kind(Kind::BFloat16).contiguous().permute([0, 3, 1, 2]),
@@ -31,8 +31,8 @@ pub fn linear(layer: &nn::Linear, x: &Tensor) -> Tensor {
     x.linear(&layer.ws.to_kind(x.kind()), layer.bs.as_ref().map(|bias| bias.to_kind(x.kind())))
 }
 
-/// A layer's answer in 32 bits, of `x` of any width.
-pub fn answer(layer: &nn::Linear, x: &Tensor) -> Tensor {
+/// The same in 32 bits, whatever the width of `x`.
+pub fn linear_f32(layer: &nn::Linear, x: &Tensor) -> Tensor {
     linear(layer, &x.to_kind(Kind::Float))
 }
 
@@ -64,8 +64,8 @@ mod tests {
         let layer = nn::linear(store.root() / "layer", 8 * 4 * 4, 5, Default::default());
         let maps = Tensor::rand([3, 6, 7, 7], (Kind::Half, Device::Cpu));
         let [full, mixed] = [Precision::Full, Precision::Mixed].map(|precision| {
-            let x = convolution(&conv, &precision.shown(&maps), 2).flatten(1, -1);
-            (linear(&layer, &x), answer(&layer, &x))
+            let x = convolution(&conv, &precision.cast(&maps), 2).flatten(1, -1);
+            (linear(&layer, &x), linear_f32(&layer, &x))
         });
         assert_eq!([full.0.kind(), mixed.0.kind(), mixed.1.kind()], [Kind::Float, Kind::BFloat16, Kind::Float]);
         assert_eq!(full.0, maps.to_kind(Kind::Float).apply(&conv).flatten(1, -1).apply(&layer), "to the bit");

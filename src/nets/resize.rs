@@ -2,12 +2,12 @@
 
 /// Averages a square image of `from` x `from` pixels, three bytes a pixel, down to `to` x `to`. Planes: all red, then all green,
 /// then all blue, each row-major. Returns nothing but zeros when the image is shorter than its size says.
-pub fn shrink(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
+pub fn resize_area(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
     weighted(rgb, from, to, &areas(from, to))
 }
 
-/// As [`shrink`], with weights that fall off linearly from each target pixel's centre: what image libraries call bilinear.
-pub fn shrink_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
+/// As [`resize_area`], with weights that fall off linearly from each target pixel's centre: what image libraries call bilinear.
+pub fn resize_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
     weighted(rgb, from, to, &triangles(from, to))
 }
 
@@ -82,12 +82,12 @@ mod tests {
     #[test]
     fn an_even_colour_stays_and_a_checkerboard_turns_grey() {
         let even: Vec<u8> = [10, 200, 90].repeat(300 * 300);
-        let small = shrink(&even, 300, 112);
+        let small = resize_area(&even, 300, 112);
         assert_eq!(small.len(), 3 * 112 * 112);
         assert!(small[..112 * 112].iter().all(|&v| v == 10));
         assert!(small[2 * 112 * 112..].iter().all(|&v| v == 90));
         let board: Vec<u8> = (0..4).flat_map(|y| (0..4).flat_map(move |x| [((x + y) % 2) as u8 * 200; 3])).collect();
-        assert!(shrink(&board, 4, 2).iter().all(|&v| v == 100));
+        assert!(resize_area(&board, 4, 2).iter().all(|&v| v == 100));
     }
 
     #[test]
@@ -131,7 +131,7 @@ mod tests {
     fn bilinear_agrees_with_pillow() {
         let rgb: Vec<u8> =
             (0..300 * 300).flat_map(|i| [0, 1, 2].map(|c| ((i % 300) * 3 + (i / 300) * (5 + c) % 251) as u8)).collect();
-        let small = shrink_bilinear(&rgb, 300, 224);
+        let small = resize_bilinear(&rgb, 300, 224);
         // Computed with Pillow 13.0's Image.resize((224, 224), Image.BILINEAR); it rounds twice, so it may differ by 1.
         for ((channel, y, x), expected) in PILLOW {
             let found = small[(channel * 224 + y) * 224 + x];

@@ -7,7 +7,7 @@ use anyhow::Context;
 use tch::{Device, Kind, Tensor};
 
 use super::frozen::{BatchNormParts, FoldedConv, FrameEncoder, stacked};
-use super::resize::shrink_bilinear;
+use super::resize::resize_bilinear;
 use super::weights::{self, TensorSpec, Tensors};
 use crate::house::view::Frame;
 
@@ -122,11 +122,11 @@ impl Block {
         }
     }
 
-    fn twin(&self) -> Block {
+    fn share(&self) -> Block {
         Block {
-            first: self.first.twin(),
-            second: self.second.twin(),
-            shortcut: self.shortcut.as_ref().map(FoldedConv::twin),
+            first: self.first.share(),
+            second: self.second.share(),
+            shortcut: self.shortcut.as_ref().map(FoldedConv::share),
         }
     }
 }
@@ -137,7 +137,7 @@ impl FrameEncoder for ResNet18 {
     }
 
     fn image(&self, frame: &Frame) -> Vec<u8> {
-        shrink_bilinear(&frame.rgb, frame.width, INPUT)
+        resize_bilinear(&frame.rgb, frame.width, INPUT)
     }
 
     fn features(&self) -> i64 {
@@ -157,10 +157,10 @@ impl FrameEncoder for ResNet18 {
         &self.digest
     }
 
-    fn twin(&self) -> Box<dyn FrameEncoder> {
+    fn share(&self) -> Box<dyn FrameEncoder> {
         Box::new(ResNet18 {
-            stem: self.stem.twin(),
-            blocks: self.blocks.iter().map(Block::twin).collect(),
+            stem: self.stem.share(),
+            blocks: self.blocks.iter().map(Block::share).collect(),
             mean: self.mean.shallow_clone(),
             deviation: self.deviation.shallow_clone(),
             device: self.device,
@@ -220,7 +220,7 @@ pub(super) mod tests {
         weights::write(&path, &all, &BTreeMap::new()).unwrap();
         let net = ResNet18::read(&path, Device::Cpu).unwrap();
         let image: Vec<u8> = (0..3 * 224 * 224).map(|i| ((number("image", i) + 0.5) * 256.0) as u8).collect();
-        let maps = net.twin().encode(&[image.clone(), image]);
+        let maps = net.share().encode(&[image.clone(), image]);
         assert_eq!(maps.size(), [2, FEATURES, 7, 7]);
         let flat: Vec<f32> = maps.get(1).flatten(0, -1).try_into().unwrap();
         // torchvision 0.26.0 with torch 2.11.0; every 392nd number of 512 x 7 x 7, see tests/resnet18_expected.py.

@@ -39,12 +39,12 @@ impl Transformer {
         let checked = CheckedTensors { tensors: &tensors, epsilon: config.layer_norm_eps };
         match config.model_type.as_str() {
             "bert" => {
-                weights::check(path, &tensors, &Bert::forms(config))?;
-                Ok(Transformer::Bert(Bert::take(&checked, config)?))
+                weights::check(path, &tensors, &Bert::tensor_specs(config))?;
+                Ok(Transformer::Bert(Bert::load(&checked, config)?))
             }
             "mpnet" => {
-                weights::check(path, &tensors, &Mpnet::forms(config))?;
-                Ok(Transformer::Mpnet(Mpnet::take(&checked, config)?))
+                weights::check(path, &tensors, &Mpnet::tensor_specs(config))?;
+                Ok(Transformer::Mpnet(Mpnet::load(&checked, config)?))
             }
             other => bail!("model_type {other:?} is not supported (bert and mpnet are)"),
         }

@@ -22,6 +22,6 @@ impl ValueHead {
 
     /// `input` [n, from] to `[n]`.
     pub fn forward(&self, input: &Tensor, train: bool) -> Tensor {
-        precision::answer(&self.out, &self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
+        precision::linear_f32(&self.out, &self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
     }
 }

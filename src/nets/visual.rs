@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::bounds;
 use super::frozen::{BatchNormParts, FoldedConv, FrameEncoder, stacked};
 use super::precision::{self, Precision};
-use super::resize::shrink;
+use super::resize::resize_area;
 use super::weights;
 use crate::house::view::Frame;
 
@@ -51,7 +51,7 @@ impl VisualSpec {
 
     /// What the encoder reads of a frame: planes of bytes.
     pub fn image(&self, frame: &Frame) -> Vec<u8> {
-        shrink(&frame.rgb, frame.width, self.input as usize)
+        resize_area(&frame.rgb, frame.width, self.input as usize)
     }
 }
 
@@ -144,7 +144,7 @@ impl HouseEncoder {
 
     /// The same, computed with `precision`; the maps have 32 bits.
     pub fn forward_with(&self, precision: Precision, pixels: &Tensor, train: bool) -> Tensor {
-        let x = precision.shown(&((pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0));
+        let x = precision.cast(&((pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0));
         let stem = self.stem.forward(&x, train).relu();
         self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train)).to_kind(Kind::Float)
     }
@@ -211,11 +211,11 @@ impl FrameEncoder for FrozenVisual {
         &self.digest
     }
 
-    fn twin(&self) -> Box<dyn FrameEncoder> {
+    fn share(&self) -> Box<dyn FrameEncoder> {
         Box::new(FrozenVisual {
             spec: self.spec.clone(),
-            stem: self.stem.twin(),
-            stages: self.stages.iter().map(|stage| stage.each_ref().map(FoldedConv::twin)).collect(),
+            stem: self.stem.share(),
+            stages: self.stages.iter().map(|stage| stage.each_ref().map(FoldedConv::share)).collect(),
             device: self.device,
             digest: self.digest.clone(),
         })
@@ -265,7 +265,7 @@ mod tests {
             let _ = encoder.forward(&noise, true);
         }
         let images: Vec<Vec<u8>> = (0..4).map(|i| Vec::try_from(noise.get(i).flatten(0, -1)).unwrap()).collect();
-        let frozen = encoder.frozen(&store).unwrap().twin();
+        let frozen = encoder.frozen(&store).unwrap().share();
         let (slow, fast) = (encoder.encode(&images), frozen.encode(&images));
         assert!(slow.abs().max().double_value(&[]) > 0.1);
         assert!((slow - fast).abs().max().double_value(&[]) < 1e-5);

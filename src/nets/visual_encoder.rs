@@ -70,7 +70,7 @@ impl VisualEncoder {
     pub fn frozen(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
         match self {
             VisualEncoder::House { encoder, store } => Ok(Box::new(encoder.frozen(store)?)),
-            VisualEncoder::ResNet18(net) => Ok(net.twin()),
+            VisualEncoder::ResNet18(net) => Ok(net.share()),
         }
     }
 }

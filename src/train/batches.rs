@@ -143,13 +143,13 @@ impl<'a> Batches<'a> {
     fn transitions(&self, items: &[Item], told: Tensor) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
         let (mut actions, mut objects, mut taken) = (Vec::new(), Vec::new(), Vec::new());
-        let named: Vec<i64> = items.iter().map(|item| i64::from(self.material.items.named_by(item))).collect();
+        let named: Vec<i64> = items.iter().map(|item| i64::from(self.material.items.object_target(item))).collect();
         for item in items {
             let label = self.material.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
             objects.push(i64::from(label.object));
-            taken.push(flag(label.taken));
+            taken.push(flag(label.executed));
         }
         let terminal: Vec<f32> = items.iter().map(|item| flag(item.is_last())).collect();
         // Both observations share all frames but two, which are gathered once.

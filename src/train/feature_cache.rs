@@ -100,7 +100,7 @@ pub fn encode(
     let (sender, receiver) = sync_channel(2 * threads);
     let result = std::thread::scope(|scope| {
         for _ in 0..threads {
-            let (encoder, sender, next, end) = (encoder.twin(), sender.clone(), &next, trajectories.end);
+            let (encoder, sender, next, end) = (encoder.share(), sender.clone(), &next, trajectories.end);
             scope.spawn(move || {
                 // The threads are one a core; libtorch should not start more.
                 device::set_threads(1);

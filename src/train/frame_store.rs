@@ -146,7 +146,7 @@ impl FrameStore {
                 labels.push(taken.and(recorded.choice(step)).map(|action| {
                     let class = action.target.and_then(|target| world.class_of(scene, target)).unwrap_or_default();
                     let object = if class.in_vocabulary() { class.index() as u8 } else { 0 };
-                    ActionLabel { action: action.kind.index() as u8, object, taken: taken == Some(action) }
+                    ActionLabel { action: action.kind.index() as u8, object, executed: taken == Some(action) }
                 }));
                 Ok(())
             })?;
@@ -206,7 +206,7 @@ mod tests {
         choices[1..3].fill(Action::navigate(ActionType::MoveAhead));
         frame_store.trajectories[0].choices = choices;
         let labels = frame_store.labels().unwrap();
-        let found: Vec<_> = labels[..5].iter().map(|l| l.map(|l| (usize::from(l.action), l.taken))).collect();
+        let found: Vec<_> = labels[..5].iter().map(|l| l.map(|l| (usize::from(l.action), l.executed))).collect();
         let [left, ahead] = [ActionType::RotateLeft, ActionType::MoveAhead].map(ActionType::index);
         let right = [Some((left, true)), Some((ahead, false)), Some((ahead, false)), Some((left, true)), None];
         assert_eq!(found, right);

@@ -231,7 +231,7 @@ mod tests {
                 summaries: &summaries,
             };
             let frames = trajectories.iter().map(|trajectory| trajectory.actions.len() + 1).sum();
-            let labels = vec![Some(ActionLabel { action: 0, object: 0, taken: true }); frames];
+            let labels = vec![Some(ActionLabel { action: 0, object: 0, executed: true }); frames];
             let items = Items::of(&source, labels, &selection).unwrap();
             (items.training.len(), items.texts)
         };

@@ -248,7 +248,7 @@ mod tests {
         let label = |frame: u64| ActionLabel {
             action: (frame % 12) as u8,
             object: (frame % 2 * (frame % 12)) as u8,
-            taken: !frame.is_multiple_of(5),
+            executed: !frame.is_multiple_of(5),
         };
         let span = |text, first: u32| Span { trajectory: 0, skills: 0..1, first, start: first, end: first + 5, text };
         Items {

@@ -140,7 +140,7 @@ fn items() -> Items {
     let label = |frame: u32| ActionLabel {
         action: (frame % 12) as u8,
         object: if frame.is_multiple_of(4) { 7 } else { 0 },
-        taken: true,
+        executed: true,
     };
     let span = |number: u32| {
         let (start, trajectory) = (number * SPAN, number / 3);

@@ -83,7 +83,7 @@ impl Planner<'_> {
 
     /// One of `aims`, with everything around their targets left as it is.
     fn any(&self, aims: Vec<Aim>) -> Result<Intent, NoWay> {
-        let aims: Vec<Aim> = aims.into_iter().filter(|aim| self.is_named(aim.target)).collect();
+        let aims: Vec<Aim> = aims.into_iter().filter(|aim| self.in_vocabulary(aim.target)).collect();
         if aims.is_empty() {
             return Err(self.no_way());
         }
@@ -97,7 +97,7 @@ impl Planner<'_> {
         Ok(Intent { aims, keep })
     }
 
-    fn is_named(&self, instance: Instance) -> bool {
+    fn in_vocabulary(&self, instance: Instance) -> bool {
         self.world.class_of(self.scene, instance).is_some_and(|class| class.in_vocabulary())
     }
 
@@ -194,7 +194,7 @@ impl Planner<'_> {
         let content = self.world.class_of(self.scene, held).unwrap_or_default();
         let aims = self.world.instances(self.scene).filter_map(|receptacle| {
             let class = self.world.class_of(self.scene, receptacle)?;
-            if !class.info().receptacle || !self.is_named(receptacle) {
+            if !class.info().receptacle || !self.in_vocabulary(receptacle) {
                 return None;
             }
             let odd = if class.holds(content) { 0 } else { 6 };

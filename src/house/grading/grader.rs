@@ -175,7 +175,7 @@ impl Grader {
     }
 
     /// The expert's instance that strict grading asks for.
-    pub(super) fn asked(&self, role: u8) -> Option<Original> {
+    pub(super) fn expert_instance(&self, role: u8) -> Option<Original> {
         let role = self.roles.get(usize::from(role)).filter(|_| self.grading == Grading::Strict)?;
         role.expert
     }

@@ -1,4 +1,4 @@
-//! How what came about is told: a clause an outcome.
+//! Outcomes as clauses, one each.
 
 use rand::Rng;
 

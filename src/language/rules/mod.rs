@@ -41,8 +41,8 @@ pub fn summary(passage: &Passage<'_>) -> String {
     // Each manner is shorter than the one before.
     let mut sentence = String::new();
     for manner in [DetailLevel::Full, DetailLevel::Plain, DetailLevel::Last] {
-        let telling = SummaryBuilder::new(passage, manner, ChaCha8Rng::seed_from_u64(digest));
-        sentence = finish(&telling.tell());
+        let builder = SummaryBuilder::new(passage, manner, ChaCha8Rng::seed_from_u64(digest));
+        sentence = finish(&builder.sentence());
         if sentence.split(' ').count() <= LONGEST {
             break;
         }
@@ -50,7 +50,7 @@ pub fn summary(passage: &Passage<'_>) -> String {
     sentence
 }
 
-/// How much is told.
+/// How much a sentence says.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum DetailLevel {
     Full,
@@ -70,9 +70,9 @@ struct SummaryBuilder<'a> {
 impl<'a> SummaryBuilder<'a> {
     fn new(passage: &Passage<'a>, manner: DetailLevel, rng: ChaCha8Rng) -> SummaryBuilder<'a> {
         let story = Story { roles: passage.roles, subtasks: passage.subtasks, origins: &[] };
-        let mut telling = SummaryBuilder { story, nouns: Vec::new(), manner, rng: RefCell::new(rng) };
-        telling.nouns = (0..passage.roles.len() as u8).map(|role| telling.noun(passage, role)).collect();
-        telling
+        let mut builder = SummaryBuilder { story, nouns: Vec::new(), manner, rng: RefCell::new(rng) };
+        builder.nouns = (0..passage.roles.len() as u8).map(|role| builder.noun(passage, role)).collect();
+        builder
     }
 
     fn chance(&self, probability: f64) -> bool {
@@ -104,17 +104,17 @@ impl<'a> SummaryBuilder<'a> {
         }
     }
 
-    fn tell(&self) -> String {
-        let mut told = outcomes(&self.story);
-        let last = told.len().saturating_sub(1);
+    fn sentence(&self) -> String {
+        let mut outcomes = outcomes(&self.story);
+        let last = outcomes.len().saturating_sub(1);
         let mut position = 0;
-        told.retain(|outcome| {
+        outcomes.retain(|outcome| {
             position += 1;
             position > last
                 || self.manner != DetailLevel::Last && (!self.is_aside(outcome) || last == 1 && self.chance(0.15))
         });
         let mut clauses: Vec<String> = Vec::new();
-        for (number, outcome) in told.iter().enumerate() {
+        for (number, outcome) in outcomes.iter().enumerate() {
             let clause = self.clause(outcome);
             let again = number > 0
                 && ["put ", "place "]
@@ -161,10 +161,10 @@ mod tests {
     use crate::house::testing::{put_subtask, role, slice_role, subtask};
     use crate::language::nouns;
 
-    /// Summaries of a passage whose sentences are told in slightly different ways, so that chance differs.
+    /// Summaries of a passage whose sentences differ slightly, so that chance differs.
     fn ways(roles: &[Role], subtasks: &[Subtask], sentences: &[&str]) -> Vec<String> {
         let say = |way: usize| {
-            let sentences: Vec<String> = sentences.iter().map(|told| format!("{told}{}", " ".repeat(way))).collect();
+            let sentences: Vec<String> = sentences.iter().map(|text| format!("{text}{}", " ".repeat(way))).collect();
             summary(&Passage { roles, subtasks, sentences: &sentences })
         };
         (0..60).map(say).collect()
@@ -184,8 +184,8 @@ mod tests {
     fn picking_up_is_implied_and_what_was_done_to_a_thing_becomes_an_adjective() {
         let roles = [role("Cup"), role("Cabinet")];
         let subtasks = [subtask(SkillKind::Pickup, 0), subtask(SkillKind::Clean, 0), put_subtask(0, 1)];
-        let told = ["Pick up the wine glass.", "Rinse the glass in the sink.", "Put it in the lower cabinet."];
-        let ways = ways(&roles, &subtasks, &told);
+        let texts = ["Pick up the wine glass.", "Rinse the glass in the sink.", "Put it in the lower cabinet."];
+        let ways = ways(&roles, &subtasks, &texts);
         any(&ways, "Put a rinsed wine glass in the cabinet.");
         any(&ways, "Wash the glass and place it in the cabinet.");
         all(&ways, |way| !way.contains("ick up") && way.contains("glass"));
@@ -202,7 +202,7 @@ mod tests {
             subtask(SkillKind::Heat, 3),
             put_subtask(3, 4),
         ];
-        let told = [
+        let texts = [
             "Take the knife.",
             "Cut the apple.",
             "Leave it.",
@@ -210,27 +210,27 @@ mod tests {
             "Heat it.",
             "Put it in the refrigerator.",
         ];
-        let whole = ways(&roles, &subtasks, &told);
+        let whole = ways(&roles, &subtasks, &texts);
         any(&whole, "Put a heated slice of apple in the refrigerator.");
         let quiet = whole.iter().filter(|way| !way.contains("knife") && way.contains("refrigerator")).count();
         assert!(quiet > 45, "{whole:#?}");
-        any(&ways(&roles, &subtasks[..2], &told[..2]), "Slice an apple.");
-        all(&ways(&roles, &subtasks[..3], &told[..3]), |way| way.contains("knife") && way.contains("sink"));
-        all(&ways(&roles, &subtasks[..4], &told[..4]), |way| way.contains("apple"));
+        any(&ways(&roles, &subtasks[..2], &texts[..2]), "Slice an apple.");
+        all(&ways(&roles, &subtasks[..3], &texts[..3]), |way| way.contains("knife") && way.contains("sink"));
+        all(&ways(&roles, &subtasks[..4], &texts[..4]), |way| way.contains("apple"));
     }
 
     #[test]
     fn two_of_a_kind_are_told_together_and_two_kinds_are_joined() {
         let roles = [role("Mug"), role("Desk"), role("Mug"), role("Pen")];
         let take_and_put = |thing| [subtask(SkillKind::Pickup, thing), put_subtask(thing, 1)];
-        let told = ["Take the red mug.", "Put it on the desk.", "Take it.", "Put it on the desk."];
-        let two = ways(&roles, &[take_and_put(0), take_and_put(2)].concat(), &told);
+        let texts = ["Take the red mug.", "Put it on the desk.", "Take it.", "Put it on the desk."];
+        let two = ways(&roles, &[take_and_put(0), take_and_put(2)].concat(), &texts);
         any(&two, "Put two mugs on the desk.");
-        let mixed = ways(&roles, &[take_and_put(0), take_and_put(3)].concat(), &told);
+        let mixed = ways(&roles, &[take_and_put(0), take_and_put(3)].concat(), &texts);
         all(&mixed, |way| {
             way.contains("mug") && way.contains("pen") && way.contains(" and ") || way.contains(", then ")
         });
-        let another = ways(&roles, &[put_subtask(0, 1), subtask(SkillKind::Pickup, 2)], &told[1..3]);
+        let another = ways(&roles, &[put_subtask(0, 1), subtask(SkillKind::Pickup, 2)], &texts[1..3]);
         any(&another, "Put the mug on the desk and pick up another mug.");
     }
 
@@ -238,8 +238,8 @@ mod tests {
     fn what_lies_in_a_thing_goes_along() {
         let roles = [role("Spoon"), role("Bowl"), role("DiningTable")];
         let subtasks = [put_subtask(0, 1), subtask(SkillKind::Pickup, 1), put_subtask(1, 2)];
-        let told = ["Put the spoon in the blue bowl.", "Take the bowl.", "Put it on the table."];
-        let ways = ways(&roles, &subtasks, &told);
+        let texts = ["Put the spoon in the blue bowl.", "Take the bowl.", "Put it on the table."];
+        let ways = ways(&roles, &subtasks, &texts);
         any(&ways, "Put the spoon in a blue bowl and put it on the table.");
         all(&ways, |way| way.contains("spoon") && way.contains("bowl") && way.contains("table"));
     }
@@ -279,7 +279,7 @@ mod tests {
         fn every_span_gives_one_short_sentence_that_names_the_last_target(
             subtasks in proptest::collection::vec(any_step(), 2..=10),
             classes in proptest::collection::vec(1..Class::VOCABULARY, 6),
-            told in "[a-z ,.é]{0,60}",
+            text in "[a-z ,.é]{0,60}",
         ) {
             let mut roles: Vec<Role> = classes
                 .iter()
@@ -287,7 +287,7 @@ mod tests {
                 .map(|class| Role { class, slice: false, bound: None, expert: None })
                 .collect();
             roles.extend(["Apple", "Bread"].map(slice_role));
-            let sentences = vec![told; subtasks.len()];
+            let sentences = vec![text; subtasks.len()];
             let text = summary(&Passage { roles: &roles, subtasks: &subtasks, sentences: &sentences });
             let last = &subtasks[subtasks.len() - 1];
             let class = roles[usize::from(last.receptacle.unwrap_or(last.object))].class;
