@@ -57,7 +57,7 @@ pub(super) const AGG_A: &str = "lead";
 const AGG_B: &str = "follow";
 
 /// Transitions that become one segment, relabelled with a conditioning and terminals that may not be their own.
-struct Relabelled<'a> {
+struct SegmentSource<'a> {
     name: &'static str,
     weight: f64,
     transitions: &'a Transitions,
@@ -110,7 +110,7 @@ impl Batch {
     /// The batch and its relabelled copies, one after the other, with observations in `precision`.
     pub(super) fn relabelled(&self, chaining: Option<&Chaining>, precision: Precision) -> (Transitions, Vec<Segment>) {
         let base = &self.base;
-        let segment = |name, weight, transitions, conditioning, terminal| Relabelled {
+        let segment = |name, weight, transitions, conditioning, terminal| SegmentSource {
             name,
             weight,
             transitions,
@@ -127,7 +127,7 @@ impl Batch {
                 sources.push(segment(AGG_B, share, second, &second.conditioning, &second.terminal));
             }
         }
-        let cat = |of: &dyn Fn(&Relabelled<'_>) -> Tensor| match &sources[..] {
+        let cat = |of: &dyn Fn(&SegmentSource<'_>) -> Tensor| match &sources[..] {
             [source] => of(source),
             sources => Tensor::cat(&sources.iter().map(of).collect::<Vec<_>>(), 0),
         };

@@ -24,7 +24,7 @@ pub enum Shape {
 /// What a fixture does to things.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Effect {
+pub enum FixtureEffect {
     /// Its contents are hot once it is switched on.
     Heat,
     /// Its contents are cold once it is closed.
@@ -50,7 +50,7 @@ pub struct ClassInfo {
     /// Has a switch.
     pub toggleable: bool,
     /// What it does to things: a toggled machine or tap when it is switched on, a fridge when it is closed.
-    pub effect: Option<Effect>,
+    pub effect: Option<FixtureEffect>,
     /// Has a door that swings out when it is opened.
     pub door: bool,
     /// Slides out when it is opened, and its contents with it.

@@ -2,7 +2,7 @@
 
 use super::outcome::{Outcome, Reason};
 use super::placing;
-use crate::domain::class::Effect;
+use crate::domain::class::FixtureEffect;
 use crate::domain::place::Pose;
 use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Action, ActionType, Class, Point, Scene};
@@ -125,7 +125,7 @@ fn interact(scene: &Scene, world: &mut World, kind: ActionType, target: Instance
         (ActionType::Open, _) => set_open(scene, world, target, true),
         (ActionType::Close, _) => {
             set_open(scene, world, target, false);
-            if class.info().effect == Some(Effect::Cool) {
+            if class.info().effect == Some(FixtureEffect::Cool) {
                 change_contents(world, target, |object| object.cold = true);
             }
         }
@@ -160,13 +160,13 @@ fn set_open(scene: &Scene, world: &mut World, target: Instance, open: bool) {
 fn toggle_on(scene: &Scene, world: &mut World, index: u16, class: Class) {
     world.fixtures[usize::from(index)].on = true;
     match class.info().effect {
-        Some(Effect::Heat) => change_contents(world, Instance::Fixture(index), |object| object.hot = true),
-        Some(Effect::Rinse) => {
+        Some(FixtureEffect::Heat) => change_contents(world, Instance::Fixture(index), |object| object.hot = true),
+        Some(FixtureEffect::Rinse) => {
             if let Some(basin) = nearest_basin(scene, scene.fixtures[usize::from(index)].pivot) {
                 change_contents(world, basin, |object| object.clean = true);
             }
         }
-        Some(Effect::Cool) | None => {}
+        Some(FixtureEffect::Cool) | None => {}
     }
 }
 

@@ -7,7 +7,7 @@
 use super::super::grading::{Grader, describe};
 use super::super::rules;
 use super::no_way::NoWay;
-use crate::domain::class::Effect;
+use crate::domain::class::FixtureEffect;
 use crate::domain::skill::{SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Scene, World};
@@ -63,7 +63,8 @@ pub fn left_open(scene: &Scene, world: &World, intent: &Intent) -> Vec<Aim> {
         if world.is_open(fixture) {
             return Some(Aim::new(ActionType::Close, fixture, 0));
         }
-        let runs = world.is_on(fixture) && matches!(class.info().effect, Some(Effect::Heat | Effect::Rinse));
+        let runs =
+            world.is_on(fixture) && matches!(class.info().effect, Some(FixtureEffect::Heat | FixtureEffect::Rinse));
         runs.then_some(Aim::new(ActionType::ToggleOff, fixture, 0))
     })
     .collect()
@@ -117,7 +118,7 @@ impl Planner<'_> {
         self.held().filter(|&held| self.fits(held))
     }
 
-    fn with_effect(&self, effect: Effect) -> Vec<Instance> {
+    fn with_effect(&self, effect: FixtureEffect) -> Vec<Instance> {
         let fixtures = (0..self.scene.fixtures.len() as u16).map(Instance::Fixture);
         fixtures
             .filter(|&fixture| {
@@ -272,7 +273,7 @@ impl Planner<'_> {
     }
 
     fn clean(&self) -> Result<Intent, NoWay> {
-        let faucets = self.with_effect(Effect::Rinse);
+        let faucets = self.with_effect(FixtureEffect::Rinse);
         let basin = |faucet: Instance| match faucet {
             Instance::Fixture(index) => {
                 self.scene.fixture(index).and_then(|fixture| rules::nearest_basin(self.scene, fixture.pivot))
@@ -321,7 +322,7 @@ impl Planner<'_> {
 
     fn heat(&self) -> Result<Intent, NoWay> {
         self.change_in(
-            Effect::Heat,
+            FixtureEffect::Heat,
             |object| object.hot,
             |plan, oven, object, hot| {
                 let (open, on) = (plan.world.is_open(oven), plan.world.is_on(oven));
@@ -339,7 +340,7 @@ impl Planner<'_> {
 
     fn cool(&self) -> Result<Intent, NoWay> {
         self.change_in(
-            Effect::Cool,
+            FixtureEffect::Cool,
             |object| object.cold,
             |plan, fridge, object, cold| match (cold, plan.world.is_open(fridge)) {
                 (true, true) => Aim::new(ActionType::Pickup, object, 1),
@@ -353,7 +354,7 @@ impl Planner<'_> {
     /// Heating and cooling: into the machine, out of it again when it has worked, and its door closed.
     fn change_in(
         &self,
-        effect: Effect,
+        effect: FixtureEffect,
         is_changed: impl Fn(&crate::domain::Object) -> bool,
         inside: impl Fn(&Self, Instance, Instance, bool) -> Aim,
     ) -> Result<Intent, NoWay> {

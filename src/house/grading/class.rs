@@ -1,7 +1,7 @@
 //! Grading by class: a subtask asks for classes, and what the agent chose is bound to the role it plays.
 
 use super::grader::{GradedStep, Grader, Pending, SubtaskVerdict};
-use crate::domain::class::Effect;
+use crate::domain::class::FixtureEffect;
 use crate::domain::skill::{SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, Scene, World};
@@ -186,7 +186,7 @@ fn holds_changed(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -
 
 fn a_fridge_is_open(step: GradedStep<'_>) -> bool {
     let fixtures = (0u16..).zip(&step.scene.fixtures);
-    let mut fridges = fixtures.filter(|(_, fixture)| fixture.class.info().effect == Some(Effect::Cool));
+    let mut fridges = fixtures.filter(|(_, fixture)| fixture.class.info().effect == Some(FixtureEffect::Cool));
     fridges.any(|(index, _)| step.world.is_open(Instance::Fixture(index)))
 }
 

@@ -1,7 +1,7 @@
 //! Strict grading: the released reward code taken literally, for comparison with published numbers.
 
 use super::grader::{GradedStep, Grader, Pending, SubtaskVerdict};
-use crate::domain::class::Effect;
+use crate::domain::class::FixtureEffect;
 use crate::domain::skill::{Literal, Original, SkillKind, Subtask};
 use crate::domain::world::Instance;
 use crate::domain::{ActionType, World};
@@ -90,6 +90,7 @@ fn any_part_clean(world: &World, whole: Instance) -> bool {
 }
 
 fn first_fridge_closed(step: GradedStep<'_>) -> bool {
-    let fridge = step.scene.fixtures.iter().position(|fixture| fixture.class.info().effect == Some(Effect::Cool));
+    let fridge =
+        step.scene.fixtures.iter().position(|fixture| fixture.class.info().effect == Some(FixtureEffect::Cool));
     fridge.is_none_or(|index| !step.world.is_open(Instance::Fixture(index as u16)))
 }

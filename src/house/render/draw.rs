@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec2, Vec3};
 
 use super::raster::{Material, Plane, Raster};
-use super::solid::{Lathe, Rgb, Solid, SolidKind};
+use super::solid::{Lathe, RgbF32, Solid, SolidKind};
 use crate::house::bounds;
 use crate::house::camera::Camera;
 
@@ -74,7 +74,7 @@ impl<'a> Brush<'a> {
     }
 
     /// A lit colour. The normal is a unit vector of the camera's frame; `depth` in metres dims what is far.
-    fn lit(&self, colour: Rgb, normal: Vec3, depth: f32) -> u32 {
+    fn lit(&self, colour: RgbF32, normal: Vec3, depth: f32) -> u32 {
         let shade = 0.80 + 0.20 * normal.dot(self.light) + 0.07 * normal.dot(self.up);
         pack(colour, shade * dimming(depth))
     }
@@ -276,7 +276,7 @@ pub fn dimming(depth: f32) -> f32 {
 }
 
 /// A shaded colour as bytes.
-pub fn pack(colour: Rgb, shade: f32) -> u32 {
+pub fn pack(colour: RgbF32, shade: f32) -> u32 {
     let [r, g, b] = colour.map(|part| (part * shade * 255.0).clamp(0.0, 255.0) as u32);
     r | g << 8 | b << 16
 }

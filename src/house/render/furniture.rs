@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::looks::{FilledBox, Look, Variant};
-use super::solid::{Rgb, Solid, SolidKind};
+use super::solid::{RgbF32, Solid, SolidKind};
 use crate::domain::place::Cuboid;
 use crate::domain::scene::{Fixture, Scene};
 use crate::domain::world::FixtureState;
@@ -64,7 +64,7 @@ pub fn build(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Solid> {
 }
 
 /// A closed box.
-fn plain(place: &FilledBox, colour: Rgb, inner: Rgb) -> Solid {
+fn plain(place: &FilledBox, colour: RgbF32, inner: RgbF32) -> Solid {
     let kind = SolidKind::Box { missing: 0 };
     Solid { kind, centre: place.centre, axes: place.axes, colour, inner, glows: false }
 }

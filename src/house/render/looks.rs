@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use glam::{Mat3, Vec3};
 use serde::Deserialize;
 
-use super::solid::{CYLINDER, Lathe, Rgb, Solid, SolidKind};
+use super::solid::{CYLINDER, Lathe, RgbF32, Solid, SolidKind};
 use crate::domain::Class;
 
 /// When a part is drawn.
@@ -85,7 +85,7 @@ enum SidePosition {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PartColour {
     Main(f32),
-    Own(Rgb),
+    Own(RgbF32),
 }
 
 #[derive(Debug)]
@@ -93,7 +93,7 @@ struct LookPart {
     kind: SolidKind,
     spans: [[SidePosition; 2]; 3],
     paint: PartColour,
-    lit: Option<Rgb>,
+    lit: Option<RgbF32>,
     glow: bool,
     when: Option<When>,
 }
@@ -105,12 +105,12 @@ pub struct Look {
     piece: Option<usize>,
     /// Every box of a body of several looks like this.
     pub each: bool,
-    palette: Vec<Rgb>,
-    inner: Option<Rgb>,
+    palette: Vec<RgbF32>,
+    inner: Option<RgbF32>,
     /// The colour inside, where it was cut.
-    pub flesh: Option<Rgb>,
+    pub flesh: Option<RgbF32>,
     /// The colour of flat pieces of a body of many boxes: counter tops.
-    pub slab: Option<Rgb>,
+    pub slab: Option<RgbF32>,
     parts: Vec<LookPart>,
 }
 
@@ -138,7 +138,7 @@ pub struct FilledBox {
 }
 
 /// A colour written as `#rrggbb`, or `None`.
-fn hex(text: &str) -> Option<Rgb> {
+fn hex(text: &str) -> Option<RgbF32> {
     let number = u32::from_str_radix(text.strip_prefix('#').filter(|digits| digits.len() == 6)?, 16).ok()?;
     Some([16, 8, 0].map(|shift| (number >> shift & 255) as f32 / 255.0))
 }
@@ -222,7 +222,7 @@ impl Look {
     }
 
     /// The main colour of an instance: one of the palette, a little lighter or darker.
-    pub fn main(&self, seed: u32) -> Rgb {
+    pub fn main(&self, seed: u32) -> RgbF32 {
         let colour = self.palette[seed as usize % self.palette.len()];
         let shift = |bits: u32, span: f32| 1.0 + span * ((seed >> bits & 15) as f32 / 7.5 - 1.0);
         let bright = shift(8, 0.06);
@@ -231,7 +231,7 @@ impl Look {
     }
 
     /// The colour of insides.
-    pub fn inner(&self, seed: u32) -> Rgb {
+    pub fn inner(&self, seed: u32) -> RgbF32 {
         self.inner.unwrap_or_else(|| self.main(seed).map(|part| 0.6 * part))
     }
 

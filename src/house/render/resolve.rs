@@ -4,14 +4,14 @@ use glam::Vec4;
 
 use super::draw::{dimming, pack};
 use super::raster::{GROUP, Material, Raster, mark, unmark};
-use super::solid::Rgb;
+use super::solid::RgbF32;
 use crate::domain::Room;
 use crate::house::camera::Camera;
 use crate::house::view::Frame;
 
 /// How the floor of a room looks: two colours in tiles of so many metres, or in planks when `planks`.
 struct FloorPattern {
-    colours: [Rgb; 2],
+    colours: [RgbF32; 2],
     side: f32,
     planks: bool,
 }

@@ -6,7 +6,7 @@ use crate::domain::class::Shape;
 use crate::house::extent::Extent;
 
 /// A colour before lighting: red, green, blue from 0 to 1.
-pub type Rgb = [f32; 3];
+pub type RgbF32 = [f32; 3];
 
 /// The outline that a round body turns about its y axis: rings of (height, radius) from bottom to top, each from -1 or 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +41,9 @@ pub struct Solid {
     /// Columns: its half axes, at right angles to each other.
     pub axes: Mat3,
     /// The colour outside.
-    pub colour: Rgb,
+    pub colour: RgbF32,
     /// The colour inside, where one can look inside.
-    pub inner: Rgb,
+    pub inner: RgbF32,
     /// It shines: no shading.
     pub glows: bool,
 }
@@ -53,7 +53,7 @@ pub const CYLINDER: Lathe = Lathe { rings: &[[-1.0, 1.0], [1.0, 1.0]], hollow: f
 
 impl Solid {
     /// A closed body of the given extent in one colour.
-    pub fn filling(extent: &Extent, colour: Rgb) -> Solid {
+    pub fn filling(extent: &Extent, colour: RgbF32) -> Solid {
         let kind = match extent.shape {
             Shape::Box => SolidKind::Box { missing: 0 },
             Shape::Cylinder => SolidKind::Lathe(CYLINDER),
