@@ -1,4 +1,6 @@
 //! Scales a drawn frame down to what the visual encoder reads, by averaging areas so that small things stay visible.
+//! Ours, because trained encoders depend on every byte: fast_image_resize 5 has no area average (its box filter takes whole
+//! pixels: a tenth of the bytes differ, by up to 65), and its bilinear filter rounds some bytes otherwise.
 
 /// Averages a square image of `from` x `from` pixels, three bytes a pixel, down to `to` x `to`. Planes: all red, then all green,
 /// then all blue, each row-major. Returns nothing but zeros when the image is shorter than its size says.
