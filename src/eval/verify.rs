@@ -344,11 +344,13 @@ mod tests {
     use crate::agent::policy_source::MakePolicy;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
     use crate::episode::branches::{Taken, Tree};
+    use crate::episode::scenes::Scenes;
     use crate::eval::evaluation::tests::{options, tasks};
     use crate::eval::evaluation::{Evaluation, evaluate};
     use crate::explore::session_export;
     use crate::explore::session_export::SessionExport;
     use crate::house::testing::kitchen;
+    use crate::run_dir::writer::RunWriter;
 
     /// A random walk of eight steps in the kitchen; the fourth and fifth by hand, with another instruction from the sixth on.
     fn walked() -> SessionExport {
@@ -458,10 +460,10 @@ mod tests {
             let options = Options { jobs, ..options() };
             let scenes = Scenes::of(&file, &set.value);
             let evaluation = Evaluation::prepare(&set, scenes, options, "undecided", None).unwrap();
-            let mut run_folder = RunFolder::open(&path, evaluation.manifest()).unwrap();
+            let mut run_folder = RunWriter::open(&path, evaluation.manifest()).unwrap();
             let stop = Arc::new(AtomicBool::new(false));
             evaluate(&evaluation, &make, &mut run_folder, &stop, &mut |_| ()).unwrap();
-            let run = Recorded::open(&path, Some(&file)).unwrap();
+            let run = RecordedRun::open(&path, Some(&file)).unwrap();
             let verdict = verify(&run, &mut |_| Ok(Some(source.clone())), 4 - jobs, &mut |_| ()).unwrap();
             assert!(verdict.is_equal() && verdict.episodes == 12, "{jobs} jobs: {verdict:?}");
             assert_eq!(verdict.choices, verdict.steps);
