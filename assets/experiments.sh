@@ -2,9 +2,9 @@
 # Trains the methods and measures them on ALFRED's task sets, as for the README's tables of results.
 # Stopped or killed at any time, the same command goes on where it was.
 #
-#   assets/experiments.sh DATA EYES OUT [METHOD ...]
+#   assets/experiments.sh DATA ENCODER OUT [METHOD ...]
 #
-# DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), EYES a checkpoint whose visual encoder
+# DATA is an import of ALFRED with labels (`sprint import alfred`, `sprint relabel`), ENCODER a checkpoint whose visual encoder
 # all methods share, OUT the folder for checkpoints and runs, by seed, and for the tables. CLONING (updates of cloning, which
 # methods that learn from the same words share), STEPS (updates after that), SEEDS (as "1 2 3"), PRECISION (mixed, for
 # processors that compute with bfloat16) and JOBS may be set; HOUSES may name further datasets to learn from, SPRINT another
@@ -15,7 +15,7 @@ complain() {
     exit 1
 }
 [ $# -ge 3 ] || complain "$(sed -n '2,11s/^# \{0,1\}//p' "$0")"
-data=$1 eyes=$2 out=$3
+data=$1 encoder=$2 out=$3
 shift 3
 known=(sprint iql-primitive l-bc et am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
 methods=("$@")
@@ -29,7 +29,7 @@ sprint=${SPRINT:-target/release/sprint}
 command -v "$sprint" >/dev/null || complain "there is no $sprint: \`make build\` makes it, or SPRINT names another"
 
 # What was begun with other settings is not gone on with: tables would mix them.
-settings="data=$data eyes=$eyes cloning=$cloning steps=$steps precision=${PRECISION:-full} houses=${HOUSES:-}"
+settings="data=$data encoder=$encoder cloning=$cloning steps=$steps precision=${PRECISION:-full} houses=${HOUSES:-}"
 mkdir -p "$out"
 [ -f "$out/settings" ] || echo "$settings" >"$out/settings"
 [ "$settings" = "$(cat "$out/settings")" ] || complain "$out was begun with $(cat "$out/settings"), not $settings: name another OUT"
@@ -41,7 +41,7 @@ pretrain() {
     printf 'extends = "%s"\nseed = %s\nhold_out = 0\nprecision = "%s"\n%s\n' "$3" "$seed" "${PRECISION:-full}" "$5" >"$preset"
     [ ! -d "$checkpoint/training" ] || resume=(--resume)
     [ -f "$checkpoint/README.md" ] || "$sprint" pretrain "$data" ${HOUSES:-} --preset "$preset" \
-        --steps "$4" --visual-from "$eyes" --out "$checkpoint" "${resume[@]}" "${@:6}"
+        --steps "$4" --visual-from "$encoder" --out "$checkpoint" "${resume[@]}" "${@:6}"
 }
 
 # A method's policy begins as a clone of what it learns from; the episodic transformer is one as it is.
@@ -105,9 +105,9 @@ for set in eval_100 eval_chain; do
         for method in "${methods[@]}"; do runs+=("$(joined "$method-$set-$kind")"); done
         "$sprint" compare "${runs[@]}" "$out"/runs/{random,expert}-$set-$kind
     done
-    told=()
+    step_by_step=()
     for method in "${methods[@]}"; do
-        case $method in sprint | l-bc) told+=("$(joined "$method-$set-steps")") ;; esac
+        case $method in sprint | l-bc) step_by_step+=("$(joined "$method-$set-steps")") ;; esac
     done
-    [ ${#told[@]} -lt 2 ] || "$sprint" compare "${told[@]}"
+    [ ${#step_by_step[@]} -lt 2 ] || "$sprint" compare "${step_by_step[@]}"
 done | tee "$out/tables.md"

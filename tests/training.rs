@@ -18,12 +18,12 @@ hold_out = 3
 save_every = 2
 report_every = 1
 
-[visual]
+[visual_encoder]
 channels = [4, 4, 4, 8]
 
-[visual_training.optimisation]
+[visual_encoder_training.optimisation]
 steps = 2
-batch = 4
+batch_size = 4
 
 [policy]
 channels = [4, 4, 4, 4]
@@ -35,13 +35,13 @@ hidden = [8]
 
 [chaining]
 pairs = { pool = 4 }
-batch = 2
+batch_size = 2
 
 [training]
 steps = 6
-batch = 8
+batch_size = 8
 
-[appraisal]
+[validation]
 tasks = 1
 swaps = 0
 "#;
@@ -49,7 +49,7 @@ swaps = 0
 /// Behaviour cloning in miniature, through ResNet-18.
 const RESNET: &str = r#"
 extends = "l-bc"
-eyes = "resnet18"
+visual_backbone = "resnet18"
 hold_out = 3
 
 [policy]
@@ -58,9 +58,9 @@ hidden = [8]
 
 [training]
 steps = 2
-batch = 8
+batch_size = 8
 
-[appraisal]
+[validation]
 tasks = 1
 swaps = 0
 "#;
@@ -91,18 +91,22 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
     done(&sprint, "pretrain D --preset tiny.toml --out agent --trials tasks.json --trials-every 3");
     let progress = sprint.read("agent/training/progress.jsonl");
     let lines = || progress.lines().filter(|line| line.contains("\"policy\""));
-    let tried: Vec<&str> = lines().filter(|line| line.contains("trial_success")).collect();
+    let tried: Vec<&str> = lines().filter(|line| line.contains("eval_success_rate")).collect();
     assert_eq!(tried.len(), 2, "{progress}");
     assert!(tried[0].contains("\"step\":4") && tried[1].contains("\"step\":6"), "{tried:?}");
-    for scalar in ["chain_q_loss", "follow_action_loss", "weight_max", "held_out_action_loss"] {
+    for scalar in ["chain_q_loss", "aggregate_b_action_loss", "weight_max", "held_out_action_loss"] {
         assert!(lines().any(|line| line.contains(scalar)), "{scalar} is not in {progress}");
     }
     assert!(sprint.read("agent/README.md").contains("implicit Q-learning with skills chained"));
     let config: serde_json::Value = serde_json::from_str(&sprint.read("agent/config.json")).unwrap();
     assert_eq!(config["logit_adjustment"]["strength"], 0.5, "as the preset has it");
     assert_eq!(config["advantage_scale"], 10.0, "likewise");
-    let shares: f64 =
-        config["logit_adjustment"]["shares"].as_array().unwrap().iter().filter_map(|share| share.as_f64()).sum();
+    let shares: f64 = config["logit_adjustment"]["action_frequencies"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|share| share.as_f64())
+        .sum();
     assert!((shares - 1.0).abs() < 1e-3, "{config}");
     done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
     assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
@@ -111,7 +115,7 @@ fn sprint_is_trained_from_demonstrations_tried_on_the_way_and_evaluated() {
 #[test]
 fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     let Some(sprint) = demonstrations() else { return };
-    let corrected = TINY.replace("[visual]", "[data]\ncorrections = true\n\n[visual]");
+    let corrected = TINY.replace("[visual_encoder]", "[data]\ncorrections = true\n\n[visual_encoder]");
     std::fs::write(sprint.path("corrected.toml"), corrected).unwrap();
     done(&sprint, "pretrain D --preset tiny.toml --out agent");
     done(&sprint, "collect E --episodes 6 --seed 5 --lengths 2 --annotations 1 --demonstrator expert");
@@ -127,20 +131,20 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     done(&sprint, "relabel C --with rules");
     let from = "--visual-from agent --policy-from agent --critic-from agent";
     done(&sprint, &format!("pretrain D C --preset corrected.toml {from} --out better"));
-    done(&sprint, "average agent better --out both --appraise 1");
+    done(&sprint, "average agent better --out both --validate 1");
     assert!(sprint.read("both/README.md").contains("one-skill tasks solved"));
     assert!(sprint.read("both/README.md").contains("the mean of 2 checkpoints'"), "{}", sprint.read("both/README.md"));
     done(&sprint, "eval --tasks tasks.json --checkpoint both --out run");
     assert!(sprint.run("average agent better --out both").stderr.contains("holds a checkpoint already"));
-    done(&sprint, "average agent --logit_adjustment 0.2 --out lighter --appraise 1");
+    done(&sprint, "average agent --logit-adjustment 0.2 --out lighter --validate 1");
     assert!(sprint.read("lighter/config.json").contains("\"strength\": 0.2"), "{}", sprint.read("lighter/config.json"));
-    assert!(sprint.read("lighter/README.md").contains("20 % of what is merely frequent"));
-    let refused = sprint.run("average agent --logit_adjustment 2 --out none").stderr;
+    assert!(sprint.read("lighter/README.md").contains("20 % of the log frequency"));
+    let refused = sprint.run("average agent --logit-adjustment 2 --out none").stderr;
     assert!(
-        refused.contains("--logit_adjustment 2 for agent: logit_adjustment.strength is 2, which is not a share"),
+        refused.contains("--logit-adjustment 2 for agent: logit_adjustment.strength is 2, which is not a share"),
         "{refused}"
     );
-    done(&sprint, "average agent --advantage_scale 2.5 --out wiser --appraise 1");
+    done(&sprint, "average agent --advantage-scale 2.5 --out wiser --validate 1");
     assert!(
         sprint.read("wiser/config.json").contains("\"advantage_scale\": 2.5"),
         "{}",
@@ -151,12 +155,12 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
         "{}",
         sprint.read("wiser/README.md")
     );
-    let refused = sprint.run("average agent --advantage_scale=-1 --out none").stderr;
-    assert!(refused.contains("--advantage_scale -1 for agent: advantage_scale is -1, which is no weight"), "{refused}");
+    let refused = sprint.run("average agent --advantage-scale=-1 --out none").stderr;
+    assert!(refused.contains("--advantage-scale -1 for agent: advantage_scale is -1, which is no weight"), "{refused}");
     let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
-    let refused = sprint.run(&format!("average {first} --logit_adjustment 0.2 --out none")).stderr;
+    let refused = sprint.run(&format!("average {first} --logit-adjustment 0.2 --out none")).stderr;
     assert!(refused.contains("how often each action was shown was not noted"), "{refused}");
-    let refused = sprint.run(&format!("average {first} --advantage_scale 2 --out none")).stderr;
+    let refused = sprint.run(&format!("average {first} --advantage-scale 2 --out none")).stderr;
     assert!(refused.contains("advantage_scale needs a critic, and there is none"), "{refused}");
     let config = sprint.read("agent/config.json");
     let digest = config.split("\"digest\": \"").nth(1).unwrap()[..64].to_string();
@@ -179,9 +183,9 @@ fn a_training_begins_with_the_networks_it_was_given() {
     let card = sprint.read("still/README.md");
     let told = [
         ": 1 steps of the policy, seed 1",
-        "the eyes of `agent` (2 steps)",
-        "policy began as that of `agent` (preset `sprint`, 6 steps of the policy)",
-        "critic began as that of `agent`",
+        "Its visual encoder is that of `agent` (2 steps)",
+        "policy was initialised from that of `agent` (preset `sprint`, 6 steps of the policy)",
+        "critic was initialised from that of `agent`",
     ];
     assert!(told.iter().all(|told| card.contains(told)), "{card}");
     let tensors = |folder: &str| weights::read(&sprint.path(folder).join("model.safetensors")).unwrap();
@@ -201,11 +205,11 @@ fn a_training_begins_with_the_networks_it_was_given() {
 fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
     let Some(sprint) = demonstrations() else { return };
     let tiny = TINY.replace("\"sprint\"", "\"am\"").replace("pairs = { pool = 4 }\n", "").replace("swaps = 0\n", "");
-    let goal = tiny.replace("[critic]", "goal = [4, 4, 4, 4]\n\n[critic]");
+    let goal = tiny.replace("[critic]", "goal_channels = [4, 4, 4, 4]\n\n[critic]");
     std::fs::write(sprint.path("am.toml"), format!("precision = \"mixed\"\n{goal}")).unwrap();
     done(&sprint, "pretrain D --preset am.toml --out agent");
     assert!(sprint.read("agent/README.md").contains("6 steps of the policy in mixed precision, seed"));
-    done(&sprint, "average agent agent --out mean --appraise 1");
+    done(&sprint, "average agent agent --out mean --validate 1");
     for folder in ["agent", "mean"] {
         assert!(!sprint.read(&format!("{folder}/README.md")).contains("two objects in view"));
     }
@@ -225,6 +229,10 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     assert_eq!(other.code, Some(1));
     let said = "begun with another preset: steps = 2 there, steps = 4 here";
     assert!(other.stderr.contains(said), "{}", other.stderr);
+    let preset = sprint.read("agent/training/preset.toml").replace("format_version = 2", "format_version = 1");
+    std::fs::write(sprint.path("agent/training/preset.toml"), preset).unwrap();
+    let older = sprint.run("pretrain D --preset tiny.toml --out agent --steps 2 --resume");
+    assert!(older.stderr.contains("another version of sprint began this training"), "{}", older.stderr);
     std::fs::remove_file(sprint.path("agent/training/state.safetensors")).unwrap();
     std::fs::remove_file(sprint.path("agent/training/visual.safetensors")).unwrap();
     let over = sprint.run("pretrain D --preset tiny.toml --out agent");
@@ -237,7 +245,7 @@ fn a_training_in_the_same_folder_or_with_another_preset_is_refused() {
     assert!(data.stderr.contains("D holds a dataset already"), "{}", data.stderr);
     let seeing = sprint.run("pretrain D --preset l-bc --out other --visual-from agent");
     assert_eq!(seeing.code, Some(1));
-    assert!(seeing.stderr.contains("visual is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
+    assert!(seeing.stderr.contains("visual_encoder is") && seeing.stderr.contains("config.json"), "{}", seeing.stderr);
     assert!(!sprint.path("other").exists(), "a refused training left something behind");
     let judging = sprint.run("pretrain D --preset l-bc --out other --critic-from agent");
     assert!(judging.stderr.contains("has no critic") && !sprint.path("other").exists(), "{}", judging.stderr);
@@ -260,10 +268,10 @@ fn a_training_that_is_stopped_and_killed_on_the_way_ends_with_the_same_bytes() {
         progress.lines().filter(|line| line.contains(&format!("\"{stage}\""))).count()
     };
     let mut stopped = begin("pretrain D --preset longer.toml --out parts");
-    wait_for(|| reported("visual") > 5);
+    wait_for(|| reported("visual_encoder") > 5);
     assert!(std::process::Command::new("kill").args(["-TERM", &stopped.id().to_string()]).status().unwrap().success());
     assert_eq!(stopped.wait().unwrap().code(), Some(130));
-    assert!(reported("visual") < 60 && reported("policy") == 0, "it was stopped while it learned to see");
+    assert!(reported("visual_encoder") < 60 && reported("policy") == 0, "it was stopped while it learned to see");
     let mut killed = begin("pretrain D --preset longer.toml --out parts --resume");
     wait_for(|| reported("policy") > 5);
     killed.kill().unwrap();

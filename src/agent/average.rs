@@ -7,24 +7,24 @@ use anyhow::{Context, ensure};
 use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
-use super::config::Config;
+use super::config::CheckpointConfig;
 
-/// The mean of checkpoints' policies, each as often as it is named; eyes, critic and configuration are the first one's.
+/// The mean of checkpoints' policies, each as often as it is named; visual encoder, critic and configuration are the first one's.
 ///
 /// # Errors
-/// When a checkpoint cannot be read, or differs from the first in its policy's size, its eyes or its sentence encoder.
-pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, Networks)> {
+/// When a checkpoint cannot be read, or differs from the first in its policy's size, its visual encoder or its sentence encoder.
+pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(CheckpointConfig, Networks)> {
     let (first, others) = folders.split_first().context("no checkpoint was named")?;
     let (mut config, networks) = load(first, device)?;
-    let eyes = networks.eyes.frozen()?.digest().to_owned();
+    let encoder = networks.visual_encoder.frozen()?.digest().to_owned();
     let mut sums: Vec<(String, Tensor)> =
         networks.policy_store.variables().into_iter().map(|(name, own)| (name, own.to_kind(Kind::Double))).collect();
     for folder in others {
         let (found, given) = load(folder, device)?;
         same(folder, &found, &config)?;
         ensure!(
-            given.eyes.frozen()?.digest() == eyes,
-            "{} sees through other eyes than {}",
+            given.visual_encoder.frozen()?.digest() == encoder,
+            "{} has another visual encoder than {}",
             folder.display(),
             first.display()
         );
@@ -39,7 +39,8 @@ pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, N
             *own = joined(own, &other, mark);
         }
     }
-    config.provenance.averaged = (!others.is_empty()).then_some(folders.len() as u64).or(config.provenance.averaged);
+    let count = (!others.is_empty()).then_some(folders.len() as u64);
+    config.provenance.averaged_checkpoints = count.or(config.provenance.averaged_checkpoints);
     let mut variables = networks.policy_store.variables();
     tch::no_grad(|| -> anyhow::Result<()> {
         for (name, sum) in sums {
@@ -51,18 +52,18 @@ pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(Config, N
     Ok((config, networks))
 }
 
-fn load(folder: &Path, device: Device) -> anyhow::Result<(Config, Networks)> {
-    let config = Config::read(folder)?;
+fn load(folder: &Path, device: Device) -> anyhow::Result<(CheckpointConfig, Networks)> {
+    let config = CheckpointConfig::read(folder)?;
     let networks = Networks::load(folder, &config, device)?;
     Ok((config, networks))
 }
 
 /// Both policies take in and put out the same.
-fn same(folder: &Path, found: &Config, first: &Config) -> anyhow::Result<()> {
+fn same(folder: &Path, found: &CheckpointConfig, first: &CheckpointConfig) -> anyhow::Result<()> {
     let file = folder.join("config.json");
     let (own, others) = (&first.policy, &found.policy);
     ensure!(others.fits(own), "{}: policy is {others:?}, the first one's is {own:?}", file.display());
-    ensure!(found.words == first.words, "{}: words are not the first one's", file.display());
+    ensure!(found.vocabulary == first.vocabulary, "{}: vocabulary is not the first one's", file.display());
     let (own, others) = (&first.sentence_encoder, &found.sentence_encoder);
     ensure!(own == others, "{}: sentence_encoder is {}, the first one's is {}", file.display(), others.name, own.name);
     Ok(())
@@ -84,33 +85,42 @@ mod tests {
     use super::*;
     use crate::agent::config::tests::small;
 
-    /// A checkpoint whose policy is one number everywhere, and whose eyes are another.
-    fn checkpoint(policy: f64, eyes: f64, change: impl FnOnce(&mut Config)) -> tempfile::TempDir {
+    /// A checkpoint whose policy is one number everywhere, and whose visual encoder is another.
+    fn checkpoint(policy: f64, encoder: f64, change: impl FnOnce(&mut CheckpointConfig)) -> tempfile::TempDir {
         let (folder, mut config) = (tempfile::tempdir().unwrap(), small());
         change(&mut config);
-        let networks = Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu);
+        let networks =
+            Networks::new(config.build_visual_encoder(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu);
         let fill = |store: &tch::nn::VarStore, number: f64| {
             tch::no_grad(|| store.variables().into_values().for_each(|mut tensor| drop(tensor.fill_(number))));
         };
         fill(&networks.policy_store, policy);
-        fill(networks.eyes.store().unwrap(), eyes);
+        fill(networks.visual_encoder.store().unwrap(), encoder);
         networks.save(folder.path(), &config).unwrap();
         folder
     }
 
-    fn of(checkpoints: &[&tempfile::TempDir]) -> anyhow::Result<(Config, Networks)> {
+    fn of(checkpoints: &[&tempfile::TempDir]) -> anyhow::Result<(CheckpointConfig, Networks)> {
         average(&checkpoints.iter().map(|folder| folder.path().to_owned()).collect::<Vec<_>>(), Device::Cpu)
     }
 
     #[test]
-    fn each_policy_counts_as_often_as_it_is_named_and_the_eyes_are_kept() {
+    fn each_policy_counts_as_often_as_it_is_named_and_the_visual_encoder_is_kept() {
         let _chance = crate::nets::testing::chance();
         let one = checkpoint(1.0, 0.5, |config| config.provenance.dataset = "a-b".into());
         let four = checkpoint(4.0, 0.5, |config| config.provenance.dataset = "b-c".into());
         let (config, networks) = of(&[&one, &four, &four]).unwrap();
         assert!(networks.policy_store.variables().values().all(|tensor| tensor.eq(3.0).all().int64_value(&[]) == 1));
-        assert!(networks.eyes.store().unwrap().variables().values().all(|t| t.eq(0.5).all().int64_value(&[]) == 1));
-        assert_eq!((config.provenance.dataset.as_str(), config.provenance.averaged), ("a-b-c", Some(3)));
+        assert!(
+            networks
+                .visual_encoder
+                .store()
+                .unwrap()
+                .variables()
+                .values()
+                .all(|t| t.eq(0.5).all().int64_value(&[]) == 1)
+        );
+        assert_eq!((config.provenance.dataset.as_str(), config.provenance.averaged_checkpoints), ("a-b-c", Some(3)));
     }
 
     #[test]
@@ -118,9 +128,9 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         let one = checkpoint(1.0, 0.5, |_| ());
         let error = |other: tempfile::TempDir| format!("{:#}", of(&[&one, &other]).unwrap_err());
-        assert!(error(checkpoint(1.0, 0.6, |_| ())).contains("other eyes"));
+        assert!(error(checkpoint(1.0, 0.6, |_| ())).contains("another visual encoder"));
         assert!(error(checkpoint(1.0, 0.5, |config| config.policy.hidden = vec![3])).contains("policy is"));
-        let strange = |config: &mut Config| config.sentence_encoder.digest = "0".into();
+        let strange = |config: &mut CheckpointConfig| config.sentence_encoder.digest = "0".into();
         assert!(error(checkpoint(1.0, 0.5, strange)).contains("sentence_encoder is"));
     }
 }

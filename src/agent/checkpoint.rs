@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tch::{Device, Tensor, nn};
 
-use super::config::Config;
+use super::config::CheckpointConfig;
 use super::value_estimates::Values;
 use crate::data::json;
 use crate::house::view::Candidate;
@@ -17,17 +17,17 @@ use crate::nets::weights::{self, TensorSpec};
 /// A policy's networks with the stores that own their weights.
 #[derive(Debug)]
 pub struct Networks {
-    /// Sees.
-    pub eyes: VisualEncoder,
-    /// Decides.
+    /// Turns frames into feature maps.
+    pub visual_encoder: VisualEncoder,
+    /// Turns maps and instruction into logits.
     pub policy: PolicyNet,
     /// The policy's weights.
     pub policy_store: nn::VarStore,
-    /// Judges.
+    /// Q and V with their target, where the method has them.
     pub critic: Option<Critics>,
 }
 
-/// A critic and the target that follows it.
+/// A critic and its target network, which follows it by Polyak averaging.
 #[derive(Debug)]
 pub struct Critics {
     /// The critic that learns.
@@ -41,14 +41,22 @@ pub struct Critics {
 }
 
 impl Networks {
-    /// Networks with fresh weights behind the eyes.
-    pub fn new(eyes: VisualEncoder, policy: &PolicySpec, critic: Option<&CriticSpec>, device: Device) -> Networks {
+    /// Networks with fresh weights behind a visual encoder.
+    pub fn new(
+        visual_encoder: VisualEncoder,
+        policy: &PolicySpec,
+        critic: Option<&CriticSpec>,
+        device: Device,
+    ) -> Networks {
         let policy_store = nn::VarStore::new(device);
-        let features = eyes.features();
-        let senses =
-            CriticInputs { channels: policy.history * features, conditioning: policy.embedding, goal: policy.goal };
+        let features = visual_encoder.features();
+        let senses = CriticInputs {
+            channels: policy.history * features,
+            conditioning: policy.embedding,
+            goal: policy.goal_channels,
+        };
         Networks {
-            eyes,
+            visual_encoder,
             policy: PolicyNet::new(&policy_store.root(), policy, features),
             policy_store,
             critic: critic.map(|spec| {
@@ -63,19 +71,19 @@ impl Networks {
         }
     }
 
-    /// What the critic makes of an observation under what is told, where the agent weighs its policy by that.
+    /// The critic's values of an observation under an instruction, where its advantages take part in decisions.
     ///
     /// # Errors
     /// When the critic's answer cannot be read.
     pub fn advice(
         &self,
-        config: &Config,
+        config: &CheckpointConfig,
         observation: &Tensor,
-        told: &Tensor,
+        conditioning: &Tensor,
         candidates: &[Candidate],
     ) -> anyhow::Result<Option<Values>> {
         match (&self.critic, config.advantage_scale) {
-            (Some(critic), Some(_)) => Values::of(&critic.online, observation, told, candidates).map(Some),
+            (Some(critic), Some(_)) => Values::of(&critic.online, observation, conditioning, candidates).map(Some),
             _ => Ok(None),
         }
     }
@@ -83,7 +91,7 @@ impl Networks {
     /// Every tensor by its name in `model.safetensors`.
     pub fn tensors(&self) -> BTreeMap<String, Tensor> {
         let mut stores = vec![("policy", &self.policy_store)];
-        stores.extend(self.eyes.store().map(|store| ("visual", store)));
+        stores.extend(self.visual_encoder.store().map(|store| ("visual", store)));
         if let Some(critic) = &self.critic {
             stores.extend([("critic", &critic.online_store), ("target", &critic.target_store)]);
         }
@@ -97,10 +105,11 @@ impl Networks {
     ///
     /// # Errors
     /// When `model.safetensors` cannot be read or differs from the configuration; every such tensor is named.
-    pub fn load(folder: &Path, config: &Config, device: Device) -> anyhow::Result<Networks> {
+    pub fn load(folder: &Path, config: &CheckpointConfig, device: Device) -> anyhow::Result<Networks> {
         let path = folder.join("model.safetensors");
         let tensors = weights::read(&path)?;
-        let networks = Networks::new(config.eyes(device)?, &config.policy, config.critic.as_ref(), device);
+        let networks =
+            Networks::new(config.build_visual_encoder(device)?, &config.policy, config.critic.as_ref(), device);
         let variables = networks.tensors();
         let forms = variables.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
         weights::check(&path, &tensors, &forms)?;
@@ -119,7 +128,7 @@ impl Networks {
     ///
     /// # Errors
     /// When the folder cannot be written to.
-    pub fn save(&self, folder: &Path, config: &Config) -> anyhow::Result<()> {
+    pub fn save(&self, folder: &Path, config: &CheckpointConfig) -> anyhow::Result<()> {
         weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
         json::write_pretty(&folder.join("config.json"), config)
     }
@@ -130,11 +139,15 @@ mod tests {
     use super::*;
     use crate::agent::config::tests::small;
 
-    fn saved() -> (tempfile::TempDir, Config) {
+    fn saved() -> (tempfile::TempDir, CheckpointConfig) {
         let folder = tempfile::tempdir().unwrap();
         let config = small();
-        let networks =
-            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
+        let networks = Networks::new(
+            config.build_visual_encoder(Device::Cpu).unwrap(),
+            &config.policy,
+            config.critic.as_ref(),
+            Device::Cpu,
+        );
         networks.save(folder.path(), &config).unwrap();
         (folder, config)
     }
@@ -143,7 +156,8 @@ mod tests {
     fn a_saved_checkpoint_loads_with_equal_weights() {
         let _chance = crate::nets::testing::chance();
         let (folder, config) = saved();
-        let first = Networks::load(folder.path(), &Config::read(folder.path()).unwrap(), Device::Cpu).unwrap();
+        let first =
+            Networks::load(folder.path(), &CheckpointConfig::read(folder.path()).unwrap(), Device::Cpu).unwrap();
         let again = tempfile::tempdir().unwrap();
         first.save(again.path(), &config).unwrap();
         let second = weights::read(&again.path().join("model.safetensors")).unwrap();
@@ -157,17 +171,21 @@ mod tests {
         config.method = Some("iql".into());
         config.critic = Some(CriticSpec {
             channels: [4; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![8],
             dropout: 0.2,
             action_embedding: 4,
             object_embedding: 2,
             shared_trunk: true,
         });
-        let networks =
-            Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
+        let networks = Networks::new(
+            config.build_visual_encoder(Device::Cpu).unwrap(),
+            &config.policy,
+            config.critic.as_ref(),
+            Device::Cpu,
+        );
         networks.save(folder.path(), &config).unwrap();
-        let read = Config::read(folder.path()).unwrap();
+        let read = CheckpointConfig::read(folder.path()).unwrap();
         assert_eq!(read, config);
         let loaded = Networks::load(folder.path(), &read, Device::Cpu).unwrap().tensors();
         assert!(networks.tensors().iter().all(|(name, tensor)| *tensor == loaded[name]));
@@ -177,10 +195,10 @@ mod tests {
     #[test]
     fn the_shipped_agents_load() {
         let _chance = crate::nets::testing::chance();
-        for (name, judges) in [("alfred", true), ("first", false), ("sprint", true)] {
+        for (name, has_critic) in [("alfred", true), ("first", false), ("sprint", true)] {
             let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
-            let config = Config::read(&folder).unwrap();
-            assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), judges);
+            let config = CheckpointConfig::read(&folder).unwrap();
+            assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), has_critic);
         }
     }
 

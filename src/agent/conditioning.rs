@@ -3,7 +3,7 @@
 use anyhow::Context;
 use tch::{Device, Kind, Tensor};
 
-use super::config::Config;
+use super::config::CheckpointConfig;
 use super::frame_history::SharedEmbedder;
 use super::policy::{Observation, Reading};
 use crate::language::instruction::normalise;
@@ -21,12 +21,12 @@ const WORDS: usize = 128;
 /// When the sentence encoder fails, or an agent that is shown its goal has no task to take it from.
 pub fn of(
     observation: &mut Observation<'_>,
-    config: &Config,
+    config: &CheckpointConfig,
     visual: &dyn FrameEncoder,
     sentences: &SharedEmbedder,
     device: Device,
 ) -> anyhow::Result<Tensor> {
-    if config.policy.goal.is_some() {
+    if config.policy.goal_channels.is_some() {
         return goal_frames(observation, config.policy.history as usize, visual);
     }
     let instruction = normalise(observation.instruction);
@@ -40,9 +40,9 @@ pub fn of(
 }
 
 /// How much of an instruction the agent reads; nothing where it is shown its goal, or the sentence encoder fails.
-pub fn reading(instruction: &str, config: &Config, sentences: &SharedEmbedder) -> Option<Reading> {
+pub fn reading(instruction: &str, config: &CheckpointConfig, sentences: &SharedEmbedder) -> Option<Reading> {
     let instruction = normalise(instruction);
-    match (&config.policy.goal, &config.policy.attention) {
+    match (&config.policy.goal_channels, &config.policy.attention) {
         (Some(_), _) => None,
         (None, Some(_)) => {
             let words = words(config, &instruction).len();
@@ -56,14 +56,14 @@ pub fn reading(instruction: &str, config: &Config, sentences: &SharedEmbedder) -
 }
 
 /// The numbers of an instruction's words.
-fn words(config: &Config, instruction: &str) -> Vec<i64> {
-    Vocabulary::new(config.words.clone().unwrap_or_default()).numbers(instruction)
+fn words(config: &CheckpointConfig, instruction: &str) -> Vec<i64> {
+    Vocabulary::new(config.vocabulary.clone().unwrap_or_default()).numbers(instruction)
 }
 
 /// Zeros of the same shape, for an empty slot.
-pub fn blank(config: &Config, device: Device) -> Tensor {
+pub fn blank(config: &CheckpointConfig, device: Device) -> Tensor {
     let (policy, features) = (&config.policy, config.features());
-    match (policy.goal, &policy.attention) {
+    match (policy.goal_channels, &policy.attention) {
         (Some(_), _) => Tensor::zeros([1, policy.history * features, SIDE, SIDE], (Kind::Float, device)),
         (None, Some(_)) => Tensor::zeros([1, WORDS as i64], (Kind::Int64, device)),
         (None, None) => Tensor::zeros([1, policy.embedding], (Kind::Float, device)),

@@ -9,6 +9,7 @@ use tch::Device;
 
 use super::logit_adjustment::LogitAdjustment;
 use super::value_estimates::{AdvantageScale, Values};
+use crate::data::json;
 use crate::domain::{ActionType, Class};
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::critic::CriticSpec;
@@ -51,10 +52,10 @@ pub struct SentenceSpec {
     pub digest: String,
 }
 
-/// A checkpoint that another one began with.
+/// A checkpoint from which another one took networks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Beginning {
+pub struct SourceCheckpoint {
     /// Its folder's name.
     pub name: String,
     /// The preset it was trained with.
@@ -63,11 +64,11 @@ pub struct Beginning {
     pub policy_steps: u64,
 }
 
-/// Where a checkpoint comes from.
+/// How a checkpoint was trained, and from what.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// The preset's name.
+    /// The preset's name; of a mean, those of its parts.
     pub preset: String,
     /// The digest of the trajectories it was trained on.
     pub dataset: String,
@@ -76,37 +77,37 @@ pub struct Provenance {
     /// The seed of initialisation and data order.
     pub seed: u64,
     /// Steps of the visual encoder's training.
-    pub visual_steps: u64,
+    pub visual_encoder_steps: u64,
     /// Steps of the policy's training.
     pub policy_steps: u64,
     /// How wide the numbers were that the networks computed with while they learned.
     #[serde(default)]
     pub precision: Precision,
-    /// Whose eyes it has, where they were not trained with it.
+    /// The checkpoint whose visual encoder it uses, where that was not trained with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub visual_from: Option<Beginning>,
-    /// Whose policy its own began as.
+    pub visual_encoder_from: Option<SourceCheckpoint>,
+    /// The checkpoint whose weights the policy's training started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub policy_from: Option<Beginning>,
-    /// Whose critic its own began as.
+    pub policy_initialised_from: Option<SourceCheckpoint>,
+    /// The checkpoint whose weights the critic's training started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub critic_from: Option<Beginning>,
+    pub critic_initialised_from: Option<SourceCheckpoint>,
     /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub averaged: Option<u64>,
+    pub averaged_checkpoints: Option<u64>,
 }
 
 /// A checkpoint's `config.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Config {
+pub struct CheckpointConfig {
     /// Version of this format.
     pub format_version: u32,
-    /// What the heads stand for.
+    /// The classes and actions of the heads.
     pub ontology: Ontology,
     /// The size of the House encoder, where the agent sees through one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub visual: Option<VisualSpec>,
+    pub visual_encoder: Option<VisualSpec>,
     /// The digest of ResNet-18's weights, where the agent sees through that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resnet18: Option<String>,
@@ -120,8 +121,8 @@ pub struct Config {
     pub critic: Option<CriticSpec>,
     /// The words that the agent knows, where it reads words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub words: Option<Vec<String>>,
-    /// What of the actions' frequency does not count when it decides; absent where all does.
+    pub vocabulary: Option<Vec<String>>,
+    /// How much of the actions' frequency among the labels is taken off their logits when it decides; absent where nothing is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub logit_adjustment: Option<LogitAdjustment>,
     /// How much the critic's advantages count when it decides, see [`AdvantageScale`]; absent where the policy decides alone.
@@ -129,34 +130,22 @@ pub struct Config {
     pub advantage_scale: Option<f32>,
     /// The sentence encoder.
     pub sentence_encoder: SentenceSpec,
-    /// Where it comes from.
+    /// How it was trained, and from what.
     pub provenance: Provenance,
 }
 
-impl Config {
+impl CheckpointConfig {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub const FORMAT: u32 = 2;
 
     /// Reads a checkpoint's configuration.
     ///
     /// # Errors
     /// When the file is missing or malformed, of another format version, or for other classes or actions.
-    pub fn read(folder: &Path) -> anyhow::Result<Config> {
-        Config::check_there(folder)?;
+    pub fn read(folder: &Path) -> anyhow::Result<CheckpointConfig> {
+        CheckpointConfig::check_there(folder)?;
         let path = folder.join("config.json");
-        let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let value: serde_json::Value =
-            serde_json::from_str(&text).with_context(|| format!("{} is not JSON", path.display()))?;
-        let version = value.get("format_version").and_then(serde_json::Value::as_u64);
-        anyhow::ensure!(
-            version == Some(u64::from(Config::FORMAT)),
-            "{}: format_version is {}, this program reads {}",
-            path.display(),
-            version.map_or("missing".to_string(), |version| version.to_string()),
-            Config::FORMAT
-        );
-        let config: Config = serde_json::from_value(value)
-            .with_context(|| format!("{} is not a checkpoint's configuration", path.display()))?;
+        let config: CheckpointConfig = json::read(&path, CheckpointConfig::FORMAT)?.value;
         let own = Ontology::current();
         anyhow::ensure!(
             config.ontology.classes == own.classes,
@@ -189,25 +178,25 @@ impl Config {
         Ok(())
     }
 
-    /// What the agent sees through: a House encoder with fresh weights, or ResNet-18 with the very weights it was trained on.
+    /// The visual encoder: a House encoder with fresh weights, or ResNet-18 with the very weights it was trained on.
     ///
     /// # Errors
     /// When ResNet-18's weights are missing, or others.
-    pub fn eyes(&self, device: Device) -> anyhow::Result<VisualEncoder> {
-        match (&self.visual, &self.resnet18) {
+    pub fn build_visual_encoder(&self, device: Device) -> anyhow::Result<VisualEncoder> {
+        match (&self.visual_encoder, &self.resnet18) {
             (Some(spec), None) => Ok(VisualEncoder::house(spec, device)),
             (None, Some(digest)) => {
                 let file = VisualEncoder::resnet18_file();
-                let eyes = VisualEncoder::resnet18(&file, device)?;
-                let found = eyes.frozen()?.digest().to_owned();
+                let encoder = VisualEncoder::resnet18(&file, device)?;
+                let found = encoder.frozen()?.digest().to_owned();
                 anyhow::ensure!(
                     found == *digest,
                     "{}: these weights are {found}, the agent was trained on {digest}",
                     file.display()
                 );
-                Ok(eyes)
+                Ok(encoder)
             }
-            _ => anyhow::bail!("an agent sees through either visual or resnet18, not both or none"),
+            _ => anyhow::bail!("an agent has either visual_encoder or resnet18, not both or none"),
         }
     }
 
@@ -230,17 +219,17 @@ impl Config {
         Ok(())
     }
 
-    /// Balances the logits of the action head, where the agent's are.
+    /// Adjusts the logits of the action head [12] in place, where `logit_adjustment` is there.
     pub fn adjust_logits(&self, logits: &mut [f32]) {
         if let Some(logit_adjustment) = &self.logit_adjustment {
             logit_adjustment.apply(logits);
         }
     }
 
-    /// Takes so much of what is frequent off the logits from now on: 0 none, 1 all.
+    /// Sets the fraction of the log frequencies that is taken off the logits: 0 none, 1 all.
     ///
     /// # Errors
-    /// When the strength is no share, or it is not known how frequent each action is.
+    /// When the strength is not between 0 and 1, or the actions' frequencies were not kept.
     pub fn set_logit_adjustment(&mut self, strength: f32) -> anyhow::Result<()> {
         let logit_adjustment = self.logit_adjustment.as_mut();
         let logit_adjustment = logit_adjustment
@@ -249,10 +238,10 @@ impl Config {
         logit_adjustment.check().map_err(anyhow::Error::msg)
     }
 
-    /// Lets the critic's advantages count so much from now on; 0: the policy decides alone.
+    /// Sets how many times the critic's advantage enters the exponent when it decides; 0: the policy decides alone.
     ///
     /// # Errors
-    /// When that is no weight, or there is no critic.
+    /// When the scale is negative or not finite, or there is no critic.
     pub fn set_advantage_scale(&mut self, weight: f32) -> anyhow::Result<()> {
         self.advantage_scale = (weight != 0.0).then_some(weight);
         self.check_advantage_scale()
@@ -265,14 +254,14 @@ impl Config {
         Ok(())
     }
 
-    /// How values weigh the policy.
+    /// The values with their scale, where the critic takes part in decisions.
     pub fn advantage_scale<'a>(&self, values: Option<&'a Values>) -> Option<AdvantageScale<'a>> {
         values.zip(self.advantage_scale).map(|(values, weight)| AdvantageScale { values, weight })
     }
 
-    /// Features in each of the 7 x 7 places of a map.
+    /// Features in each of the 7 x 7 cells of a map.
     pub fn features(&self) -> i64 {
-        self.visual.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
+        self.visual_encoder.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
     }
 
     /// What no network or agent can have is refused before anything is allocated for it.
@@ -281,14 +270,14 @@ impl Config {
         if let Some(critic) = &self.critic {
             critic.check()?;
         }
-        if let Some(visual) = &self.visual {
-            visual.check()?;
+        if let Some(spec) = &self.visual_encoder {
+            spec.check()?;
         }
         ensure!(
-            self.visual.is_some() != self.resnet18.is_some(),
-            "an agent sees through either visual or resnet18, not both or none"
+            self.visual_encoder.is_some() != self.resnet18.is_some(),
+            "an agent has either visual_encoder or resnet18, not both or none"
         );
-        self.check_words()?;
+        self.check_vocabulary()?;
         if let Some(logit_adjustment) = &self.logit_adjustment {
             logit_adjustment.check().map_err(anyhow::Error::msg)?;
         }
@@ -296,16 +285,19 @@ impl Config {
     }
 
     /// An agent that attends to words has a number for each that it knows, and neither a critic nor a goal to be shown.
-    fn check_words(&self) -> anyhow::Result<()> {
+    fn check_vocabulary(&self) -> anyhow::Result<()> {
         let Some(attention) = &self.policy.attention else {
-            ensure!(self.words.is_none(), "words are there, and no policy.attention that reads them");
+            ensure!(self.vocabulary.is_none(), "vocabulary is there, and no policy.attention that reads it");
             return Ok(());
         };
         ensure!(self.critic.is_none(), "policy.attention reads words, which no critic here does");
-        ensure!(self.policy.goal.is_none(), "policy.attention and policy.goal exclude each other");
-        let words = self.words.as_ref().context("words is missing, which policy.attention reads")?.len();
-        let most = Vocabulary::most(attention.words);
-        ensure!(words <= most, "words are {words}, and policy.attention.words has numbers for {most}");
+        ensure!(self.policy.goal_channels.is_none(), "policy.attention and policy.goal_channels exclude each other");
+        let words = self.vocabulary.as_ref().context("vocabulary is missing, which policy.attention reads")?.len();
+        let most = Vocabulary::most(attention.vocabulary_size);
+        ensure!(
+            words <= most,
+            "vocabulary has {words} words, and policy.attention.vocabulary_size is enough for {most}"
+        );
         Ok(())
     }
 }
@@ -313,28 +305,27 @@ impl Config {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::data::json;
 
     /// A cloned agent of no use.
-    pub fn small() -> Config {
-        Config {
-            format_version: Config::FORMAT,
+    pub fn small() -> CheckpointConfig {
+        CheckpointConfig {
+            format_version: CheckpointConfig::FORMAT,
             ontology: Ontology::current(),
-            visual: Some(VisualSpec { input: 112, channels: vec![4; 4] }),
+            visual_encoder: Some(VisualSpec { image_size: 112, channels: vec![4; 4] }),
             resnet18: None,
             policy: PolicySpec {
                 history: 5,
                 embedding: 8,
                 channels: [4; 4],
-                halved: false,
+                downsample: false,
                 hidden: vec![8],
                 dropout: 0.2,
-                goal: None,
+                goal_channels: None,
                 attention: None,
             },
             method: None,
             critic: None,
-            words: None,
+            vocabulary: None,
             logit_adjustment: None,
             advantage_scale: None,
             sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
@@ -343,13 +334,13 @@ pub(super) mod tests {
                 dataset: "none".into(),
                 trajectories: 0,
                 seed: 1,
-                visual_steps: 0,
+                visual_encoder_steps: 0,
                 policy_steps: 0,
                 precision: Precision::Full,
-                visual_from: None,
-                policy_from: None,
-                critic_from: None,
-                averaged: None,
+                visual_encoder_from: None,
+                policy_initialised_from: None,
+                critic_initialised_from: None,
+                averaged_checkpoints: None,
             },
         }
     }
@@ -365,14 +356,17 @@ pub(super) mod tests {
         let mut value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         change(&mut value);
         std::fs::write(&path, value.to_string()).unwrap();
-        format!("{:#}", Config::read(folder).unwrap_err())
+        format!("{:#}", CheckpointConfig::read(folder).unwrap_err())
     }
 
     #[test]
     fn another_version_ontology_or_field_is_refused_by_name() {
         let folder = written();
-        let error = edit(folder.path(), |value| value["format_version"] = 7.into());
-        assert!(error.contains("format_version is 7") && error.contains("reads 1"), "{error}");
+        let error = edit(folder.path(), |value| {
+            value["format_version"] = 1.into();
+            value["balance"] = 0.5.into();
+        });
+        assert!(error.contains("config.json: format_version: 1, but this program reads 2; use the version"), "{error}");
         let folder = written();
         let error = edit(folder.path(), |value| value["ontology"]["classes"] = "abc".into());
         assert!(error.contains("ontology.classes is abc"), "{error}");
@@ -383,20 +377,20 @@ pub(super) mod tests {
         let error = edit(folder.path(), |value| value["policy"]["hidden"] = vec![1u64 << 40].into());
         assert!(error.contains("policy.hidden"), "{error}");
         let folder = written();
-        let error = edit(folder.path(), |value| value["words"] = vec!["mug"].into());
-        assert!(error.contains("no policy.attention that reads them"), "{error}");
+        let error = edit(folder.path(), |value| value["vocabulary"] = vec!["mug"].into());
+        assert!(error.contains("no policy.attention that reads it"), "{error}");
         let folder = written();
-        let attention = serde_json::json!({"words": 4, "layers": 1, "heads": 2, "inner": 8});
+        let attention = serde_json::json!({"vocabulary_size": 4, "layers": 1, "heads": 2, "feedforward": 8});
         let attending = |words: Option<[&str; 3]>| {
             edit(written().path(), |value| {
                 value["policy"]["attention"] = attention.clone();
-                value["words"] = serde_json::json!(words);
+                value["vocabulary"] = serde_json::json!(words);
             })
         };
-        assert!(attending(None).contains("words is missing"), "{}", attending(None));
+        assert!(attending(None).contains("vocabulary is missing"), "{}", attending(None));
         let many = attending(Some(["mug", "cup", "sink"]));
-        assert!(many.contains("words are 3") && many.contains("numbers for 2"), "{many}");
+        assert!(many.contains("vocabulary has 3 words") && many.contains("enough for 2"), "{many}");
         let error = edit(folder.path(), |value| value["resnet18"] = "abc".into());
-        assert!(error.contains("either visual or resnet18"), "{error}");
+        assert!(error.contains("either visual_encoder or resnet18"), "{error}");
     }
 }

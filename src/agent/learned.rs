@@ -11,7 +11,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
 use super::conditioning;
-use super::config::Config;
+use super::config::CheckpointConfig;
 use super::decision::Decision;
 use super::frame_history::FrameHistory;
 pub use super::frame_history::SharedEmbedder;
@@ -24,7 +24,7 @@ use crate::nets::visual::SIDE;
 /// A policy from a checkpoint.
 pub struct LearnedPolicy {
     name: String,
-    config: Config,
+    config: CheckpointConfig,
     networks: Networks,
     /// The visual encoder of the networks, for computing alone.
     encoder: Box<dyn FrameEncoder>,
@@ -49,7 +49,7 @@ impl LearnedPolicy {
     /// # Errors
     /// When the checkpoint is malformed, or was trained with another sentence encoder.
     pub fn load(folder: &Path, sentences: SharedEmbedder, device: Device) -> anyhow::Result<LearnedPolicy> {
-        let config = Config::read(folder)?;
+        let config = CheckpointConfig::read(folder)?;
         {
             let embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
             config.goes_with(embedder.encoder()).with_context(|| folder.join("config.json").display().to_string())?;
@@ -65,18 +65,18 @@ impl LearnedPolicy {
     /// When the visual encoder's weights cannot be read.
     pub fn with(
         name: String,
-        config: Config,
+        config: CheckpointConfig,
         networks: Networks,
         sentences: SharedEmbedder,
         device: Device,
     ) -> anyhow::Result<LearnedPolicy> {
-        let encoder = networks.eyes.frozen()?;
+        let encoder = networks.visual_encoder.frozen()?;
         let slots = (0..LearnedPolicy::SLOTS).map(|_| FrameHistory::default()).collect();
         Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
     }
 
     /// The checkpoint's configuration.
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &CheckpointConfig {
         &self.config
     }
 

@@ -13,15 +13,15 @@ pub struct LogitAdjustment {
     /// The share of the log shares that is taken off: 0 none, 1 all, as if every action had been shown alike.
     pub strength: f32,
     /// Each action's share of the labels, in the order of the action head; 0 where it never was.
-    pub shares: Vec<f32>,
+    pub action_frequencies: Vec<f32>,
 }
 
 impl LogitAdjustment {
     /// Takes what is frequent off the logits of the action head; those of the most frequent action stay as they are, since
     /// only differences count, and so does one that was never shown, of which nothing is known.
     pub fn apply(&self, logits: &mut [f32]) {
-        let most = self.shares.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-        for (logit, share) in logits.iter_mut().zip(&self.shares) {
+        let most = self.action_frequencies.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        for (logit, share) in logits.iter_mut().zip(&self.action_frequencies) {
             if *share > 0.0 {
                 *logit -= self.strength * (share / most).ln();
             }
@@ -36,12 +36,12 @@ impl LogitAdjustment {
         if !(0.0..=1.0).contains(&self.strength) {
             return Err(format!("logit_adjustment.strength is {}, which is not a share", self.strength));
         }
-        let (found, wanted) = (self.shares.len(), ActionType::COUNT);
+        let (found, wanted) = (self.action_frequencies.len(), ActionType::COUNT);
         if found != wanted {
-            return Err(format!("logit_adjustment.shares has {found} numbers, not {wanted}"));
+            return Err(format!("logit_adjustment.action_frequencies has {found} numbers, not {wanted}"));
         }
-        match self.shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-            Some(share) => Err(format!("logit_adjustment.shares has {share}, which is not a share")),
+        match self.action_frequencies.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            Some(share) => Err(format!("logit_adjustment.action_frequencies has {share}, which is not a share")),
             None => Ok(()),
         }
     }
@@ -54,12 +54,12 @@ mod tests {
     fn logit_adjustment(strength: f32) -> LogitAdjustment {
         let mut shares = vec![0.05; ActionType::COUNT];
         shares[0] = 0.45;
-        LogitAdjustment { strength, shares }
+        LogitAdjustment { strength, action_frequencies: shares }
     }
 
     /// Logits of an agent that knows nothing but how often actions were shown.
     fn knowing_only_shares() -> Vec<f32> {
-        logit_adjustment(0.0).shares.iter().map(|share| share.ln()).collect()
+        logit_adjustment(0.0).action_frequencies.iter().map(|share| share.ln()).collect()
     }
 
     #[test]
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn an_action_that_was_never_shown_gains_nothing() {
         let mut unseen = logit_adjustment(1.0);
-        unseen.shares[3] = 0.0;
+        unseen.action_frequencies[3] = 0.0;
         let mut logits = vec![0.0; ActionType::COUNT];
         unseen.apply(&mut logits);
         assert_eq!((logits[0], logits[3]), (0.0, 0.0));
@@ -99,11 +99,12 @@ mod tests {
     #[test]
     fn what_no_training_could_have_seen_is_refused_in_words() {
         logit_adjustment(0.4).check().unwrap();
-        let refused =
-            |strength, shares: &[f32]| LogitAdjustment { strength, shares: shares.to_vec() }.check().unwrap_err();
+        let refused = |strength, shares: &[f32]| {
+            LogitAdjustment { strength, action_frequencies: shares.to_vec() }.check().unwrap_err()
+        };
         assert_eq!(refused(1.5, &[0.1; 12]), "logit_adjustment.strength is 1.5, which is not a share");
         assert_eq!(refused(f32::NAN, &[0.1; 12]), "logit_adjustment.strength is NaN, which is not a share");
-        assert_eq!(refused(0.5, &[0.1; 11]), "logit_adjustment.shares has 11 numbers, not 12");
-        assert_eq!(refused(0.5, &[-0.5; 12]), "logit_adjustment.shares has -0.5, which is not a share");
+        assert_eq!(refused(0.5, &[0.1; 11]), "logit_adjustment.action_frequencies has 11 numbers, not 12");
+        assert_eq!(refused(0.5, &[-0.5; 12]), "logit_adjustment.action_frequencies has -0.5, which is not a share");
     }
 }

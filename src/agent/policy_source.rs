@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use anyhow::Context;
 use sha2::{Digest, Sha256};
 
-use super::config::Config;
+use super::config::CheckpointConfig;
 use super::experts::expert::ExpertPolicy;
 use super::learned::LearnedPolicy;
 use super::policy::Policy;
@@ -102,7 +102,7 @@ fn check_hash(folder: &Path, chosen: &str) -> anyhow::Result<()> {
 
 /// SHA-256 over a checkpoint's configuration and weights.
 fn hash(folder: &Path) -> anyhow::Result<String> {
-    Config::check_there(folder)?;
+    CheckpointConfig::check_there(folder)?;
     let mut digest = Sha256::new();
     for file in ["config.json", "model.safetensors"] {
         let path = folder.join(file);

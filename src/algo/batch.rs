@@ -51,10 +51,10 @@ pub struct Batch {
 const BASE: &str = "";
 /// Equation 4: A under z_B.
 pub(super) const CHAIN: &str = "chain";
-/// Equation 5: A under "A. B.". Metrics call it by this name.
-pub(super) const AGG_A: &str = "lead";
-/// Equation 5: B under "A. B.". Metrics call it by this name.
-const AGG_B: &str = "follow";
+/// Equation 5: A under "A. B.".
+pub(super) const AGG_A: &str = "aggregate_a";
+/// Equation 5: B under "A. B.".
+const AGG_B: &str = "aggregate_b";
 
 /// Transitions that become one segment, relabelled with a conditioning and terminals that may not be their own.
 struct SegmentSource<'a> {
@@ -119,10 +119,11 @@ impl Batch {
         };
         let mut sources = vec![segment(BASE, 1.0, base, &base.conditioning, &base.terminal)];
         if let (Some(pairs), Some(chaining)) = (&self.pairs, chaining) {
-            let (first, share) = (&pairs.first, chaining.weight / (chaining.chain + chaining.aggregate));
-            sources.push(segment(CHAIN, share * chaining.chain, first, &first.conditioning, &pairs.cut));
+            let (first, share) =
+                (&pairs.first, chaining.loss_weight / (chaining.chain_weight + chaining.aggregate_weight));
+            sources.push(segment(CHAIN, share * chaining.chain_weight, first, &first.conditioning, &pairs.cut));
             if let Some((joint, second)) = &pairs.joint {
-                let share = share * chaining.aggregate / 2.0;
+                let share = share * chaining.aggregate_weight / 2.0;
                 sources.push(segment(AGG_A, share, first, joint, &first.terminal));
                 sources.push(segment(AGG_B, share, second, &second.conditioning, &second.terminal));
             }

@@ -11,41 +11,40 @@ pub struct Chaining {
     /// Drawn from the batch, or from a pool.
     pub pairs: PairSource,
     /// Pairs in a step; the paper's is the batch.
-    pub batch: usize,
+    pub batch_size: usize,
     /// What A's reward at the cut is bootstrapped from.
-    #[serde(rename = "worth")]
     pub bootstrap: Bootstrap,
     /// What the policy learns from; the critic learns from both equations.
-    pub extracted: Extracted,
+    pub policy_extraction: PolicyExtraction,
     /// Whose statistics normalise chained items while the policy learns from them.
-    pub normalised: Normalised,
+    pub batch_norm_statistics: BatchNormStatistics,
     /// The weight of both equations together; that of the base loss is 1.
-    pub weight: f64,
+    pub loss_weight: f64,
     /// The weight of equation 4 within chaining.
-    pub chain: f64,
+    pub chain_weight: f64,
     /// The weight of equation 5 within chaining; 0 where there are no sentences to join.
-    pub aggregate: f64,
+    pub aggregate_weight: f64,
 }
 
 /// Which equations the policy learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Extracted {
+pub enum PolicyExtraction {
     /// Both, as in the paper.
     Both,
     /// Equation 5 alone. Where neither of two skills serves the other, no action is better than another for equation 4, so that
     /// it weighs as much as a demonstration and clones A under B's instruction.
-    Joint,
+    Aggregate,
 }
 
 /// Whose statistics the policy's batch norms use for chained items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Normalised {
+pub enum BatchNormStatistics {
     /// Those of the whole batch: what an agent sees later is normalised by a mixture that it never meets.
-    Together,
+    WholeBatch,
     /// The running ones of demonstrated items, which alone keep them up. Of chained items no unit is dropped then.
-    ByDemonstrations,
+    Demonstrations,
 }
 
 /// Where pairs of skills come from.

@@ -38,7 +38,7 @@ impl<'a> CriticLearner<'a> {
 
     /// Whether it is too young for its advantages to weigh the policy's loss.
     pub(super) fn is_warming_up(&self) -> bool {
-        self.learner.share() < self.iql.warmup_share
+        self.learner.share() < self.iql.cloning_fraction
     }
 
     /// One step of V and both Q, which share an optimiser and may share a trunk.
@@ -48,7 +48,7 @@ impl<'a> CriticLearner<'a> {
 
     /// Moves the target Q̄ towards Q.
     pub(super) fn update_target(&mut self) {
-        self.polyak.update(self.iql.target_rate);
+        self.polyak.update(self.iql.target_update_rate);
     }
 
     /// Every tensor of the training's state, by name.

@@ -17,11 +17,11 @@ pub struct Iql {
     /// No weight is above this.
     pub weight_cap: f64,
     /// The share by which the target Q follows Q after each step.
-    pub target_rate: f64,
+    pub target_update_rate: f64,
     /// The share of the steps in which the policy only clones the demonstrated skills: a critic that knows nothing yet weighs
     /// at random. The paper has no such phase, and 140,000 steps.
     #[serde(default)]
-    pub warmup_share: f64,
+    pub cloning_fraction: f64,
     /// How many times the advantage enters the exponent by which the agent weighs its policy when it decides. The paper's
     /// agent decides by its policy alone: 0.
     #[serde(default)]
@@ -34,8 +34,11 @@ impl Iql {
     /// # Errors
     /// Names the field of `iql` that is out of its bounds.
     pub fn check(&self) -> anyhow::Result<()> {
-        let Iql { discount, expectile, temperature, weight_cap, target_rate, warmup_share, advantage_scale } = *self;
-        for (field, share) in [("discount", discount), ("target_rate", target_rate), ("warmup_share", warmup_share)] {
+        let Iql { discount, expectile, temperature, weight_cap, target_update_rate, cloning_fraction, advantage_scale } =
+            *self;
+        for (field, share) in
+            [("discount", discount), ("target_update_rate", target_update_rate), ("cloning_fraction", cloning_fraction)]
+        {
             anyhow::ensure!((0.0..=1.0).contains(&share), "iql.{field} is {share}, which is not a share");
         }
         anyhow::ensure!(0.0 < expectile && expectile < 1.0, "iql.expectile is {expectile}, not between 0 and 1");

@@ -16,7 +16,7 @@ pub struct Optimisation {
     /// Steps of the whole training.
     pub steps: u64,
     /// Items in a step.
-    pub batch: usize,
+    pub batch_size: usize,
     /// The learning rate over the steps.
     pub schedule: Schedule,
     /// The optimiser's other settings.
@@ -29,15 +29,18 @@ impl Optimisation {
     /// # Errors
     /// Names the field that is out of its bounds.
     pub fn check(&self, name: &str) -> anyhow::Result<()> {
-        let Schedule { learning_rate, final_share, .. } = self.schedule;
+        let Schedule { learning_rate, final_fraction, .. } = self.schedule;
         let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.adamw;
-        let batch = self.batch;
-        ensure!((2..=65_536).contains(&batch), "{name}.batch is {batch}, which is not between 2 and 65536");
+        let batch_size = self.batch_size;
+        ensure!(
+            (2..=65_536).contains(&batch_size),
+            "{name}.batch_size is {batch_size}, which is not between 2 and 65536"
+        );
         let positive = |number: f64| number.is_finite() && number > 0.0;
         ensure!(positive(learning_rate), "{name}.schedule.learning_rate is {learning_rate}, which is no rate");
         ensure!(
-            (0.0..=1.0).contains(&final_share),
-            "{name}.schedule.final_share is {final_share}, which is not a share"
+            (0.0..=1.0).contains(&final_fraction),
+            "{name}.schedule.final_fraction is {final_fraction}, which is not a share"
         );
         for (field, beta) in [("beta1", beta1), ("beta2", beta2)] {
             ensure!((0.0..1.0).contains(&beta), "{name}.adamw.{field} is {beta}, which is not below 1, or negative");
@@ -149,8 +152,8 @@ mod tests {
     fn optimisation() -> Optimisation {
         Optimisation {
             steps: 9,
-            batch: 2,
-            schedule: Schedule { learning_rate: 0.1, warmup_steps: 0, final_share: 1.0 },
+            batch_size: 2,
+            schedule: Schedule { learning_rate: 0.1, warmup_steps: 0, final_fraction: 1.0 },
             adamw: AdamWConfig { beta1: 0.9, beta2: 0.999, epsilon: 1e-8, weight_decay: 0.0 },
         }
     }

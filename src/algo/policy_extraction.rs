@@ -4,7 +4,7 @@ use tch::{Kind, Tensor};
 
 use super::batch::{CHAIN, Segment, Transitions, gather};
 use super::bc;
-use super::chain::{Chaining, Extracted, Normalised};
+use super::chain::{BatchNormStatistics, Chaining, PolicyExtraction};
 use super::loss_terms::LossTerms;
 use crate::nets::policy::Logits;
 
@@ -21,10 +21,11 @@ impl<'a> ForwardPass<'a> {
         let (base, rest) = segments.split_at(1);
         let mut passes = vec![ForwardPass { segments: base.iter().collect(), train: true }];
         let Some(chaining) = chaining else { return passes };
-        let kept = rest.iter().filter(|segment| chaining.extracted == Extracted::Both || segment.name != CHAIN);
-        match chaining.normalised {
-            Normalised::Together => passes[0].segments.extend(kept),
-            Normalised::ByDemonstrations => passes.push(ForwardPass { segments: kept.collect(), train: false }),
+        let kept =
+            rest.iter().filter(|segment| chaining.policy_extraction == PolicyExtraction::Both || segment.name != CHAIN);
+        match chaining.batch_norm_statistics {
+            BatchNormStatistics::WholeBatch => passes[0].segments.extend(kept),
+            BatchNormStatistics::Demonstrations => passes.push(ForwardPass { segments: kept.collect(), train: false }),
         }
         passes.retain(|pass| !pass.segments.is_empty());
         passes

@@ -11,7 +11,7 @@ pub struct Schedule {
     /// Steps of the warm-up from zero.
     pub warmup_steps: u64,
     /// The share of the highest rate that is left at the last step.
-    pub final_share: f64,
+    pub final_fraction: f64,
 }
 
 impl Schedule {
@@ -22,7 +22,7 @@ impl Schedule {
         }
         let span = steps.saturating_sub(self.warmup_steps).max(1) as f64;
         let done = ((step - self.warmup_steps) as f64 / span).min(1.0);
-        self.learning_rate * (1.0 + (self.final_share - 1.0) * done)
+        self.learning_rate * (1.0 + (self.final_fraction - 1.0) * done)
     }
 }
 
@@ -32,7 +32,7 @@ mod tests {
 
     #[test]
     fn the_rate_rises_to_its_height_and_falls_to_its_share() {
-        let schedule = Schedule { learning_rate: 0.1, warmup_steps: 10, final_share: 0.2 };
+        let schedule = Schedule { learning_rate: 0.1, warmup_steps: 10, final_fraction: 0.2 };
         assert!((schedule.at(0, 110) - 0.01).abs() < 1e-12);
         assert!((schedule.at(9, 110) - 0.1).abs() < 1e-12);
         assert!((schedule.at(60, 110) - 0.06).abs() < 1e-12);

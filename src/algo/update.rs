@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use crate::algo::adamw::AdamWConfig;
     use crate::algo::batch::ChainedPairs;
-    use crate::algo::chain::{Bootstrap, Extracted, Normalised, PairSource};
+    use crate::algo::chain::{BatchNormStatistics, Bootstrap, PairSource, PolicyExtraction};
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
@@ -173,15 +173,15 @@ mod tests {
             history: 1,
             embedding: TEXTS,
             channels: [6; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![24],
             dropout: 0.0,
-            goal: None,
+            goal_channels: None,
             attention: None,
         };
         let critic = CriticSpec {
             channels: [6; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![24],
             dropout: 0.0,
             action_embedding: 4,
@@ -202,27 +202,27 @@ mod tests {
         expectile: 0.7,
         temperature: 3.0,
         weight_cap: 100.0,
-        target_rate: 0.05,
-        warmup_share: 0.0,
+        target_update_rate: 0.05,
+        cloning_fraction: 0.0,
         advantage_scale: 0.0,
     };
 
     const CHAINING: Chaining = Chaining {
         pairs: PairSource::Pool(1),
-        batch: 4,
+        batch_size: 4,
         bootstrap: Bootstrap::NextValue,
-        extracted: Extracted::Both,
-        normalised: Normalised::Together,
-        weight: 1.0,
-        chain: 0.5,
-        aggregate: 0.5,
+        policy_extraction: PolicyExtraction::Both,
+        batch_norm_statistics: BatchNormStatistics::WholeBatch,
+        loss_weight: 1.0,
+        chain_weight: 0.5,
+        aggregate_weight: 0.5,
     };
 
     fn optimisation(steps: u64) -> Optimisation {
         Optimisation {
             steps,
-            batch: 1,
-            schedule: Schedule { learning_rate: 8e-3, warmup_steps: 10, final_share: 0.01 },
+            batch_size: 1,
+            schedule: Schedule { learning_rate: 8e-3, warmup_steps: 10, final_fraction: 0.01 },
             adamw: AdamWConfig { beta1: 0.9, beta2: 0.999, epsilon: 1e-8, weight_decay: 0.0 },
         }
     }
@@ -339,8 +339,14 @@ mod tests {
             // The joint costs nothing, and each skill is one step: all are worth 1.
             assert!((values.double_value(&[i]) - 1.0).abs() < 0.05, "{values}");
         }
-        for name in ["chain_q_loss", "lead_value_loss", "follow_action_loss", "weight_max", "v_mean", "action_accuracy"]
-        {
+        for name in [
+            "chain_q_loss",
+            "aggregate_a_value_loss",
+            "aggregate_b_action_loss",
+            "weight_max",
+            "v_mean",
+            "action_accuracy",
+        ] {
             assert!(numbers.contains_key(name), "{name} is not among {numbers:?}");
         }
     }
@@ -348,7 +354,7 @@ mod tests {
     #[test]
     fn while_the_critic_warms_up_the_policy_clones_the_demonstrated_skills_alone() {
         let _chance = crate::nets::testing::chance();
-        let warming = || Iql { warmup_share: 0.6, ..IQL };
+        let warming = || Iql { cloning_fraction: 0.6, ..IQL };
         let one = |critic: bool| {
             let nets = nets();
             let mut update = match critic {
@@ -374,9 +380,10 @@ mod tests {
             let nets = nets();
             update(&nets, 1, IQL, Some(chaining)).update(&chained_skills(), false).unwrap()
         };
-        let (both, joint) = (losses(CHAINING), losses(Chaining { extracted: Extracted::Joint, ..CHAINING }));
+        let (both, joint) =
+            (losses(CHAINING), losses(Chaining { policy_extraction: PolicyExtraction::Aggregate, ..CHAINING }));
         assert!(both.contains_key("chain_action_loss") && !joint.contains_key("chain_action_loss"), "{joint:?}");
-        for name in ["chain_q_loss", "chain_value_loss", "lead_action_loss", "follow_action_loss"] {
+        for name in ["chain_q_loss", "chain_value_loss", "aggregate_a_action_loss", "aggregate_b_action_loss"] {
             assert!(joint.contains_key(name), "{name} is not among {joint:?}");
         }
     }
@@ -389,7 +396,7 @@ mod tests {
             update(&nets, 1, IQL, chaining).update(&chained_skills(), false).unwrap();
             nets.store.variables().into_iter().filter(|(name, _)| name.ends_with("running_mean")).collect::<Tensors>()
         };
-        let apart = Chaining { normalised: Normalised::ByDemonstrations, ..CHAINING };
+        let apart = Chaining { batch_norm_statistics: BatchNormStatistics::Demonstrations, ..CHAINING };
         assert_eq!(means(Some(apart)), means(None));
         assert!(means(Some(CHAINING)) != means(None));
     }

@@ -6,35 +6,35 @@ use std::sync::{Arc, Mutex};
 use anyhow::Context;
 use clap::Args;
 
-use super::appraised::appraised;
-use super::bar::Bars;
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
+use super::validate::validate;
 use crate::agent::average::average;
 use crate::data::ensure_free;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::train::preset::{Appraisal, Preset};
+use crate::train::preset::{Preset, ValidationSpec};
 
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
 /// checkpoint it makes another that decides otherwise.
 #[derive(Args)]
 pub struct Average {
-    /// Checkpoints; one that is named twice weighs twice
+    /// Checkpoints; one that is named twice counts twice
     #[arg(required = true, num_args = 1.., value_name = "CHECKPOINT")]
     checkpoints: Vec<PathBuf>,
-    /// How much of what is merely frequent it takes off its actions' logits when it decides, 0 to 1 [default: as the first]
+    /// How much of each action's log frequency among its labels is taken off the action's logit, 0 to 1 [default: as the first]
     #[arg(long, value_name = "STRENGTH")]
     logit_adjustment: Option<f32>,
     /// How much its critic's advantages count when it decides; 0: its policy decides alone [default: as the first]
-    #[arg(long, value_name = "WEIGHT")]
+    #[arg(long, value_name = "SCALE")]
     advantage_scale: Option<f32>,
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Tasks in generated houses to measure the result on, and half as many pairs of objects for agents that read to tell apart
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
-    appraise: u32,
+    validate: u32,
     /// The sentence encoder's folder, for measuring the result [default: all-MiniLM-L6-v2, which `make setup` fetched]
     #[arg(long, value_name = "DIR")]
     encoder: Option<PathBuf>,
@@ -53,19 +53,19 @@ impl Average {
         if let Some(strength) = self.logit_adjustment {
             config
                 .set_logit_adjustment(strength)
-                .with_context(|| format!("--logit_adjustment {strength} for {first}"))?;
+                .with_context(|| format!("--logit-adjustment {strength} for {first}"))?;
         }
         if let Some(weight) = self.advantage_scale {
-            config.set_advantage_scale(weight).with_context(|| format!("--advantage_scale {weight} for {first}"))?;
+            config.set_advantage_scale(weight).with_context(|| format!("--advantage-scale {weight} for {first}"))?;
         }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
         std::fs::create_dir_all(&self.out).with_context(|| format!("cannot make {}", self.out.display()))?;
         networks.save(&self.out, &config)?;
-        let tasks = self.appraise as usize;
-        let swaps = if config.policy.goal.is_some() { 0 } else { tasks / 2 };
-        let appraisal = Appraisal { tasks, swaps, ..Preset::sized("sprint", None)?.appraisal };
-        appraised(&self.out, &appraisal, Arc::new(Mutex::new(sentences)), Bars::new())?;
+        let tasks = self.validate as usize;
+        let swaps = if config.policy.goal_channels.is_some() { 0 } else { tasks / 2 };
+        let validation = ValidationSpec { tasks, swaps, ..Preset::named("sprint")?.validation };
+        validate(&self.out, &validation, Arc::new(Mutex::new(sentences)), Progress::new())?;
         Ok(ExitStatus::Ok)
     }
 }

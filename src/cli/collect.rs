@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 use anyhow::ensure;
 use clap::{Args, ValueEnum};
 
-use super::bar::Bars;
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use crate::data::taskset;
@@ -16,7 +16,7 @@ use crate::house::expert::TurnTiming;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
-use crate::train::collect::{Collection, Demonstrator, Manner, Source};
+use crate::train::collect::{Collection, DemonstrationSettings, ExpertKind, TaskSource};
 
 /// Collects demonstrations.
 #[derive(Args)]
@@ -25,8 +25,8 @@ pub struct Collect {
     out: PathBuf,
     /// Where to collect
     #[arg(long, default_value = "generated")]
-    scenes: Where,
-    /// The tasks to demonstrate, each once and told in its own words, instead of tasks in generated houses
+    scenes: SceneSource,
+    /// The tasks to demonstrate, each once and in its own words, instead of tasks in generated houses
     #[arg(long, value_name = "TASKS", conflicts_with_all = ["scenes", "episodes", "lengths", "annotations"])]
     tasks: Option<PathBuf>,
     /// How many demonstrations
@@ -38,13 +38,13 @@ pub struct Collect {
     /// Task lengths, drawn uniformly; a length may be listed more than once
     #[arg(long, value_delimiter = ',', default_values_t = [1, 1, 1, 2])]
     lengths: Vec<usize>,
-    /// Who demonstrates, or says what a learner should have done
-    #[arg(long, value_enum, default_value = "seeker")]
-    demonstrator: Who,
-    /// Turns and acts as soon as it may, not as late, so that a learner need not hit the last moment
+    /// The expert that demonstrates, or says what a learner should have done
+    #[arg(long, value_enum, default_value = "scanning-expert")]
+    demonstrator: Demonstrator,
+    /// The expert turns and acts as early as it may instead of as late, so that a learner need not hit the last moment
     #[arg(long)]
     prompt: bool,
-    /// The share of steps at which chance takes over for up to four steps
+    /// The fraction of steps at which random actions begin, for up to four steps
     #[arg(long, default_value_t = 0.08)]
     noise: f64,
     /// Phrasings of each demonstration
@@ -56,16 +56,16 @@ pub struct Collect {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Where {
+enum SceneSource {
     /// Generated houses
     Generated,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Who {
-    /// Turns around until it has seen what it goes for
+enum Demonstrator {
+    /// Turns around until the object it goes for is in view
     ScanningExpert,
-    /// Goes straight for things, seen or not, as ALFRED's planner did
+    /// Goes straight for objects, in view or not, as ALFRED's planner did
     Expert,
 }
 
@@ -75,8 +75,8 @@ impl Collect {
     /// # Errors
     /// When the folder cannot be written to.
     pub fn run(self) -> anyhow::Result<ExitStatus> {
-        let Where::Generated = self.scenes;
-        ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not a share", self.noise);
+        let SceneSource::Generated = self.scenes;
+        ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not between 0 and 1", self.noise);
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
         ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
         let learner = match self.learner {
@@ -86,24 +86,26 @@ impl Collect {
             }
             None => None,
         };
-        let source = match self.tasks {
+        let tasks = match self.tasks {
             Some(file) => {
                 let set = taskset::read(&file)?.value;
-                Source::Tasks { scenes: Scenes::of(&file, &set), tasks: set.tasks }
+                TaskSource::Tasks { scenes: Scenes::of(&file, &set), tasks: set.tasks }
             }
-            None => Source::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations },
+            None => {
+                TaskSource::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations }
+            }
         };
-        let demonstrator = match self.demonstrator {
-            Who::ScanningExpert => Demonstrator::ScanningExpert,
-            Who::Expert => Demonstrator::Expert,
+        let expert = match self.demonstrator {
+            Demonstrator::ScanningExpert => ExpertKind::Scanning,
+            Demonstrator::Expert => ExpertKind::Privileged,
         };
-        let pace = if self.prompt { TurnTiming::Early } else { TurnTiming::Late };
-        let manner = Manner { demonstrator, pace, noise: self.noise };
-        let collection = Collection { out: self.out, source, seed: self.seed, manner, learner };
+        let turn_timing = if self.prompt { TurnTiming::Early } else { TurnTiming::Late };
+        let settings = DemonstrationSettings { expert, turn_timing, noise: self.noise };
+        let collection = Collection { out: self.out, tasks, seed: self.seed, settings, learner };
         let stop = stop::on_signals()?;
-        let mut bars = Bars::new();
-        let collected = collection.run(&mut bars, &stop)?;
-        bars.end();
+        let mut progress = Progress::new();
+        let collected = collection.run(&mut progress, &stop)?;
+        progress.end();
         let at = collection.out.display();
         say(&format!(
             "{}{} demonstrations in {at}",

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::bar::Bars;
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use crate::agent::checkpoint::Networks;
-use crate::agent::config::Config;
+use crate::agent::config::CheckpointConfig;
 use crate::data::Dataset;
 use crate::nets::device::best_device;
 use crate::nets::frozen::FrameEncoder;
@@ -48,10 +48,10 @@ impl Encode {
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let frame_store = FrameStore::open(&datasets)?;
         let stop = stop::on_signals()?;
-        let mut bars = Bars::new();
+        let mut progress = Progress::new();
         let begun = std::time::Instant::now();
-        let features = features(&*encoder, &datasets, &frame_store, &mut bars, &stop)?;
-        bars.end();
+        let features = features(&*encoder, &datasets, &frame_store, &mut progress, &stop)?;
+        progress.end();
         let Some(features) = features else {
             say("stopped; the same command goes on from here");
             return Ok(ExitStatus::Interrupted);
@@ -67,7 +67,9 @@ impl Encoder {
     fn load(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
         let device = best_device();
         match (&self.checkpoint, &self.resnet18) {
-            (Some(folder), _) => Networks::load(folder, &Config::read(folder)?, device)?.eyes.frozen(),
+            (Some(folder), _) => {
+                Networks::load(folder, &CheckpointConfig::read(folder)?, device)?.visual_encoder.frozen()
+            }
             (None, Some(file)) => Ok(Box::new(ResNet18::read(file, device)?)),
             (None, None) => anyhow::bail!("name --checkpoint or --resnet18"),
         }

@@ -1,17 +1,16 @@
 //! `sprint eval`: plays a task set and writes the run folder.
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::exit_status::ExitStatus;
 use super::policies::PolicyChoice;
 use super::streams::say;
-use super::{jobs, stop, streams};
+use super::{jobs, progress, stop, streams};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, Progress};
@@ -156,56 +155,35 @@ pub fn print(summary: &RunSummary, json: bool) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-/// Progress on standard error: a bar in a terminal, else a plain line now and then.
+/// Progress on standard error: a display for people, or a JSON object for every episode.
 struct Meter {
-    bar: Option<ProgressBar>,
-    json: bool,
+    display: Option<progress::Progress>,
     started: Instant,
-    last: Option<Instant>,
 }
 
 impl Meter {
-    /// At most one plain line in this time.
-    const EVERY: Duration = Duration::from_secs(5);
-
     fn new(json: bool) -> Meter {
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {elapsed}, {eta} left");
-        let bar = (!json && std::io::stderr().is_terminal()).then(|| {
-            ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
-                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        });
-        Meter { bar, json, started: Instant::now(), last: None }
+        Meter { display: (!json).then(progress::Progress::new), started: Instant::now() }
     }
 
     fn show(&mut self, progress: Progress) {
-        let Progress { done, of, successes, errors } = progress;
-        let words = if errors == 0 {
-            format!("{successes} succeeded")
-        } else {
-            format!("{successes} succeeded, {errors} errored")
+        let Some(display) = &mut self.display else {
+            let seconds = self.started.elapsed().as_secs_f64();
+            let event = ProgressEvent::Progress { progress, seconds };
+            say(&serde_json::to_string(&event).unwrap_or_default());
+            return;
         };
-        match &self.bar {
-            Some(bar) => {
-                bar.set_length(of as u64);
-                bar.set_position(done as u64);
-                bar.set_message(words);
-            }
-            None if self.json => {
-                let seconds = self.started.elapsed().as_secs_f64();
-                let event = ProgressEvent::Progress { progress, seconds };
-                say(&serde_json::to_string(&event).unwrap_or_default());
-            }
-            None if done == of || self.last.is_none_or(|last| last.elapsed() >= Meter::EVERY) => {
-                say(&format!("{done}/{of} episodes, {words}, {:.0} s", self.started.elapsed().as_secs_f64()));
-                self.last = Some(Instant::now());
-            }
-            None => {}
-        }
+        let Progress { done, of, successes, errors } = progress;
+        let message = match errors {
+            0 => format!("{successes} succeeded"),
+            _ => format!("{successes} succeeded, {errors} errored"),
+        };
+        display.show("episodes", done as u64, of as u64, &message);
     }
 
     fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
+        if let Some(display) = &self.display {
+            display.end();
         }
     }
 }

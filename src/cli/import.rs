@@ -1,12 +1,12 @@
 //! `sprint import`: makes a dataset folder of data as others publish it.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 
 use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
 
 use super::exit_status::ExitStatus;
-use super::progress_style;
+use super::progress;
 use super::streams::say;
 use crate::data::alfred::{self, ImportProgress};
 
@@ -48,22 +48,22 @@ impl Import {
 
 impl Alfred {
     fn run(self) -> anyhow::Result<ExitStatus> {
-        let bar = ProgressBar::new(0).with_style(progress_style::counted());
+        let display = Mutex::new(progress::Progress::new());
         let show = |progress: ImportProgress| {
             let (what, done, total) = match progress {
                 ImportProgress::Reading(done, total) => ("reading", done, total),
                 ImportProgress::Building(done, total) => ("building scenes", done, total),
                 ImportProgress::Writing(done, total) => ("writing", done, total),
             };
-            if done <= 1 || done == total {
-                bar.set_message(what);
-                bar.set_length(total);
+            if let Ok(mut display) = display.lock() {
+                display.show(what, done, total, "");
             }
-            bar.set_position(done);
         };
         let options = alfred::ImportOptions { eval_lists: self.eval_lists };
         let summary = alfred::import(&self.source, &self.out, &options, &show);
-        bar.finish_and_clear();
+        if let Ok(display) = display.lock() {
+            display.end();
+        }
         let summary = summary?;
         let manifest = &summary.manifest;
         for skip in &manifest.skipped {

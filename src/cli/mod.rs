@@ -6,9 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use exit_status::ExitStatus;
 
-mod appraised;
 mod average;
-mod bar;
 mod collect;
 mod compare;
 mod doctor;
@@ -26,7 +24,7 @@ mod merge;
 mod open;
 mod policies;
 mod pretrain;
-mod progress_style;
+mod progress;
 mod relabel;
 mod replay;
 mod report;
@@ -35,6 +33,7 @@ mod shell;
 mod stop;
 mod streams;
 mod tasks;
+mod validate;
 mod value_names;
 mod verify;
 

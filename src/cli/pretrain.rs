@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex};
 
 use clap::Args;
 
-use super::appraised::{appraised, name};
-use super::bar::Bars;
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
 use super::stop;
 use super::streams::say;
+use super::validate::{name, validate};
 use crate::agent::learned::SharedEmbedder;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
@@ -34,7 +34,7 @@ pub struct Pretrain {
     /// The checkpoint folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Take up the training that was begun there
+    /// Go on with the training that was begun there
     #[arg(long)]
     resume: bool,
     /// Use this checkpoint's visual encoder instead of training one
@@ -52,7 +52,7 @@ pub struct Pretrain {
     /// Steps of the policy's training, instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
-    /// Let the agent play these tasks while it trains: not those it will be judged by
+    /// Let the agent play these tasks while it trains: not those it will be evaluated on
     #[arg(long, value_name = "FILE")]
     trials: Option<PathBuf>,
     /// Steps between two trials
@@ -74,14 +74,14 @@ impl Pretrain {
     pub fn run(self) -> anyhow::Result<ExitStatus> {
         let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
-            preset.visual_training.optimisation.steps = steps;
+            preset.visual_encoder_training.optimisation.steps = steps;
         }
         if let Some(steps) = self.steps {
             preset.training.steps = steps;
         }
         let folder = self.encoder.unwrap_or_else(default_folder);
         let device = best_device();
-        let sentences: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
+        let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
         let pretraining = Pretraining {
             preset,
             data: self.data,
@@ -90,23 +90,23 @@ impl Pretrain {
             visual_from: self.visual_from,
             policy_from: self.policy_from,
             critic_from: self.critic_from,
-            trials: self.trials.map(|tasks| InTrainingEval {
+            in_training_eval: self.trials.map(|tasks| InTrainingEval {
                 tasks,
                 limit: self.trials_limit,
                 every: self.trials_every,
             }),
-            sentences: sentences.clone(),
+            embedder: embedder.clone(),
             sentence_encoder: name(&folder),
             device,
         };
         let stop = stop::on_signals()?;
-        let mut bars = Bars::new();
-        if pretraining.run(&mut bars, &stop)? == Trained::Stopped {
-            bars.end();
+        let mut progress = Progress::new();
+        if pretraining.run(&mut progress, &stop)? == Trained::Stopped {
+            progress.end();
             say("stopped; --resume goes on from here");
             return Ok(ExitStatus::Interrupted);
         }
-        appraised(&pretraining.out, &pretraining.preset.appraisal, sentences, bars)?;
+        validate(&pretraining.out, &pretraining.preset.validation, embedder, progress)?;
         Ok(ExitStatus::Ok)
     }
 }

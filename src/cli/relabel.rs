@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::bar::Bars;
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use crate::language::passage::{Concatenation, Summarizer};
@@ -41,9 +41,9 @@ impl Relabel {
             With::Concat => &Concatenation,
         };
         let stop = stop::on_signals()?;
-        let mut bars = Bars::new();
-        let found = relabel(&self.data, summarizer, &mut bars, &stop)?;
-        bars.end();
+        let mut progress = Progress::new();
+        let found = relabel(&self.data, summarizer, &mut progress, &stop)?;
+        progress.end();
         if found.stopped {
             say("stopped; the same command goes on from here");
             return Ok(ExitStatus::Interrupted);

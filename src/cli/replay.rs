@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::ProgressBar;
 
 use super::exit_status::ExitStatus;
+use super::progress::Counter;
+use super::streams;
 use super::streams::say;
-use super::{progress_style, streams};
 use crate::data::Dataset;
 use crate::eval::replay::{ReplayOptions, ReplayReport, replay};
 
@@ -47,10 +47,10 @@ impl ReplayArgs {
         if let Some(split) = &self.split {
             dataset.check_split(split)?;
         }
-        let bar = ProgressBar::new(total).with_style(progress_style::counted()).with_message("replaying");
+        let counter = Counter::new("replaying", total);
         let options = ReplayOptions { split: self.split, boxes: self.boxes, sight: self.sight };
-        let report = replay(&dataset, &options, &|done| bar.inc(done));
-        bar.finish_and_clear();
+        let report = replay(&dataset, &options, &|done| counter.add(done));
+        counter.end();
         let report = report?;
         list_failures(&report);
         let mut out = streams::out();

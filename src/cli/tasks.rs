@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
 
 use super::exit_status::ExitStatus;
-use super::{jobs, progress_style, streams, value_names};
+use super::progress::Counter;
+use super::{jobs, streams, value_names};
 use crate::agent::policy_source::PolicySource;
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
@@ -139,10 +139,9 @@ impl SampleArgs {
         let lengths = self.length.0;
         let spec = SampleSpec { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
         let set = if self.scenes == Path::new("generated") {
-            let bar =
-                ProgressBar::new(u64::from(self.count)).with_style(progress_style::counted()).with_message("sampling");
-            let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| bar.inc(1)));
-            bar.finish_and_clear();
+            let counter = Counter::new("sampling", u64::from(self.count));
+            let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| counter.add(1)));
+            counter.end();
             set?
         } else {
             let dataset = Dataset::open(&self.scenes)?;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
+use super::progress::Progress;
 use super::{jobs, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
@@ -46,10 +47,11 @@ impl Verify {
                 self.checkpoint.as_deref(),
             )
         };
-        let bar = indicatif::ProgressBar::new(run.episodes.len() as u64);
-        let verdict =
-            verify::verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| bar.set_position(done as u64))?;
-        bar.finish_and_clear();
+        let (mut progress, total) = (Progress::new(), run.episodes.len() as u64);
+        let verdict = verify::verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| {
+            progress.show("verifying", done as u64, total, "")
+        })?;
+        progress.end();
         let mut out = streams::out();
         if self.json {
             writeln!(out, "{}", serde_json::to_string(&verdict)?)?;

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
 use super::json::hex;
-use super::selection::{Composites, DataSelection, Named, Past};
+use super::selection::{Composites, DataSelection, HistoryStart, ObjectTarget};
 use super::summaries::Summaries;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{ActionType, Trajectory};
@@ -80,9 +80,9 @@ pub struct Items {
     /// beginning of its last one.
     pub withheld: HashMap<u32, Range<u32>>,
     /// How far back observations reach.
-    pub past: Past,
+    pub history_start: HistoryStart,
     /// What the object head learns.
-    pub named: Named,
+    pub object_target: ObjectTarget,
 }
 
 /// A drawn item: the transition from `frame` to the frame after it.
@@ -112,8 +112,13 @@ impl Items {
     ) -> anyhow::Result<Items> {
         let learned = |label: &ActionLabel| label.executed || selection.corrections;
         let labels = labels.into_iter().map(|label| label.filter(learned)).collect();
-        let mut items =
-            Items { labels, firsts: vec![0], past: selection.past, named: selection.named, ..Items::default() };
+        let mut items = Items {
+            labels,
+            firsts: vec![0],
+            history_start: selection.history_start,
+            object_target: selection.object_target,
+            ..Items::default()
+        };
         let mut numbers = HashMap::new();
         let mut first = 0;
         for (position, trajectory) in source.trajectories.iter().enumerate() {
@@ -167,7 +172,7 @@ impl Items {
             let frame = rng.random_range(span.start..span.end);
             if self.is_labelled(frame as usize) {
                 return Item {
-                    first: self.past.first(span.first, span.start, rng),
+                    first: self.history_start.first(span.first, span.start, rng),
                     frame,
                     end: span.end,
                     text: span.text,
@@ -178,9 +183,9 @@ impl Items {
 
     /// The class that the object head learns to name at an item's frame; 0 where there is none.
     pub fn object_target(&self, item: &Item) -> u8 {
-        let last = match self.named {
-            Named::Own => item.frame + 1,
-            Named::Ahead => item.end,
+        let last = match self.object_target {
+            ObjectTarget::Current => item.frame + 1,
+            ObjectTarget::Next => item.end,
         };
         let labels = self.labels.get(item.frame as usize..last as usize).unwrap_or_default();
         labels.iter().flatten().map(|label| label.object).find(|&object| object > 0).unwrap_or(0)
@@ -418,17 +423,20 @@ mod tests {
     #[test]
     fn observations_reach_back_as_far_as_the_selection_says() {
         let two = [trajectory(vec![0, 2], 5)];
-        let firsts = |past| {
+        let firsts = |history_start| {
             let summaries = Summaries::default();
             let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
-            let selection = DataSelection { past, ..DataSelection::of(Composites::None) };
+            let selection = DataSelection { history_start, ..DataSelection::of(Composites::None) };
             let items = Items::of(&source, labels(&two), &selection).unwrap();
             let drawn = items.draw(&items.training, 1, 0, 50);
             let late = drawn.iter().filter(|item| item.frame >= 2);
             assert!(drawn.iter().all(|item| items.goals(item) == (item.frame + 1..6)));
             Vec::from_iter::<std::collections::BTreeSet<u32>>(late.map(|item| item.first).collect())
         };
-        assert_eq!([Past::Trajectory, Past::Span, Past::Either].map(firsts), [vec![0], vec![2], vec![0, 2]]);
+        assert_eq!(
+            [HistoryStart::Trajectory, HistoryStart::Span, HistoryStart::Either].map(firsts),
+            [vec![0], vec![2], vec![0, 2]]
+        );
     }
 
     #[test]
@@ -437,16 +445,16 @@ mod tests {
         let mut labels = labels(&two);
         labels[2] = Some(ActionLabel { action: 5, object: 7, executed: true });
         labels[4] = Some(ActionLabel { action: 6, object: 9, executed: true });
-        let named = |named, end| -> Vec<u8> {
+        let named = |object_target, end| -> Vec<u8> {
             let summaries = Summaries::default();
             let source = ItemSource { trajectories: &two, apart: &[], held_out: &[], summaries: &summaries };
-            let selection = DataSelection { named, ..DataSelection::of(Composites::None) };
+            let selection = DataSelection { object_target, ..DataSelection::of(Composites::None) };
             let items = Items::of(&source, labels.clone(), &selection).unwrap();
             (0..end).map(|frame| items.object_target(&Item { first: 0, frame, end, text: 0 })).collect()
         };
-        assert_eq!(named(Named::Own, 5), [0, 0, 7, 0, 9]);
-        assert_eq!(named(Named::Ahead, 5), [7, 7, 7, 9, 9]);
-        assert_eq!(named(Named::Ahead, 4), [7, 7, 7, 0], "what comes after the span is not asked for");
+        assert_eq!(named(ObjectTarget::Current, 5), [0, 0, 7, 0, 9]);
+        assert_eq!(named(ObjectTarget::Next, 5), [7, 7, 7, 9, 9]);
+        assert_eq!(named(ObjectTarget::Next, 4), [7, 7, 7, 0], "what comes after the span is not asked for");
     }
 
     #[test]

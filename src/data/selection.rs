@@ -21,7 +21,7 @@ pub enum Composites {
 /// How far back the frames of an observation reach.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Past {
+pub enum HistoryStart {
     /// To what came before the span.
     #[default]
     Trajectory,
@@ -31,13 +31,13 @@ pub enum Past {
     Either,
 }
 
-impl Past {
+impl HistoryStart {
     /// The first frame that an observation may show, of those with which its trajectory and its span begin.
     pub(super) fn first(self, trajectory: u32, span: u32, rng: &mut ChaCha8Rng) -> u32 {
         match self {
-            Past::Trajectory => trajectory,
-            Past::Span => span,
-            Past::Either => [trajectory, span][usize::from(rng.random_bool(0.5))],
+            HistoryStart::Trajectory => trajectory,
+            HistoryStart::Span => span,
+            HistoryStart::Either => [trajectory, span][usize::from(rng.random_bool(0.5))],
         }
     }
 }
@@ -45,12 +45,12 @@ impl Past {
 /// Which class the policy's object head learns to name at a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Named {
+pub enum ObjectTarget {
     /// That of the thing the step interacts with; none on the way.
     #[default]
-    Own,
+    Current,
     /// On the way that of the thing the span interacts with next.
-    Ahead,
+    Next,
 }
 
 /// Which spans are learned from.
@@ -61,22 +61,28 @@ pub struct DataSelection {
     pub composites: Composites,
     /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub labels_of: Option<String>,
+    pub label_source: Option<String>,
     /// Whether the policy learns too what would have been right where chance or a learner did something else.
     #[serde(default)]
     pub corrections: bool,
     /// How far back observations reach.
     #[serde(default)]
-    pub past: Past,
+    pub history_start: HistoryStart,
     /// What the object head learns.
     #[serde(default)]
-    pub named: Named,
+    pub object_target: ObjectTarget,
 }
 
 impl DataSelection {
     /// A selection of composites; with labels, of the only source there is.
     pub fn of(composites: Composites) -> DataSelection {
-        DataSelection { composites, labels_of: None, corrections: false, past: Past::Trajectory, named: Named::Own }
+        DataSelection {
+            composites,
+            label_source: None,
+            corrections: false,
+            history_start: HistoryStart::Trajectory,
+            object_target: ObjectTarget::Current,
+        }
     }
 }
 
@@ -87,7 +93,7 @@ mod tests {
     #[test]
     fn a_selection_is_written_in_kebab_case() {
         let read: DataSelection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
-        assert_eq!(read, DataSelection { labels_of: Some("rules".into()), ..DataSelection::of(Composites::Labels) });
+        assert_eq!(read, DataSelection { label_source: Some("rules".into()), ..DataSelection::of(Composites::Labels) });
         assert!(toml::from_str::<DataSelection>("composites = \"some\"").is_err());
     }
 }

@@ -18,7 +18,7 @@ pub struct CriticSpec {
     pub channels: [i64; 4],
     /// Whether the second convolution reads every other place.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub halved: bool,
+    pub downsample: bool,
     /// Width of the fully connected layers of each head.
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
@@ -115,7 +115,7 @@ impl Critic {
     /// A critic with fresh weights under `path`.
     pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, inputs: CriticInputs) -> Critic {
         let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
-        let over = |channels| Convolutions { channels, halved: spec.halved };
+        let over = |channels| Convolutions { channels, downsample: spec.downsample };
         let trunk =
             |name: &&str| Trunk::new(&(path / *name), inputs.channels, over(&spec.channels), Some(inputs.conditioning));
         let trunks: Vec<Trunk> = names.iter().map(trunk).collect();
@@ -220,7 +220,7 @@ mod tests {
     fn critic(store: &nn::VarStore, shared_trunk: bool) -> Critic {
         let spec = CriticSpec {
             channels: [4; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![8],
             dropout: 0.2,
             action_embedding: 6,

@@ -15,13 +15,13 @@ use super::visual::SIDE;
 #[serde(deny_unknown_fields)]
 pub struct AttentionSpec {
     /// Entries of the table of words: at most so many, those for padding and unknown words included.
-    pub words: i64,
+    pub vocabulary_size: i64,
     /// Layers that read the words alone, and again as many that read words and frames.
     pub layers: i64,
     /// Heads of a layer.
     pub heads: i64,
     /// Width of a layer's inner network.
-    pub inner: i64,
+    pub feedforward: i64,
 }
 
 impl AttentionSpec {
@@ -31,10 +31,10 @@ impl AttentionSpec {
     /// Names the field of `policy` that is out of its bounds; also when tokens do not divide among the heads, or have no halves
     /// for sines and cosines.
     pub fn check(&self, width: i64) -> anyhow::Result<()> {
-        bounds::sizes("policy.attention.words", &[self.words], 1 << 20)?;
+        bounds::sizes("policy.attention.vocabulary_size", &[self.vocabulary_size], 1 << 20)?;
         bounds::sizes("policy.attention.layers", &[self.layers], 64)?;
         bounds::sizes("policy.attention.heads", &[self.heads], 64)?;
-        bounds::sizes("policy.attention.inner", &[self.inner], 16_384)?;
+        bounds::sizes("policy.attention.feedforward", &[self.feedforward], 16_384)?;
         anyhow::ensure!(
             width % 2 == 0 && width % self.heads == 0,
             "policy.embedding is {width}, which is not even or no multiple of policy.attention.heads, {}",
@@ -64,8 +64,8 @@ impl AttentionLayer {
             query_key_value: linear("query_key_value", width, 3 * width),
             attended: linear("attended", width, width),
             attended_norm: norm("attended_norm"),
-            inner: linear("inner", width, spec.inner),
-            outer: linear("outer", spec.inner, width),
+            inner: linear("inner", width, spec.feedforward),
+            outer: linear("outer", spec.feedforward, width),
             norm: norm("norm"),
             heads: spec.heads,
             dropout,
@@ -117,7 +117,7 @@ impl Episodic {
         };
         let trunk = Trunk::new(&(path / "frame"), features, convolutions, None);
         Episodic {
-            words: nn::embedding(path / "words", spec.words, width, Default::default()),
+            words: nn::embedding(path / "words", spec.vocabulary_size, width, Default::default()),
             frame: nn::linear(path / "frame" / "out", trunk.width(), width, Default::default()),
             trunk,
             language: layers("language"),
@@ -168,8 +168,12 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(4);
         let store = nn::VarStore::new(Device::Cpu);
-        let layer =
-            AttentionLayer::new(&store.root(), 8, &AttentionSpec { words: 9, layers: 1, heads: 2, inner: 16 }, 0.0);
+        let layer = AttentionLayer::new(
+            &store.root(),
+            8,
+            &AttentionSpec { vocabulary_size: 9, layers: 1, heads: 2, feedforward: 16 },
+            0.0,
+        );
         let (tokens, bias) = (Tensor::randn([3, 5, 8], (Kind::Float, Device::Cpu)), Tensor::from(0.0f32));
         let [full, mixed] = [Kind::Float, Kind::BFloat16].map(|kind| layer.forward(&tokens, &bias, kind, false));
         assert_eq!([full.kind(), mixed.kind()], [Kind::Float, Kind::Float]);

@@ -22,14 +22,14 @@ pub struct PolicySpec {
     pub channels: [i64; 4],
     /// Whether the second convolution reads every other place.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub halved: bool,
+    pub downsample: bool,
     /// Width of the fully connected layers.
     pub hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
     pub dropout: f64,
     /// Where a state to reach takes the place of an instruction: the channels of the four convolutions that see it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub goal: Option<[i64; 4]>,
+    pub goal_channels: Option<[i64; 4]>,
     /// Where the agent reads words and attends to them: the attention layers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attention: Option<AttentionSpec>,
@@ -46,8 +46,8 @@ impl PolicySpec {
         bounds::sizes("policy.channels", &self.channels, 4096)?;
         bounds::sizes("policy.hidden", &self.hidden, 16_384)?;
         bounds::dropout("policy.dropout", self.dropout)?;
-        if let Some(channels) = &self.goal {
-            bounds::sizes("policy.goal", channels, 4096)?;
+        if let Some(channels) = &self.goal_channels {
+            bounds::sizes("policy.goal_channels", channels, 4096)?;
         }
         self.attention.as_ref().map_or(Ok(()), |attention| attention.check(self.embedding))
     }
@@ -88,7 +88,7 @@ impl PolicyNet {
     /// A network with fresh weights under `path`, over maps of `features` channels a frame.
     pub fn new(path: &nn::Path<'_>, spec: &PolicySpec, features: i64) -> PolicyNet {
         let from = spec.history * features;
-        let over = |channels| Convolutions { channels, halved: spec.halved };
+        let over = |channels| Convolutions { channels, downsample: spec.downsample };
         let (body, width) = match &spec.attention {
             Some(attention) => {
                 let (frames, tokens) = ((spec.history, features), (spec.embedding, over(&spec.channels), spec.dropout));
@@ -96,7 +96,7 @@ impl PolicyNet {
             }
             None => {
                 let trunk = Trunk::new(path, from, over(&spec.channels), Some(spec.embedding));
-                let conditioner = Conditioning::new(path, spec.embedding, spec.goal.as_ref().map(over), from);
+                let conditioner = Conditioning::new(path, spec.embedding, spec.goal_channels.as_ref().map(over), from);
                 let width = trunk.width();
                 (Body::Trunk { conditioner, trunk }, width + spec.embedding)
             }
@@ -143,10 +143,10 @@ mod tests {
             history: 5,
             embedding: 6,
             channels: [8; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![16],
             dropout: 0.2,
-            goal,
+            goal_channels: goal,
             attention: None,
         }
     }
@@ -189,7 +189,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(1);
         let store = nn::VarStore::new(Device::Cpu);
-        let attention = Some(AttentionSpec { words: 9, layers: 1, heads: 2, inner: 8 });
+        let attention = Some(AttentionSpec { vocabulary_size: 9, layers: 1, heads: 2, feedforward: 8 });
         let net = PolicyNet::new(&store.root(), &PolicySpec { attention, ..spec(None) }, 4);
         let observation = Tensor::rand([1, 20, SIDE, SIDE], (Kind::Float, Device::Cpu));
         let say = |words: &[i64]| net.forward(&observation, &Tensor::from_slice(words).unsqueeze(0), false).actions;

@@ -14,18 +14,18 @@ pub struct Convolutions<'a> {
     /// Output channels of each.
     pub channels: &'a [i64; 4],
     /// Whether the second one reads every other place, so that those after it see 4 x 4 places instead of 7 x 7.
-    pub halved: bool,
+    pub downsample: bool,
 }
 
 impl Convolutions<'_> {
     /// How far apart the places are that the convolution at a position reads.
     fn stride(self, position: usize) -> i64 {
-        if self.halved && position == 1 { 2 } else { 1 }
+        if self.downsample && position == 1 { 2 } else { 1 }
     }
 
     /// The side of the map that comes out.
     fn side(self) -> i64 {
-        if self.halved { (SIDE + 1) / 2 } else { SIDE }
+        if self.downsample { (SIDE + 1) / 2 } else { SIDE }
     }
 }
 
@@ -166,9 +166,9 @@ mod tests {
     fn a_halved_trunk_gives_four_by_four_places_and_still_sees_all_of_the_map() {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(6);
-        let widths = [false, true].map(|halved| {
+        let widths = [false, true].map(|downsample| {
             let store = nn::VarStore::new(Device::Cpu);
-            let trunk = Trunk::new(&store.root(), 2, Convolutions { channels: &[16; 4], halved }, None);
+            let trunk = Trunk::new(&store.root(), 2, Convolutions { channels: &[16; 4], downsample }, None);
             let corner = Tensor::zeros([1, 2, SIDE, SIDE], (Kind::Float, Device::Cpu));
             let dark = trunk.forward(&corner, None, false);
             let _ = corner.select(2, SIDE - 1).select(2, SIDE - 1).fill_(9.0);

@@ -20,7 +20,7 @@ pub const SIDE: i64 = 7;
 #[serde(deny_unknown_fields)]
 pub struct VisualSpec {
     /// The side of the image it reads, in pixels: [`SIDE`], doubled as often as there are channels.
-    pub input: i64,
+    pub image_size: i64,
     /// Channels at 1/2, 1/4, 1/8 of the image and so on; the last are the features.
     pub channels: Vec<i64>,
 }
@@ -32,10 +32,14 @@ impl VisualSpec {
     /// When it becomes another, or there is no channel.
     pub fn check(&self) -> anyhow::Result<()> {
         let halvings = self.channels.len();
-        anyhow::ensure!((1..=6).contains(&halvings), "visual.channels has {halvings} entries, not 1 to 6");
+        anyhow::ensure!((1..=6).contains(&halvings), "visual_encoder.channels has {halvings} entries, not 1 to 6");
         let side = SIDE << halvings;
-        bounds::sizes("visual.channels", &self.channels, 4096)?;
-        anyhow::ensure!(self.input == side, "visual.input is {}, not {side} for {halvings} channels", self.input);
+        bounds::sizes("visual_encoder.channels", &self.channels, 4096)?;
+        anyhow::ensure!(
+            self.image_size == side,
+            "visual_encoder.image_size is {}, not {side} for {halvings} channels",
+            self.image_size
+        );
         Ok(())
     }
 
@@ -51,7 +55,7 @@ impl VisualSpec {
 
     /// What the encoder reads of a frame: planes of bytes.
     pub fn image(&self, frame: &Frame) -> Vec<u8> {
-        resize_area(&frame.rgb, frame.width, self.input as usize)
+        resize_area(&frame.rgb, frame.width, self.image_size as usize)
     }
 }
 
@@ -137,7 +141,7 @@ impl HouseEncoder {
         self.device
     }
 
-    /// `pixels` [n, 3, input, input] in 0..255, any kind, to [n, features, 7, 7].
+    /// `pixels` [n, 3, image_size, image_size] in 0..255, any kind, to [n, features, 7, 7].
     pub fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
         self.forward_with(Precision::Full, pixels, train)
     }
@@ -166,7 +170,7 @@ impl HouseEncoder {
 
     /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualSpec::image`]), without gradients.
     pub fn encode(&self, images: &[Vec<u8>]) -> Tensor {
-        let side = self.spec.input;
+        let side = self.spec.image_size;
         let pixels = Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]);
         tch::no_grad(|| self.forward(&pixels, false))
     }
@@ -184,7 +188,7 @@ pub struct FrozenVisual {
 
 impl FrameEncoder for FrozenVisual {
     fn side(&self) -> usize {
-        self.spec.input as usize
+        self.spec.image_size as usize
     }
 
     fn image(&self, frame: &Frame) -> Vec<u8> {
@@ -231,7 +235,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(3);
         let store = nn::VarStore::new(Device::Cpu);
-        let spec = VisualSpec { input: 112, channels: vec![8, 8, 8, 16] };
+        let spec = VisualSpec { image_size: 112, channels: vec![8, 8, 8, 16] };
         let encoder = HouseEncoder::new(&store.root(), &spec);
         let images: Vec<Vec<u8>> = (0..3u8).map(|i| vec![40 * i; 3 * 112 * 112]).collect();
         let maps = encoder.encode(&images);
@@ -243,14 +247,14 @@ mod tests {
     #[test]
     fn a_larger_image_is_halved_once_more_and_what_does_not_fit_is_refused() {
         let _chance = crate::nets::testing::chance();
-        let spec = VisualSpec { input: 224, channels: vec![2, 2, 2, 2, 3] };
+        let spec = VisualSpec { image_size: 224, channels: vec![2, 2, 2, 2, 3] };
         spec.check().unwrap();
         let store = nn::VarStore::new(Device::Cpu);
         let maps = HouseEncoder::new(&store.root(), &spec).encode(&[vec![9; 3 * 224 * 224]]);
         assert_eq!(maps.size(), [1, 3, SIDE, SIDE]);
-        let refused = |input, channels| VisualSpec { input, channels }.check().unwrap_err().to_string();
-        assert!(refused(112, vec![2; 5]).contains("visual.input is 112, not 224"));
-        assert!(refused(7, Vec::new()).contains("visual.channels has 0 entries"));
+        let refused = |image_size, channels| VisualSpec { image_size, channels }.check().unwrap_err().to_string();
+        assert!(refused(112, vec![2; 5]).contains("visual_encoder.image_size is 112, not 224"));
+        assert!(refused(7, Vec::new()).contains("visual_encoder.channels has 0 entries"));
     }
 
     #[test]
@@ -258,7 +262,7 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         tch::manual_seed(5);
         let store = nn::VarStore::new(Device::Cpu);
-        let encoder = HouseEncoder::new(&store.root(), &VisualSpec { input: 112, channels: vec![4, 8, 8, 16] });
+        let encoder = HouseEncoder::new(&store.root(), &VisualSpec { image_size: 112, channels: vec![4, 8, 8, 16] });
         let noise = Tensor::randint(255, [4, 3, 112, 112], (Kind::Uint8, Device::Cpu));
         // Batch norms that are not the identity.
         for _ in 0..20 {

@@ -1,4 +1,4 @@
-//! Encoding: every frame of datasets is drawn and becomes a feature map, once; the maps are kept in each dataset's cache.
+//! Feature maps: every frame of datasets is drawn and encoded once; the maps are kept in each dataset's cache folder.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use tch::{Device, Kind, Tensor};
 
 use super::frame_store::FrameStore;
-use super::metrics::{Report, Scalars};
+use super::metrics::{ProgressLogger, Scalars};
 use crate::data::Dataset;
 use crate::data::features::{FeatureHeader, FeatureWriter, Features};
 use crate::house::House;
@@ -23,9 +23,9 @@ use crate::nets::visual::SIDE;
 /// Frames that are encoded at once; with more, a core's cache no longer holds what lies between two layers.
 const BATCH: usize = 32;
 /// Trajectories whose first frames tell whether all still look as they did.
-const LOOKED_AT: usize = 24;
+const SAMPLED_TRAJECTORIES: usize = 24;
 
-/// The maps of every frame of the footage, in its order; `datasets` are those it was opened with. What is missing is computed.
+/// The maps of every frame of the store, in its order; `datasets` are those it was opened with. What is missing is computed.
 /// Nothing when it was stopped: the same call goes on from there.
 ///
 /// # Errors
@@ -34,7 +34,7 @@ pub fn features(
     encoder: &dyn FrameEncoder,
     datasets: &[Dataset],
     frame_store: &FrameStore,
-    report: &mut dyn Report,
+    logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<Option<Features>> {
     let mut all: Option<Features> = None;
@@ -42,14 +42,14 @@ pub fn features(
         let header = FeatureHeader {
             format_version: FeatureHeader::FORMAT,
             encoder: encoder.digest().to_string(),
-            dataset: format!("{}-{}", dataset.digest()?, looks(frame_store, trajectories)?),
+            dataset: format!("{}-{}", dataset.digest()?, appearance_digest(frame_store, trajectories)?),
             maps: frame_store.frames_of(trajectories) as u64,
             numbers: (encoder.features() * SIDE * SIDE) as u64,
         };
         let cache = dataset.folder().join("cache");
         let mut found = Features::read(&cache, &header)?;
         if found.is_none() {
-            if !encode(encoder, frame_store, trajectories.clone(), &cache, &header, report, stop)? {
+            if !encode(encoder, frame_store, trajectories.clone(), &cache, &header, logger, stop)? {
                 return Ok(None);
             }
             found = Features::read(&cache, &header)?;
@@ -64,10 +64,10 @@ pub fn features(
 }
 
 /// Identifies how frames look, from a few of them: scenes and their drawing are no part of a dataset's trajectories.
-fn looks(frame_store: &FrameStore, trajectories: &Range<usize>) -> anyhow::Result<String> {
+fn appearance_digest(frame_store: &FrameStore, trajectories: &Range<usize>) -> anyhow::Result<String> {
     let mut hash = Sha256::new();
     let mut renderer = Renderer::new(House::FRAME);
-    for trajectory in trajectories.clone().step_by(trajectories.len().div_ceil(LOOKED_AT).max(1)) {
+    for trajectory in trajectories.clone().step_by(trajectories.len().div_ceil(SAMPLED_TRAJECTORIES).max(1)) {
         hash.update(&renderer.draw(frame_store.scene(trajectory)?, &frame_store.trajectories[trajectory].start).rgb);
     }
     Ok(format!("{:x}", hash.finalize())[..8].to_string())
@@ -84,7 +84,7 @@ pub fn encode(
     trajectories: Range<usize>,
     folder: &Path,
     header: &FeatureHeader,
-    report: &mut dyn Report,
+    logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
     let mut writer = FeatureWriter::open(folder, header.clone())?;
@@ -123,7 +123,7 @@ pub fn encode(
             while let Some(maps) = waiting.remove(&written) {
                 writer.add(&maps)?;
                 written += 1;
-                report.step(&Scalars::new("features", frames_until(written), header.maps))?;
+                logger.log(&Scalars::new("features", frames_until(written), header.maps))?;
             }
         }
         anyhow::Ok(written == trajectories.end)
@@ -171,13 +171,13 @@ fn add_half(tensor: &Tensor, bytes: &mut Vec<u8>) -> anyhow::Result<()> {
 mod tests {
     use super::*;
     use crate::nets::visual::{HouseEncoder, VisualSpec};
-    use crate::train::visual::testing::{Notes, frame_store};
+    use crate::train::visual::testing::{RecordedScalars, frame_store};
     use tch::nn;
 
     fn encoder() -> impl FrameEncoder {
         tch::manual_seed(2);
         let store = nn::VarStore::new(Device::Cpu);
-        let spec = VisualSpec { input: 112, channels: vec![4, 4, 8, 16] };
+        let spec = VisualSpec { image_size: 112, channels: vec![4, 4, 8, 16] };
         HouseEncoder::new(&store.root(), &spec).frozen(&store).unwrap()
     }
 
@@ -189,8 +189,8 @@ mod tests {
     fn every_frame_gets_its_map() {
         let _chance = crate::nets::testing::chance();
         let (frame_store, encoder, folder) = (frame_store(), encoder(), tempfile::tempdir().unwrap());
-        let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(false));
-        assert!(encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        let (mut recorded, stop) = (RecordedScalars(Vec::new()), AtomicBool::new(false));
+        assert!(encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut recorded, &stop).unwrap());
         let features = Features::read(folder.path(), &header()).unwrap().unwrap();
         let map = |frame| {
             let mut bytes = Vec::new();
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(map(0), map(5));
         assert_eq!(map(1), map(8));
         assert_ne!(map(0), map(1));
-        assert_eq!(notes.0.iter().map(|note| note.step).collect::<Vec<_>>(), [5, 10]);
+        assert_eq!(recorded.0.iter().map(|note| note.step).collect::<Vec<_>>(), [5, 10]);
     }
 
     #[test]
@@ -210,25 +210,25 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         let (frame_store, encoder) = (frame_store(), encoder());
         let stop = AtomicBool::new(false);
-        let run = |folder: &Path, notes: &mut Notes| {
-            encode(&encoder, &frame_store, 0..2, folder, &header(), notes, &stop).unwrap();
+        let run = |folder: &Path, recorded: &mut RecordedScalars| {
+            encode(&encoder, &frame_store, 0..2, folder, &header(), recorded, &stop).unwrap();
             std::fs::read(folder.join(header().file_name())).unwrap()
         };
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let bytes = run(whole.path(), &mut Notes(Vec::new()));
+        let bytes = run(whole.path(), &mut RecordedScalars(Vec::new()));
         let part = parts.path().join(header().file_name() + ".part");
         std::fs::write(&part, &bytes[..bytes.len() * 7 / 10]).unwrap();
-        let mut notes = Notes(Vec::new());
-        assert!(bytes == run(parts.path(), &mut notes));
-        assert_eq!(notes.0.len(), 1, "only the second trajectory is computed");
+        let mut recorded = RecordedScalars(Vec::new());
+        assert!(bytes == run(parts.path(), &mut recorded));
+        assert_eq!(recorded.0.len(), 1, "only the second trajectory is computed");
     }
 
     #[test]
     fn when_it_is_stopped_nothing_is_put_in_place() {
         let _chance = crate::nets::testing::chance();
         let (frame_store, encoder, folder) = (frame_store(), encoder(), tempfile::tempdir().unwrap());
-        let (mut notes, stop) = (Notes(Vec::new()), AtomicBool::new(true));
-        assert!(!encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut notes, &stop).unwrap());
+        let (mut recorded, stop) = (RecordedScalars(Vec::new()), AtomicBool::new(true));
+        assert!(!encode(&encoder, &frame_store, 0..2, folder.path(), &header(), &mut recorded, &stop).unwrap());
         assert!(Features::read(folder.path(), &header()).unwrap().is_none());
     }
 }

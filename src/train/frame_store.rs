@@ -1,4 +1,4 @@
-//! FrameStore: the trajectories of a dataset as states that can be drawn, any step at random.
+//! The trajectories of datasets as simulator states: any frame can be drawn at random, none is stored as an image.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -91,10 +91,10 @@ impl FrameStore {
         self.firsts.partition_point(|&first| first <= frame) - 1
     }
 
-    /// The scene of a trajectory.
+    /// The scene that a trajectory, by its number, plays in.
     ///
     /// # Errors
-    /// Never for a trajectory of this footage.
+    /// Never for a trajectory of this store.
     pub fn scene(&self, trajectory: usize) -> anyhow::Result<&Arc<Scene>> {
         self.scenes.get(&self.trajectories[trajectory].scene).context("a trajectory's scene is missing")
     }
@@ -136,7 +136,7 @@ impl FrameStore {
     /// chance or a learner acted otherwise, it was not taken.
     ///
     /// # Errors
-    /// Never for a footage that was opened.
+    /// Never for a store that was opened.
     pub fn labels(&self) -> anyhow::Result<Vec<Option<ActionLabel>>> {
         let of = |trajectory: usize| -> anyhow::Result<Vec<Option<ActionLabel>>> {
             let recorded = &self.trajectories[trajectory];

@@ -1,4 +1,4 @@
-//! InTrainingEval: while it trains, an agent plays some tasks of a set, and its curve shows what losses do not.
+//! Evaluation while training: the agent plays some tasks of a set at times, and its curve shows what losses do not.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,20 +17,20 @@ use crate::eval::evaluation::Evaluation;
 use crate::eval::options::Options;
 use crate::house::grading::Grading;
 
-/// Which tasks are tried, and when.
+/// Which tasks are played, and how often.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InTrainingEval {
-    /// The task file.
+    /// A task set's file; its scenes are looked for beside it.
     pub tasks: PathBuf,
     /// Only that many tasks, from the first.
     pub limit: Option<usize>,
-    /// Steps between two trials; each is held when the training is saved next.
+    /// Steps between two evaluations; each is run when the training is saved next.
     pub every: u64,
 }
 
 impl InTrainingEval {
-    /// Whether a trial is held at the save at `step`, when the save before it was at `before`.
-    pub fn are_due(&self, before: u64, step: u64) -> bool {
+    /// Whether the tasks are played at the save at `step`, when the save before it was at `before`.
+    pub fn is_due(&self, before: u64, step: u64) -> bool {
         step / self.every.max(1) > before / self.every.max(1)
     }
 
@@ -47,11 +47,11 @@ impl InTrainingEval {
 }
 
 /// Lets the checkpoint in `folder` play, and puts its success rate and mean completed subtasks among the scalars as
-/// `trial_success` and `trial_completed`. Nothing when it was stopped meanwhile.
+/// `eval_success_rate` and `eval_completed_subtasks`. Nothing when it was stopped meanwhile.
 ///
 /// # Errors
 /// When the checkpoint cannot be read. An episode that fails counts as no success.
-pub fn hold(
+pub fn run(
     evaluation: &Evaluation,
     folder: &Path,
     sentences: &SharedEmbedder,
@@ -71,8 +71,8 @@ pub fn hold(
         Ok(())
     })?;
     if episodes > 0 && !stop.load(Ordering::Relaxed) {
-        scalars.set("trial_success", f64::from(successes) / f64::from(episodes));
-        scalars.set("trial_completed", f64::from(completed) / f64::from(episodes));
+        scalars.set("eval_success_rate", f64::from(successes) / f64::from(episodes));
+        scalars.set("eval_completed_subtasks", f64::from(completed) / f64::from(episodes));
     }
     Ok(())
 }
@@ -82,16 +82,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trial_is_held_at_the_first_save_after_each_so_many_steps() {
-        let trials = InTrainingEval { tasks: "t.json".into(), limit: None, every: 300 };
+    fn tasks_are_played_at_the_first_save_after_each_so_many_steps() {
+        let settings = InTrainingEval { tasks: "t.json".into(), limit: None, every: 300 };
         let mut before = 0;
-        let mut held = Vec::new();
+        let mut played = Vec::new();
         for saved in [200, 400, 600, 800, 850] {
-            if trials.are_due(before, saved) {
-                held.push(saved);
+            if settings.is_due(before, saved) {
+                played.push(saved);
             }
             before = saved;
         }
-        assert_eq!(held, [400, 600]);
+        assert_eq!(played, [400, 600]);
     }
 }

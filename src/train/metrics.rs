@@ -1,4 +1,4 @@
-//! Progress of long work: scalars that are returned and reported, never printed from inside.
+//! Progress of long work: scalars of each step, handed to loggers that display or keep them.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -9,68 +9,68 @@ use anyhow::Context;
 use serde::Serialize;
 use tch::{Kind, Tensor};
 
-/// What one step of a stage has to say.
+/// One step of a stage: how far it is, and what was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scalars {
-    /// The stage: `visual`, `features`, `sentences`, `policy`.
+    /// The stage, such as `visual_encoder`, `features`, `text_embeddings` or `policy`.
     pub stage: &'static str,
-    /// How far it is.
+    /// The step, from 1 to `of`.
     pub step: u64,
-    /// Where it ends.
+    /// How many steps the stage has.
     pub of: u64,
-    /// Numbers by name; empty at most steps.
+    /// Measured numbers by name; empty at most steps.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
 }
 
 impl Scalars {
-    /// No numbers yet.
+    /// A step without numbers.
     pub fn new(stage: &'static str, step: u64, of: u64) -> Scalars {
         Scalars { stage, step, of, values: BTreeMap::new() }
     }
 
-    /// Adds a scalar tensor.
+    /// Adds a tensor of one element.
     pub fn add(&mut self, name: &str, value: &Tensor) {
         self.set(name, value.to_kind(Kind::Double).double_value(&[]));
     }
 
-    /// Adds a number.
+    /// Adds a number, in place of one of the same name.
     pub fn set(&mut self, name: &str, value: f64) {
         self.values.insert(name.to_string(), value);
     }
 }
 
-/// Takes note of progress.
-pub trait Report {
-    /// After a step.
+/// Displays or keeps the progress of long work.
+pub trait ProgressLogger {
+    /// Called after every step.
     ///
     /// # Errors
-    /// When it cannot be written down.
-    fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()>;
+    /// When it cannot be kept.
+    fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()>;
 }
 
 /// Appends every step that has numbers to a file, a JSON object a line, and passes everything on.
-pub struct Journal<'a> {
+pub struct JsonLinesLogger<'a> {
     file: File,
-    next: &'a mut dyn Report,
+    next: &'a mut dyn ProgressLogger,
 }
 
-impl<'a> Journal<'a> {
-    /// Opens or begins the file.
+impl<'a> JsonLinesLogger<'a> {
+    /// Appends to the file, which need not be there.
     ///
     /// # Errors
     /// When it cannot be written to.
-    pub fn open(path: &Path, next: &'a mut dyn Report) -> anyhow::Result<Journal<'a>> {
+    pub fn open(path: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<JsonLinesLogger<'a>> {
         let file = OpenOptions::new().create(true).append(true).open(path);
-        Ok(Journal { file: file.with_context(|| format!("{} cannot be written to", path.display()))?, next })
+        Ok(JsonLinesLogger { file: file.with_context(|| format!("{} cannot be written to", path.display()))?, next })
     }
 }
 
-impl Report for Journal<'_> {
-    fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+impl ProgressLogger for JsonLinesLogger<'_> {
+    fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
         if !scalars.values.is_empty() {
             self.file.write_all((serde_json::to_string(scalars)? + "\n").as_bytes())?;
         }
-        self.next.step(scalars)
+        self.next.log(scalars)
     }
 }

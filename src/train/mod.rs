@@ -1,6 +1,6 @@
 //! Training: presets, data, batches, the trainer, and the jobs that make data and checkpoints.
 
-pub mod batches;
+pub mod batch_sampler;
 pub mod collect;
 pub mod feature_cache;
 pub mod frame_store;

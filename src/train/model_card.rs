@@ -3,11 +3,10 @@
 use std::fmt::Write;
 
 use super::validation::ValidationReport;
-use crate::agent::config::{Beginning, Config, Provenance};
+use crate::agent::config::{CheckpointConfig, Provenance, SourceCheckpoint};
 use crate::nets::precision::Precision;
 
-/// The method in words.
-fn method(config: &Config) -> &'static str {
+fn method(config: &CheckpointConfig) -> &'static str {
     match config.method.as_deref() {
         Some("iql") => "implicit Q-learning",
         Some("sprint") => "implicit Q-learning with skills chained across trajectories",
@@ -17,23 +16,23 @@ fn method(config: &Config) -> &'static str {
     }
 }
 
-/// What it sees through, in words.
-fn eyes(config: &Config) -> String {
-    match &config.visual {
-        Some(visual) => format!(
+/// The visual encoder's sizes, in words.
+fn visual_encoder(config: &CheckpointConfig) -> String {
+    match &config.visual_encoder {
+        Some(spec) => format!(
             "{input} x {input} pixels to {features} x 7 x 7, channels {channels:?}",
-            input = visual.input,
-            features = visual.features(),
-            channels = visual.channels
+            input = spec.image_size,
+            features = spec.features(),
+            channels = spec.channels
         ),
         None => "ResNet-18 as torchvision publishes it, 224 x 224 pixels to 512 x 7 x 7".into(),
     }
 }
 
-/// What it is told, in words.
-fn told(config: &Config) -> String {
+/// What its policy is conditioned on, in words.
+fn conditioning(config: &CheckpointConfig) -> String {
     let policy = &config.policy;
-    match (&policy.goal, &policy.attention) {
+    match (&policy.goal_channels, &policy.attention) {
         (Some(_), _) => "is shown the last frames of the state to reach".into(),
         (None, Some(_)) => "reads the instruction word by word".into(),
         (None, None) => format!(
@@ -44,75 +43,74 @@ fn told(config: &Config) -> String {
 }
 
 /// How it decides, in words, where not by the logits alone.
-fn deciding(config: &Config) -> String {
-    let logit_adjustment = config
-        .logit_adjustment
-        .as_ref()
-        .map(|logit_adjustment| logit_adjustment.strength)
-        .filter(|&strength| strength > 0.0);
-    let balanced = logit_adjustment.map(|strength| {
+fn deciding(config: &CheckpointConfig) -> String {
+    let strength = config.logit_adjustment.as_ref().map(|adjustment| adjustment.strength).filter(|&it| it > 0.0);
+    let adjusted = strength.map(|strength| {
         format!(
-            "{:.0} % of what is merely frequent is taken off the actions' logits (`logit_adjustment`)",
+            "{:.0} % of the log frequency of each action among its labels is taken off the action's logit \
+             (`logit_adjustment`)",
             100.0 * strength
         )
     });
-    let weighed = config.advantage_scale.map(|weight| {
-        format!("a choice of advantage A by its critic is exp({weight} A) times as likely (`advantage_scale`)")
+    let scaled = config.advantage_scale.map(|scale| {
+        format!("a choice of advantage A by its critic is exp({scale} A) times as likely (`advantage_scale`)")
     });
-    let ways: Vec<String> = balanced.into_iter().chain(weighed).collect();
+    let ways: Vec<String> = adjusted.into_iter().chain(scaled).collect();
     if ways.is_empty() { String::new() } else { format!(" When it decides, {}.", ways.join(", and ")) }
 }
 
-/// What it learned from, in words.
-fn origin(config: &Config) -> String {
-    let Provenance { preset, dataset, trajectories, seed, visual_steps, policy_steps, precision, averaged, .. } =
-        &config.provenance;
+/// Method, data, steps and seed, in words.
+fn origin(config: &CheckpointConfig) -> String {
+    let Provenance { preset, dataset, trajectories, seed, policy_steps, precision, .. } = &config.provenance;
     let method = method(config);
     let width = match precision {
         Precision::Full => "",
         Precision::Mixed => " in mixed precision",
     };
-    let seen = match (&config.visual, &config.provenance.visual_from) {
-        (Some(_), None) => format!("{visual_steps} steps of the visual encoder, "),
+    let encoder = match (&config.visual_encoder, &config.provenance.visual_encoder_from) {
+        (Some(_), None) => format!("{} steps of the visual encoder, ", config.provenance.visual_encoder_steps),
         _ => String::new(),
     };
-    let trained = match averaged {
+    let trained = match config.provenance.averaged_checkpoints {
         None => format!(
             "Trained with the preset `{preset}` ({method}) on {trajectories} demonstrations (datasets `{dataset}`): \
-             {seen}{policy_steps} steps of the policy{width}, seed {seed}."
+             {encoder}{policy_steps} steps of the policy{width}, seed {seed}."
         ),
         Some(count) => format!(
             "Its policy is the mean of {count} checkpoints' (presets `{preset}`, datasets `{dataset}`); all else is the first \
-             one's, which had ({method}) {seen}{policy_steps} steps of the policy{width} on {trajectories} demonstrations, \
+             one's, which had ({method}) {encoder}{policy_steps} steps of the policy{width} on {trajectories} demonstrations, \
              seed {seed}."
         ),
     };
-    trained + &beginnings(&config.provenance)
+    trained + &source_checkpoints(&config.provenance)
 }
 
-/// Whose networks it began with, in words.
-fn beginnings(provenance: &Provenance) -> String {
-    let whose = |beginning: &Beginning| {
-        let Beginning { name, preset, policy_steps } = beginning;
-        format!("`{name}` (preset `{preset}`, {policy_steps} steps of the policy)")
+/// The checkpoints that its networks came from, in words.
+fn source_checkpoints(provenance: &Provenance) -> String {
+    let initialised = |network: &str, source: &Option<SourceCheckpoint>| {
+        source.as_ref().map(|SourceCheckpoint { name, preset, policy_steps }| {
+            format!(
+                " Its {network} was initialised from that of `{name}` (preset `{preset}`, {policy_steps} steps of the policy)."
+            )
+        })
     };
-    let eyes = provenance.visual_from.as_ref();
-    let eyes =
-        eyes.map(|eyes| format!(" It sees through the eyes of `{}` ({} steps).", eyes.name, provenance.visual_steps));
-    let policy = provenance.policy_from.as_ref().map(|from| format!(" Its policy began as that of {}.", whose(from)));
-    let critic = provenance.critic_from.as_ref().map(|from| format!(" Its critic began as that of {}.", whose(from)));
-    [eyes, policy, critic].into_iter().flatten().collect()
+    let steps = provenance.visual_encoder_steps;
+    let encoder = provenance.visual_encoder_from.as_ref();
+    let encoder = encoder.map(|source| format!(" Its visual encoder is that of `{}` ({steps} steps).", source.name));
+    let policy = initialised("policy", &provenance.policy_initialised_from);
+    let critic = initialised("critic", &provenance.critic_initialised_from);
+    [encoder, policy, critic].into_iter().flatten().collect()
 }
 
-/// The card's text.
-pub fn card(name: &str, config: &Config, findings: &ValidationReport) -> String {
+/// The card in Markdown; `name` is the checkpoint folder's.
+pub fn card(name: &str, config: &CheckpointConfig, report: &ValidationReport) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write!(
         text,
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
-         ({eyes}), {told} and chooses one of 12 actions and one of 82 object classes.{deciding}\n\n\
+         ({visual_encoder}), {conditioning} and chooses one of 12 actions and one of 82 object classes.{deciding}\n\n\
          {origin}\n\n\
          ## Measured in generated houses that no training saw\n\n\
          `sprint {command}` measures this at its end.\n\n\
@@ -120,30 +118,30 @@ pub fn card(name: &str, config: &Config, findings: &ValidationReport) -> String 
          | one-skill tasks solved, within twice the expert's steps | {agent} |\n\
          | the same tasks by chance | {random} |\n",
         history = config.policy.history,
-        eyes = eyes(config),
-        told = told(config),
+        visual_encoder = visual_encoder(config),
+        conditioning = conditioning(config),
         deciding = deciding(config),
         origin = origin(config),
-        command = if config.provenance.averaged.is_some() { "average" } else { "pretrain" },
-        agent = findings.agent,
-        random = findings.random,
+        command = if config.provenance.averaged_checkpoints.is_some() { "average" } else { "pretrain" },
+        agent = report.agent,
+        random = report.random,
     );
-    for (skill, rate) in &findings.by_skill {
+    for (skill, rate) in &report.by_skill {
         let _ = writeln!(text, "| of these, {skill} | {rate} |");
     }
-    if findings.swapped.trials > 0 {
+    if report.follows_both.trials > 0 {
         let _ = write!(
             text,
-            "| two objects in view, told to take one: takes that one first | {} |\n\
+            "| two objects in view, instructed to take one: takes that one first | {} |\n\
              | takes the other one first | {} |\n\
              | from one start, takes the one and, with the instruction swapped, the other | {} |\n",
-            findings.named, findings.other, findings.swapped
+            report.instructed_first, report.other_first, report.follows_both
         );
     }
     text.push_str(
         "\n## Limits\n\n\
-         It knows only what its last frames show, and the houses and words of its demonstrations. It has no sign for being \
-         done.\n",
+         It knows only what its last frames show, and the houses and words of its demonstrations. It has no stop \
+         action: it does not say when a task is done.\n",
     );
     text
 }

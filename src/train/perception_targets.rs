@@ -1,4 +1,5 @@
-//! Sights: what the simulator knows of a frame, place by place; the visual encoder learns to tell it.
+//! What the visual encoder is trained to predict of a frame, from the simulator's state: labels and depth for each cell of the
+//! 7 x 7 map, and the held class.
 
 use std::collections::HashMap;
 
@@ -7,68 +8,72 @@ use crate::house::view;
 use crate::house::view::{Frame, View, decode};
 use crate::nets::visual::SIDE;
 
-/// Places in a feature map.
-pub const PLACES: usize = (SIDE * SIDE) as usize;
-/// Marks of a place: the 82 classes that may show there, the 7 interactions that are possible there, and whether something
+/// Cells of a feature map: 7 x 7.
+pub const CELLS: usize = (SIDE * SIDE) as usize;
+/// Labels of a cell: the 82 classes that may show there, the 7 interactions that are possible there, and whether something
 /// there stands open.
-pub const MARKS: usize = Class::VOCABULARY + INTERACTIONS + 1;
+pub const CELL_LABELS: usize = Class::VOCABULARY + INTERACTIONS + 1;
 const INTERACTIONS: usize = ActionType::COUNT - 5;
-/// As few pixels of a 300 x 300 frame in one place show a thing there.
+/// As few pixels of a 300 x 300 frame in one cell show a thing there.
 const FEWEST_PIXELS: u16 = 8;
 /// Depth beyond this, in metres, counts as this.
 const FARTHEST: f32 = 10.0;
 
-/// What the simulator knows of a frame.
+/// The targets of one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sight {
-    /// [`MARKS`] x [`PLACES`], mark by mark: 1 where the mark holds.
-    pub marks: Vec<u8>,
-    /// The logarithm of each place's mean depth in metres.
+pub struct PerceptionTargets {
+    /// [`CELL_LABELS`] x [`CELLS`], label by label: 1 where the label holds.
+    pub cell_labels: Vec<u8>,
+    /// The logarithm of each cell's mean depth in metres.
     pub depth: Vec<f32>,
     /// The held class; 0 for an empty hand.
     pub held: u8,
 }
 
-impl Sight {
-    /// Of a drawn frame.
-    pub fn of(scene: &Scene, world: &World, frame: &Frame) -> Sight {
-        let mut marks = vec![0u8; MARKS * PLACES];
+impl PerceptionTargets {
+    /// The targets of a frame that was drawn of `world`.
+    pub fn of(scene: &Scene, world: &World, frame: &Frame) -> PerceptionTargets {
+        let mut cell_labels = vec![0u8; CELL_LABELS * CELLS];
         let candidates = view::candidates(scene, world, &View::of(frame));
-        for (code, pixels) in pixels_by_place(frame) {
+        for (code, pixels) in pixels_by_cell(frame) {
             let Some(instance) = decode(code) else { continue };
             let class = world.class_of(scene, instance).unwrap_or_default();
             let kinds = candidates.iter().filter(|candidate| candidate.instance == instance);
-            let mut known: Vec<usize> = kinds.map(|c| Class::VOCABULARY + c.kind.index() - 5).collect();
+            let mut labels: Vec<usize> = kinds.map(|c| Class::VOCABULARY + c.kind.index() - 5).collect();
             if class.in_vocabulary() {
-                known.push(class.index());
+                labels.push(class.index());
             }
             if world.is_open(instance) {
-                known.push(MARKS - 1);
+                labels.push(CELL_LABELS - 1);
             }
-            for (place, _) in pixels.iter().enumerate().filter(|(_, count)| **count >= FEWEST_PIXELS) {
-                for &mark in &known {
-                    marks[mark * PLACES + place] = 1;
+            for (cell, _) in pixels.iter().enumerate().filter(|(_, count)| **count >= FEWEST_PIXELS) {
+                for &label in &labels {
+                    cell_labels[label * CELLS + cell] = 1;
                 }
             }
         }
         let held = world.held.and_then(|index| world.object(index)).map(|object| object.class).unwrap_or_default();
-        Sight { marks, depth: depth_by_place(frame), held: if held.in_vocabulary() { held.index() as u8 } else { 0 } }
+        PerceptionTargets {
+            cell_labels,
+            depth: depth_by_cell(frame),
+            held: if held.in_vocabulary() { held.index() as u8 } else { 0 },
+        }
     }
 }
 
-/// How many pixels of each place show each code.
-fn pixels_by_place(frame: &Frame) -> HashMap<u16, [u16; PLACES]> {
+/// How many pixels of each cell show each code.
+fn pixels_by_cell(frame: &Frame) -> HashMap<u16, [u16; CELLS]> {
     let side = SIDE as usize;
-    let mut counts: HashMap<u16, [u16; PLACES]> = HashMap::new();
+    let mut counts: HashMap<u16, [u16; CELLS]> = HashMap::new();
     for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
         let down = y * side / frame.height;
         let mut x = 0;
         while x < row.len() {
             let (id, across) = (row[x], x * side / frame.width);
-            let place_end = ((across + 1) * frame.width).div_ceil(side);
-            let run = row[x..place_end.min(row.len())].iter().take_while(|&&other| other == id).count();
+            let cell_end = ((across + 1) * frame.width).div_ceil(side);
+            let run = row[x..cell_end.min(row.len())].iter().take_while(|&&other| other == id).count();
             if id != 0 {
-                counts.entry(id).or_insert([0; PLACES])[down * side + across] += run as u16;
+                counts.entry(id).or_insert([0; CELLS])[down * side + across] += run as u16;
             }
             x += run;
         }
@@ -76,15 +81,15 @@ fn pixels_by_place(frame: &Frame) -> HashMap<u16, [u16; PLACES]> {
     counts
 }
 
-fn depth_by_place(frame: &Frame) -> Vec<f32> {
+fn depth_by_cell(frame: &Frame) -> Vec<f32> {
     let side = SIDE as usize;
-    let (mut sums, mut counts) = (vec![0f32; PLACES], vec![0f32; PLACES]);
+    let (mut sums, mut counts) = (vec![0f32; CELLS], vec![0f32; CELLS]);
     // Every fourth pixel of every fourth row is enough for a mean.
     for y in (0..frame.height).step_by(4) {
         for x in (0..frame.width).step_by(4) {
-            let place = (y * side / frame.height) * side + x * side / frame.width;
-            sums[place] += frame.depth[y * frame.width + x].clamp(0.1, FARTHEST);
-            counts[place] += 1.0;
+            let cell = (y * side / frame.height) * side + x * side / frame.width;
+            sums[cell] += frame.depth[y * frame.width + x].clamp(0.1, FARTHEST);
+            counts[cell] += 1.0;
         }
     }
     sums.iter().zip(counts).map(|(sum, count)| (sum / count.max(1.0)).max(0.1).ln()).collect()
@@ -95,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pixels_are_counted_in_the_place_they_fall_into() {
+    fn pixels_are_counted_in_the_cell_they_fall_into() {
         let mut frame =
             Frame { width: 300, height: 300, rgb: Vec::new(), depth: vec![2.0; 90_000], ids: vec![0; 90_000] };
         for y in 0..10 {
@@ -103,9 +108,9 @@ mod tests {
                 frame.ids[y * 300 + x] = 3;
             }
         }
-        let counts = pixels_by_place(&frame);
+        let counts = pixels_by_cell(&frame);
         assert_eq!(counts[&3][6], 200);
         assert_eq!(counts[&3].iter().map(|&n| u32::from(n)).sum::<u32>(), 200);
-        assert!(depth_by_place(&frame).iter().all(|depth| (depth - 2f32.ln()).abs() < 1e-5));
+        assert!(depth_by_cell(&frame).iter().all(|depth| (depth - 2f32.ln()).abs() < 1e-5));
     }
 }

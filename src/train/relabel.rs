@@ -5,17 +5,17 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::metrics::{Report, Scalars};
+use super::metrics::{ProgressLogger, Scalars};
 use crate::data::Dataset;
 use crate::data::items::composites;
 use crate::data::summaries::{Ledger, SpanSummary};
 use crate::domain::Trajectory;
 use crate::language::passage::{Passage, Summarizer};
 
-/// Passages between two writes.
+/// Spans whose labels are appended at once; after each chunk a relabelling can be stopped.
 const CHUNK: usize = 4096;
 
-/// What a relabelling came to.
+/// Counts of a relabelling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Relabelled {
     /// Spans, once for each aligned annotation.
@@ -28,8 +28,8 @@ pub struct Relabelled {
     pub stopped: bool,
 }
 
-/// One span of one annotator.
-struct Wanted<'a> {
+/// A run of two or more skills of a trajectory, in the words of one annotator.
+struct CompositeSpan<'a> {
     trajectory: &'a Trajectory,
     annotator: usize,
     skills: Range<usize>,
@@ -45,7 +45,7 @@ struct Wanted<'a> {
 pub fn relabel(
     folder: &Path,
     summarizer: &dyn Summarizer,
-    report: &mut dyn Report,
+    logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<Relabelled> {
     let dataset = Dataset::open(folder)?;
@@ -61,12 +61,12 @@ pub fn relabel(
     let mut missing = Vec::new();
     let mut found = Relabelled::default();
     for trajectory in &trajectories {
-        for wanted in wanted(trajectory, &dataset.manifest().held_out) {
+        for span in composite_spans(trajectory, &dataset.manifest().held_out) {
             found.spans += 1;
-            let line = wanted.line(String::new(), summarizer);
+            let line = span.line(String::new(), summarizer);
             match labelled.contains(&(line.trajectory, line.annotator, line.skills, line.input)) {
                 true => found.known += 1,
-                false => missing.push(wanted),
+                false => missing.push(span),
             }
         }
     }
@@ -77,37 +77,37 @@ pub fn relabel(
             break;
         }
         let mut asked = HashSet::new();
-        let new: Vec<&Wanted> = chunk
+        let new: Vec<&CompositeSpan> = chunk
             .iter()
-            .filter(|wanted| !texts.contains_key(&wanted.digest) && asked.insert(wanted.digest.as_str()))
+            .filter(|span| !texts.contains_key(&span.digest) && asked.insert(span.digest.as_str()))
             .collect();
-        let passages: Vec<Passage> = new.iter().map(|wanted| wanted.passage).collect();
+        let passages: Vec<Passage> = new.iter().map(|span| span.passage).collect();
         let summaries = summarizer.summaries(&passages)?;
         anyhow::ensure!(summaries.len() == new.len(), "{} gave too few summaries", summarizer.source());
         found.asked += new.len();
-        texts.extend(new.iter().map(|wanted| wanted.digest.clone()).zip(summaries));
-        let lines = chunk.iter().map(|wanted| wanted.line(texts[&wanted.digest].clone(), summarizer));
+        texts.extend(new.iter().map(|span| span.digest.clone()).zip(summaries));
+        let lines = chunk.iter().map(|span| span.line(texts[&span.digest].clone(), summarizer));
         ledger.append(&lines.collect::<Vec<_>>())?;
         done += chunk.len();
-        report.step(&Scalars::new("labels", done as u64, found.spans as u64))?;
+        logger.log(&Scalars::new("labels", done as u64, found.spans as u64))?;
     }
     Ok(found)
 }
 
 /// The composite spans of a trajectory, once for each aligned annotation.
-fn wanted<'a>(trajectory: &'a Trajectory, held_out: &[String]) -> Vec<Wanted<'a>> {
+fn composite_spans<'a>(trajectory: &'a Trajectory, held_out: &[String]) -> Vec<CompositeSpan<'a>> {
     let mut found = Vec::new();
     for (annotator, annotation) in trajectory.annotations.iter().enumerate() {
         for skills in composites(trajectory, held_out) {
             if let Some(passage) = Passage::of(trajectory, annotation, skills.clone()) {
-                found.push(Wanted { trajectory, annotator, skills, passage, digest: passage.digest() });
+                found.push(CompositeSpan { trajectory, annotator, skills, passage, digest: passage.digest() });
             }
         }
     }
     found
 }
 
-impl Wanted<'_> {
+impl CompositeSpan<'_> {
     fn line(&self, text: String, summarizer: &dyn Summarizer) -> SpanSummary {
         SpanSummary {
             trajectory: self.trajectory.id.clone(),
@@ -158,8 +158,8 @@ mod tests {
 
     struct Silent;
 
-    impl Report for Silent {
-        fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+    impl ProgressLogger for Silent {
+        fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
             Ok(())
         }
     }
@@ -223,7 +223,8 @@ mod tests {
         let trajectories: Vec<Trajectory> = dataset.trajectories().unwrap().map(Result::unwrap).collect();
         let texts = |source| {
             let summaries = Summaries::read(&[folder.path()], Some(source)).unwrap();
-            let selection = DataSelection { labels_of: Some(source.into()), ..DataSelection::of(Composites::Labels) };
+            let selection =
+                DataSelection { label_source: Some(source.into()), ..DataSelection::of(Composites::Labels) };
             let source = ItemSource {
                 apart: &[],
                 trajectories: &trajectories,

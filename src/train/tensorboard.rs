@@ -1,4 +1,5 @@
-//! TensorBoard event files: every scalar of a training, for whoever watches it there.
+//! TensorBoard event files: every scalar of a training, for whoever watches it there. Written by hand: of the crates that write
+//! them, `tensorboard-rs` brings an old `image` and `protobuf` 2, and `tboard` needs `protoc` to build.
 //!
 //! A file is a run of records: the length of the data as a little-endian u64, a masked CRC-32C of these 8 bytes, the data, and a
 //! masked CRC-32C of the data. The data is a protocol buffer, `Event`: wall time (field 1, double), step (2, varint), and either
@@ -11,12 +12,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 
-use super::metrics::{Report, Scalars};
+use super::metrics::{ProgressLogger, Scalars};
 
 /// Appends every step that has numbers to an event file, and passes everything on.
 pub struct TensorBoard<'a> {
     file: File,
-    next: &'a mut dyn Report,
+    next: &'a mut dyn ProgressLogger,
 }
 
 impl<'a> TensorBoard<'a> {
@@ -24,7 +25,7 @@ impl<'a> TensorBoard<'a> {
     ///
     /// # Errors
     /// When it cannot be written to.
-    pub fn open(folder: &Path, next: &'a mut dyn Report) -> anyhow::Result<TensorBoard<'a>> {
+    pub fn open(folder: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<TensorBoard<'a>> {
         let now = now();
         let path = folder.join(format!("events.out.tfevents.{now:.6}.sprint"));
         let open = || -> std::io::Result<File> {
@@ -36,8 +37,8 @@ impl<'a> TensorBoard<'a> {
     }
 }
 
-impl Report for TensorBoard<'_> {
-    fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+impl ProgressLogger for TensorBoard<'_> {
+    fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
         if !scalars.values.is_empty() {
             let mut summary = Vec::new();
             for (name, &value) in &scalars.values {
@@ -46,7 +47,7 @@ impl Report for TensorBoard<'_> {
             }
             self.file.write_all(&record(&event(now(), scalars.step, &message(5, &summary))))?;
         }
-        self.next.step(scalars)
+        self.next.log(scalars)
     }
 }
 
@@ -119,8 +120,8 @@ mod tests {
 
     struct Nobody;
 
-    impl Report for Nobody {
-        fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+    impl ProgressLogger for Nobody {
+        fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
             Ok(())
         }
     }
@@ -184,10 +185,10 @@ mod tests {
         let mut nobody = Nobody;
         let mut events = TensorBoard::open(folder.path(), &mut nobody).unwrap();
         let mut scalars = Scalars::new("policy", 300, 1000);
-        events.step(&scalars).unwrap();
+        events.log(&scalars).unwrap();
         scalars.set("q_loss", 0.25);
         scalars.set("v_mean", -1.5);
-        events.step(&scalars).unwrap();
+        events.log(&scalars).unwrap();
         let path = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
         assert!(path.file_name().unwrap().to_string_lossy().starts_with("events.out.tfevents."));
         let records = records(&std::fs::read(path).unwrap());

@@ -7,8 +7,8 @@ use std::time::Instant;
 use anyhow::Context;
 use tch::{Kind, Tensor};
 
-use super::batches::Batches;
-use super::metrics::{Report, Scalars};
+use super::batch_sampler::BatchSampler;
+use super::metrics::{ProgressLogger, Scalars};
 use super::preset::Preset;
 use super::training_state::TrainingState;
 use crate::agent::checkpoint::Networks;
@@ -23,24 +23,24 @@ use crate::nets::precision::Precision;
 const MEASURED: usize = 2048;
 /// Of those, how many are computed at once.
 const CHUNK: usize = 256;
-/// Batches that wait for their update.
+/// BatchSampler that wait for their update.
 const AHEAD: usize = 2;
 
 /// A training's networks, hyper-parameters and state.
 pub struct Trainer<'a> {
-    /// What learns.
+    /// Policy and critic, which learn; the visual encoder is frozen.
     pub networks: &'a Networks,
-    /// How.
+    /// The hyper-parameters.
     pub preset: &'a Preset,
-    /// Its state.
+    /// Where the optimisers' state is saved.
     pub state: TrainingState<'a>,
 }
 
 /// Keeps the networks of a saved step, and may add to what is reported of it.
-pub type Keep<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
+pub type SaveCheckpoint<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
 
 impl Trainer<'_> {
-    /// Trains up to the preset's last step, from where the state left off if it is there. `keep` is called right before the
+    /// Trains up to the preset's last step, from where the state left off if it is there. `save_checkpoint` is called right before the
     /// state is saved: what could not be kept is taken again by the resumed training. Returns false when it was stopped; its
     /// state is saved then.
     ///
@@ -48,11 +48,11 @@ impl Trainer<'_> {
     /// When a state cannot be read or written, belongs to other data or encoders, or a loss is not a number.
     pub fn train(
         &self,
-        batches: Batches<'_>,
+        batches: BatchSampler<'_>,
         held_out: &[Span],
-        report: &mut dyn Report,
+        logger: &mut dyn ProgressLogger,
         stop: &AtomicBool,
-        keep: &mut Keep<'_>,
+        save_checkpoint: &mut SaveCheckpoint<'_>,
     ) -> anyhow::Result<bool> {
         let mut update = self.update()?;
         if let Some((step, tensors)) = self.state.read()? {
@@ -66,7 +66,7 @@ impl Trainer<'_> {
             scope.spawn(move || {
                 (first..steps).map(|step| batches.at(step)).all(|batch| sender.send(batch).is_ok());
             });
-            let finished = self.steps(&mut update, &gathered, &measured, report, stop, keep);
+            let finished = self.steps(&mut update, &gathered, &measured, logger, stop, save_checkpoint);
             drop(gathered);
             finished
         })
@@ -77,37 +77,37 @@ impl Trainer<'_> {
         update: &mut Update<'_>,
         gathered: &mpsc::Receiver<anyhow::Result<Batch>>,
         measured: &[Transitions],
-        report: &mut dyn Report,
+        logger: &mut dyn ProgressLogger,
         stop: &AtomicBool,
-        keep: &mut Keep<'_>,
+        save_checkpoint: &mut SaveCheckpoint<'_>,
     ) -> anyhow::Result<bool> {
-        let (mut pace, first) = (Pace::new(), update.step());
+        let (mut throughput, first) = (Throughput::new(), update.step());
         while !update.is_done() {
             if stop.load(Ordering::Relaxed) {
-                keep(update.step(), &mut Scalars::new("policy", update.step(), self.preset.training.steps))?;
+                save_checkpoint(update.step(), &mut Scalars::new("policy", update.step(), self.preset.training.steps))?;
                 self.state.write(update.step(), &update.state())?;
                 return Ok(false);
             }
             let begun = Instant::now();
             let batch = gathered.recv().context("the batches ended early")??;
-            pace.waited += begun.elapsed().as_secs_f64();
+            throughput.data_wait += begun.elapsed().as_secs_f64();
             let (step, last) = (update.step() + 1, update.step() + 1 == self.preset.training.steps);
             let due = |every: u64| step.is_multiple_of(every) || last;
             let mut scalars = Scalars::new("policy", step, self.preset.training.steps);
             let numbers = update.update(&batch, due(self.preset.report_every))?;
             if due(self.preset.report_every) {
                 scalars.values = numbers;
-                pace.describe(step - first, self.preset.training.batch, &mut scalars);
+                throughput.describe(step - first, self.preset.training.batch_size, &mut scalars);
                 scalars.set("learning_rate", self.preset.training.schedule.at(step - 1, self.preset.training.steps));
             }
             if due(self.preset.report_every * 5) {
                 self.measure(measured, &mut scalars);
             }
             if due(self.preset.save_every) {
-                keep(step, &mut scalars)?;
+                save_checkpoint(step, &mut scalars)?;
                 self.state.write(step, &update.state())?;
             }
-            report.step(&scalars)?;
+            logger.log(&scalars)?;
         }
         Ok(true)
     }
@@ -160,22 +160,22 @@ impl Trainer<'_> {
     }
 }
 
-/// How fast a training goes.
-struct Pace {
+/// Items a second since the training began or was resumed, and how long it waited for them.
+struct Throughput {
     begun: Instant,
-    waited: f64,
+    data_wait: f64,
 }
 
-impl Pace {
-    fn new() -> Pace {
-        Pace { begun: Instant::now(), waited: 0.0 }
+impl Throughput {
+    fn new() -> Throughput {
+        Throughput { begun: Instant::now(), data_wait: 0.0 }
     }
 
     /// After so many steps: base items a second, and the share of the time in which a batch was waited for.
     fn describe(&self, steps: u64, batch: usize, scalars: &mut Scalars) {
         let elapsed = self.begun.elapsed().as_secs_f64().max(1e-9);
         scalars.set("samples_per_second", steps as f64 * batch as f64 / elapsed);
-        scalars.set("waiting_share", self.waited / elapsed);
+        scalars.set("data_wait_fraction", self.data_wait / elapsed);
     }
 }
 
@@ -187,20 +187,22 @@ mod tests {
     use crate::algo::chain::PairSource;
     use crate::data::features::{FeatureHeader, FeatureWriter, Features};
     use crate::data::items::{ActionLabel, Items};
-    use crate::data::selection::{Named, Past};
+    use crate::data::selection::{HistoryStart, ObjectTarget};
     use crate::nets::critic::CriticSpec;
     use crate::nets::episodic::AttentionSpec;
     use crate::nets::policy::PolicySpec;
     use crate::nets::visual_encoder::VisualEncoder;
     use crate::nets::weights;
-    use crate::train::training_data::{ConditioningTable, Maps, Pool, Rows, TrainingData, joined};
+    use crate::train::training_data::{
+        ChainingPool, ConditioningTable, EmbeddingTable, FeatureMaps, TrainingData, joint_text,
+    };
 
     const FRAMES: u64 = 24;
 
     fn preset(name: &str, steps: u64) -> Preset {
         let mut preset = Preset::named(name).unwrap();
-        let goal = preset.policy.goal.map(|_| [2; 4]);
-        let small = |_| AttentionSpec { words: 10, layers: 1, heads: 1, inner: 4 };
+        let goal = preset.policy.goal_channels.map(|_| [2; 4]);
+        let small = |_| AttentionSpec { vocabulary_size: 10, layers: 1, heads: 1, feedforward: 4 };
         let attention = preset.policy.attention.map(small);
         let embedding = if attention.is_some() { 4 } else { 3 };
         let channels = [4; 4];
@@ -208,21 +210,21 @@ mod tests {
             history: 2,
             embedding,
             channels,
-            halved: false,
+            downsample: false,
             hidden: vec![32],
             dropout: 0.1,
-            goal,
+            goal_channels: goal,
             attention,
         };
         preset.critic = preset.critic.map(|critic| CriticSpec { channels: [4; 4], hidden: vec![16], ..critic });
         if let Some(chaining) = &mut preset.chaining {
-            chaining.batch = 8;
+            chaining.batch_size = 8;
             if chaining.pairs != PairSource::InBatch {
                 chaining.pairs = PairSource::Pool(5);
             }
         }
-        preset.visual.channels = vec![2; 4];
-        (preset.training.steps, preset.training.batch) = (steps, 16);
+        preset.visual_encoder.channels = vec![2; 4];
+        (preset.training.steps, preset.training.batch_size) = (steps, 16);
         (preset.training.schedule.warmup_steps, preset.training.schedule.learning_rate) = (2, 0.01);
         (preset.save_every, preset.report_every) = (1000, 1000);
         preset
@@ -231,9 +233,8 @@ mod tests {
     /// Frames of noise, each with an action of its own; half of them with an object.
     fn features(preset: &Preset) -> Features {
         let folder = tempfile::tempdir().unwrap();
-        let numbers = preset.visual.map() as u64;
-        let header =
-            FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
+        let numbers = preset.visual_encoder.map() as u64;
+        let header = FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
         tch::manual_seed(4);
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];
@@ -258,8 +259,8 @@ mod tests {
             held_out: vec![span(0, 0), span(1, 0)],
             firsts: vec![0, 6, 12, 18, FRAMES as u32],
             withheld: Default::default(),
-            past: Past::Trajectory,
-            named: Named::Own,
+            history_start: HistoryStart::Trajectory,
+            object_target: ObjectTarget::Current,
         }
     }
 
@@ -270,8 +271,8 @@ mod tests {
         last: Scalars,
     }
 
-    impl Report for Watch<'_> {
-        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+    impl ProgressLogger for Watch<'_> {
+        fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
             self.last = scalars.clone();
             self.stop.store(scalars.step == self.stop_after, Ordering::Relaxed);
             Ok(())
@@ -296,9 +297,9 @@ mod tests {
     fn trained_keeping(
         preset: &Preset,
         stop_after: u64,
-        keep: &mut dyn FnMut(u64) -> anyhow::Result<()>,
+        save_checkpoint: &mut dyn FnMut(u64) -> anyhow::Result<()>,
     ) -> (weights::Tensors, Scalars) {
-        let (features, items) = (features(preset), Items { named: preset.data.named, ..items() });
+        let (features, items) = (features(preset), Items { object_target: preset.data.object_target, ..items() });
         let sentences = Tensor::from_slice2(&[[1.0f32, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let folder = tempfile::tempdir().unwrap();
         let state = folder.path().join("state.safetensors");
@@ -307,33 +308,38 @@ mod tests {
         loop {
             tch::manual_seed(1);
             let networks = {
-                let eyes = VisualEncoder::house(&preset.visual, Device::Cpu);
-                Networks::new(eyes, &preset.policy, preset.critic.as_ref(), Device::Cpu)
+                let encoder = VisualEncoder::house(&preset.visual_encoder, Device::Cpu);
+                Networks::new(encoder, &preset.policy, preset.critic.as_ref(), Device::Cpu)
             };
-            let told = match preset.policy.goal {
+            let conditioning = match preset.policy.goal_channels {
                 Some(_) => ConditioningTable::Goals,
-                None if preset.policy.attention.is_some() => ConditioningTable::Words(vec![vec![2, 3], vec![4]]),
-                None => ConditioningTable::Sentences(Rows::new(&sentences, Device::Cpu).unwrap()),
+                None if preset.policy.attention.is_some() => ConditioningTable::TokenIds(vec![vec![2, 3], vec![4]]),
+                None => ConditioningTable::SentenceEmbeddings(EmbeddingTable::new(&sentences, Device::Cpu).unwrap()),
             };
             let pool = preset.chaining.as_ref().and_then(|chaining| match chaining.pairs {
                 PairSource::InBatch => None,
                 PairSource::Pool(count) => {
-                    let pairs = Pool::draw(&items, preset.seed, count);
-                    let texts: Vec<String> = pairs.iter().map(|&pair| joined(&items, pair)).collect();
+                    let pairs = ChainingPool::draw(&items, preset.seed, count);
+                    let texts: Vec<String> = pairs.iter().map(|&pair| joint_text(&items, pair)).collect();
                     let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
-                    Some(Pool::new(&items, pairs, &joint, Device::Cpu).unwrap())
+                    Some(ChainingPool::new(&items, pairs, &joint, Device::Cpu).unwrap())
                 }
             });
-            let material =
-                TrainingData { items: &items, maps: Maps::on(&features, Device::Cpu), told, pool, embed: &embed };
-            let (judged, size) = (networks.critic.is_some(), (preset.seed, preset.training.batch));
-            let batches = Batches::new(material, 2, judged, preset.chaining.as_ref(), size, Device::Cpu);
+            let data = TrainingData {
+                items: &items,
+                feature_maps: FeatureMaps::on(&features, Device::Cpu),
+                conditioning,
+                pool,
+                embed: &embed,
+            };
+            let (with_next, size) = (networks.critic.is_some(), (preset.seed, preset.training.batch_size));
+            let batches = BatchSampler::new(data, 2, with_next, preset.chaining.as_ref(), size, Device::Cpu);
             let trainer =
                 Trainer { networks: &networks, preset, state: TrainingState { path: &state, identity: &identity } };
             let mut watch = Watch { stop: &stop, stop_after, last: Scalars::new("", 0, 0) };
             stop.store(false, Ordering::Relaxed);
-            let mut keep = |step, _: &mut Scalars| keep(step);
-            match trainer.train(batches, &items.held_out, &mut watch, &stop, &mut keep) {
+            let mut save_checkpoint = |step, _: &mut Scalars| save_checkpoint(step);
+            match trainer.train(batches, &items.held_out, &mut watch, &stop, &mut save_checkpoint) {
                 Ok(true) => return (weights::read(&state).unwrap(), watch.last),
                 Ok(false) => (),
                 Err(error) => assert_eq!(error.to_string(), FULL),
@@ -352,9 +358,9 @@ mod tests {
     #[test]
     fn the_object_head_is_taught_what_the_preset_says() {
         let _chance = crate::nets::testing::chance();
-        let losses = [Named::Own, Named::Ahead].map(|named| {
+        let losses = [ObjectTarget::Current, ObjectTarget::Next].map(|target| {
             let mut preset = preset("l-bc", 1);
-            preset.data.named = named;
+            preset.data.object_target = target;
             trained(&preset, u64::MAX).1.values
         });
         assert_eq!(losses[0]["action_loss"], losses[1]["action_loss"]);
@@ -419,8 +425,8 @@ mod tests {
         for (name, present, absent) in [
             ("l-bc", "held_out_action_loss", "q_loss"),
             ("iql-primitive", "v_mean", "chain_q_loss"),
-            ("sprint", "follow_q_loss", "none"),
-            ("am", "chain_q_loss", "lead_q_loss"),
+            ("sprint", "aggregate_b_q_loss", "none"),
+            ("am", "chain_q_loss", "aggregate_a_q_loss"),
             ("et", "action_loss", "q_loss"),
         ] {
             let (_, last) = trained(&preset(name, 2), u64::MAX);
@@ -433,6 +439,6 @@ mod tests {
         let _chance = crate::nets::testing::chance();
         let mut preset = preset("sprint", 2);
         preset.chaining.as_mut().unwrap().pairs = PairSource::InBatch;
-        assert!(trained(&preset, u64::MAX).1.values["lead_q_loss"].is_finite());
+        assert!(trained(&preset, u64::MAX).1.values["aggregate_a_q_loss"].is_finite());
     }
 }

@@ -11,7 +11,7 @@ use crate::nets::weights::Tensors;
 /// Where a training's state lies, and what it belongs to.
 #[derive(Clone, Copy)]
 pub struct TrainingState<'a> {
-    /// The file.
+    /// The safetensors file; step and identity are its metadata.
     pub path: &'a Path,
     /// What a state must have been made with to be taken up, by name: the dataset, the encoders.
     pub identity: &'a BTreeMap<String, String>,

@@ -1,4 +1,4 @@
-//! Measures a policy in generated houses that no training saw: one-skill tasks, and whether it follows what it is told.
+//! Measures a policy in generated houses that no training saw: one-skill tasks, and whether it follows its instruction.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -8,8 +8,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::metrics::{Report, Scalars};
-use super::preset::Appraisal;
+use super::metrics::{ProgressLogger, Scalars};
+use super::preset::ValidationSpec;
 use crate::agent::{ExpertPolicy, Policy, RandomPolicy};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
@@ -19,10 +19,10 @@ use crate::house::{House, generate};
 use crate::language::phrases;
 use crate::report::stats;
 
-/// Houses of appraisals have seeds from here on; those of collections lie below.
-const UNSEEN: u64 = 1 << 40;
+/// Houses for validation have seeds from here on; those of collections lie below.
+const FIRST_SEED: u64 = 1 << 40;
 
-/// Successes among trials.
+/// A success rate, displayed with its 95 % Wilson interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rate {
@@ -47,7 +47,7 @@ impl std::fmt::Display for Rate {
     }
 }
 
-/// What an appraisal found.
+/// Success rates of a policy in houses that no training saw.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValidationReport {
@@ -58,28 +58,28 @@ pub struct ValidationReport {
     /// The policy's rate for each kind of skill.
     pub by_skill: BTreeMap<String, Rate>,
     /// Of two objects in view, the instruction names one: how often the policy picks up that one first.
-    pub named: Rate,
+    pub instructed_first: Rate,
     /// How often it picks up the other one.
-    pub other: Rate,
+    pub other_first: Rate,
     /// From one and the same start: how often it picks up first the one and, with the instruction swapped, the other.
-    pub swapped: Rate,
+    pub follows_both: Rate,
 }
 
-/// Measures a policy.
+/// Plays the tasks and the swapped instructions of `spec`.
 ///
 /// # Errors
 /// When the policy fails.
-pub fn appraise(
+pub fn validate(
     policy: &mut dyn Policy,
-    appraisal: &Appraisal,
-    report: &mut dyn Report,
+    spec: &ValidationSpec,
+    logger: &mut dyn ProgressLogger,
 ) -> anyhow::Result<ValidationReport> {
-    let mut findings = ValidationReport::default();
+    let mut report = ValidationReport::default();
     let mut chance = RandomPolicy::new();
-    let mut rng = ChaCha8Rng::seed_from_u64(appraisal.seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(spec.seed);
     let mut number = 0;
-    while findings.agent.trials < appraisal.tasks {
-        let (reference, scene, world) = unseen(appraisal.seed, number);
+    while report.agent.trials < spec.tasks {
+        let (reference, scene, world) = unseen_house(spec.seed, number);
         number += 1;
         let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
         let start = task.start.clone().unwrap_or(world);
@@ -92,38 +92,38 @@ pub fn appraise(
             Ok(rollout.end() == Some(End::Success))
         };
         let solved = solve(policy)?;
-        findings.agent.count(solved);
-        findings.random.count(solve(&mut chance)?);
+        report.agent.count(solved);
+        report.random.count(solve(&mut chance)?);
         if let Some(subtask) = task.subtasks.first() {
-            findings.by_skill.entry(format!("{:?}", subtask.skill)).or_default().count(solved);
+            report.by_skill.entry(format!("{:?}", subtask.skill)).or_default().count(solved);
         }
-        report.step(&Scalars::new("tasks", findings.agent.trials as u64, appraisal.tasks as u64))?;
+        logger.log(&Scalars::new("tasks", report.agent.trials as u64, spec.tasks as u64))?;
     }
-    while findings.swapped.trials < appraisal.swaps {
-        let (_, scene, world) = unseen(appraisal.seed + 1, number);
+    while report.follows_both.trials < spec.swaps {
+        let (_, scene, world) = unseen_house(spec.seed + 1, number);
         number += 1;
-        let Some(case) = pair(&scene, &world, &mut rng) else { continue };
+        let Some(case) = object_pair(&scene, &world, &mut rng) else { continue };
         let mut right = [false; 2];
-        for (told, right) in right.iter_mut().enumerate() {
-            let first = case.first_pickup(policy, told, &mut rng)?;
-            *right = first == Some(case.objects[told]);
-            findings.named.count(*right);
-            findings.other.count(first == Some(case.objects[1 - told]));
+        for (instructed, right) in right.iter_mut().enumerate() {
+            let first = case.first_pickup(policy, instructed, &mut rng)?;
+            *right = first == Some(case.objects[instructed]);
+            report.instructed_first.count(*right);
+            report.other_first.count(first == Some(case.objects[1 - instructed]));
         }
-        findings.swapped.count(right == [true; 2]);
-        report.step(&Scalars::new("swaps", findings.swapped.trials as u64, appraisal.swaps as u64))?;
+        report.follows_both.count(right == [true; 2]);
+        logger.log(&Scalars::new("swaps", report.follows_both.trials as u64, spec.swaps as u64))?;
     }
-    Ok(findings)
+    Ok(report)
 }
 
-fn unseen(seed: u64, number: u64) -> (SceneRef, Arc<Scene>, World) {
-    let (room, seed) = (Room::ALL[(number % 4) as usize], UNSEEN + seed * 1_000_000 + number);
+fn unseen_house(seed: u64, number: u64) -> (SceneRef, Arc<Scene>, World) {
+    let (room, seed) = (Room::ALL[(number % 4) as usize], FIRST_SEED + seed * 1_000_000 + number);
     let (scene, world) = generate::house(room, seed);
     (SceneRef::Generated { room, seed }, Arc::new(scene), world)
 }
 
 /// A start from which two objects of different classes are in view, each the only one of its class there.
-struct Pair {
+struct ObjectPair {
     scene: Arc<Scene>,
     world: World,
     objects: [Class; 2],
@@ -134,7 +134,7 @@ struct Pair {
 /// Places that are tried in a house.
 const TRIES: usize = 20;
 
-fn pair(scene: &Arc<Scene>, world: &World, rng: &mut ChaCha8Rng) -> Option<Pair> {
+fn object_pair(scene: &Arc<Scene>, world: &World, rng: &mut ChaCha8Rng) -> Option<ObjectPair> {
     for _ in 0..TRIES {
         let mut world = world.clone();
         let cell = scene.cells[rng.random_range(0..scene.cells.len())];
@@ -158,7 +158,7 @@ fn pair(scene: &Arc<Scene>, world: &World, rng: &mut ChaCha8Rng) -> Option<Pair>
         let objects = [single[first], single[second]];
         let horizon = |class: Class| expert_steps(scene, &world, class).map(|steps| 2 * steps);
         if let (Some(one), Some(other)) = (horizon(objects[0]), horizon(objects[1])) {
-            return Some(Pair { scene: scene.clone(), world, objects, horizons: [one, other] });
+            return Some(ObjectPair { scene: scene.clone(), world, objects, horizons: [one, other] });
         }
     }
     None
@@ -179,19 +179,19 @@ fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> 
     (rollout.end() == Some(End::Success)).then_some(rollout.steps())
 }
 
-impl Pair {
-    /// The class that the policy picks up first when it is told to take one of the two.
+impl ObjectPair {
+    /// The class that the policy picks up first when it is instructed to take one of the two.
     fn first_pickup(
         &self,
         policy: &mut dyn Policy,
-        told: usize,
+        instructed: usize,
         rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<Option<Class>> {
-        let (roles, subtasks) = pickup(self.objects[told]);
+        let (roles, subtasks) = pickup(self.objects[instructed]);
         let instruction = phrases::sentence(&roles, &subtasks[0], rng);
         let house = House::new(self.scene.clone(), self.world.clone());
-        let mut rollout = Rollout::in_house(house, instruction, None, Some(self.horizons[told]));
-        policy.reset(0, told as u64);
+        let mut rollout = Rollout::in_house(house, instruction, None, Some(self.horizons[instructed]));
+        policy.reset(0, instructed as u64);
         let mut first = None;
         let mut until_pickup = AfterEach(|rollout: &mut Rollout, _: &Tick| {
             let world = rollout.env.house.world();

@@ -1,4 +1,4 @@
-//! Trains the visual encoder on drawn frames of a dataset.
+//! Trains the visual encoder to predict perception targets of drawn frames.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use tch::{Kind, Tensor, nn};
 
 use super::frame_store::FrameStore;
-use super::metrics::{Report, Scalars};
-use super::perception_targets::{MARKS, Sight};
+use super::metrics::{ProgressLogger, Scalars};
+use super::perception_targets::{CELL_LABELS, PerceptionTargets};
 use super::preset::Preset;
 use super::training_state::TrainingState;
 use crate::algo::learner::Learner;
@@ -34,11 +34,11 @@ pub fn train(
     frame_store: &FrameStore,
     preset: &Preset,
     state: TrainingState<'_>,
-    report: &mut dyn Report,
+    logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<bool> {
-    let heads = PerceptionHeads::new(&(store.root() / "heads"), encoder.spec().features(), MARKS as i64);
-    let training = &preset.visual_training;
+    let heads = PerceptionHeads::new(&(store.root() / "heads"), encoder.spec().features(), CELL_LABELS as i64);
+    let training = &preset.visual_encoder_training;
     let mut learner = Learner::new(store, training.optimisation.clone(), preset.seed);
     if let Some((step, tensors)) = state.read()? {
         learner.restore_checked(state.path, step, &tensors)?;
@@ -54,21 +54,22 @@ pub fn train(
             state.write(learner.step(), &learner.state())?;
             return Ok(false);
         }
-        let (images, known) =
-            batch(frame_store, encoder, &drawn(learner.step() + 1, training.optimisation.batch, false))?;
+        let (images, targets) =
+            batch(frame_store, encoder, &drawn(learner.step() + 1, training.optimisation.batch_size, false))?;
         learner.begin_step();
-        let loss = heads.loss(&encoder.forward_with(preset.precision, &images, true), &known, training.positive_weight);
+        let loss =
+            heads.loss(&encoder.forward_with(preset.precision, &images, true), &targets, training.positive_weight);
         learner.minimise(&loss.total());
-        let mut scalars = Scalars::new("visual", learner.step(), training.optimisation.steps);
+        let mut scalars = Scalars::new("visual_encoder", learner.step(), training.optimisation.steps);
         if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
-            scalars.add("marks", &loss.marks);
-            scalars.add("depth", &loss.depth);
-            scalars.add("held", &loss.held);
+            scalars.add("cell_label_loss", &loss.marks);
+            scalars.add("depth_loss", &loss.depth);
+            scalars.add("held_object_loss", &loss.held);
         }
         if (learner.step().is_multiple_of(preset.report_every * 5) || learner.is_done()) && !held_out.is_empty() {
             measure(encoder, &heads, frame_store, &held_out, &mut scalars)?;
         }
-        report.step(&scalars)?;
+        logger.log(&scalars)?;
         if learner.step().is_multiple_of(preset.save_every) || learner.is_done() {
             state.write(learner.step(), &learner.state())?;
         }
@@ -83,14 +84,14 @@ fn measure(
     held_out: &[usize],
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
-    let (images, known) = batch(frame_store, encoder, held_out)?;
+    let (images, targets) = batch(frame_store, encoder, held_out)?;
     tch::no_grad(|| {
         let maps = encoder.forward(&images, false);
-        for (name, from, to) in [("classes", 0, Class::VOCABULARY), ("possible", Class::VOCABULARY, MARKS - 1)] {
-            let [both, holds, told, held] = heads.counts(&maps, &known, from as i64, to as i64);
-            scalars.set(&format!("held_out_{name}_recall"), both / holds.max(1.0));
-            scalars.set(&format!("held_out_{name}_precision"), both / told.max(1.0));
-            scalars.set("held_out_held_accuracy", held / held_out.len().max(1) as f64);
+        for (name, from, to) in [("class", 0, Class::VOCABULARY), ("affordance", Class::VOCABULARY, CELL_LABELS - 1)] {
+            let [true_positives, positives, predicted, held] = heads.counts(&maps, &targets, from as i64, to as i64);
+            scalars.set(&format!("held_out_{name}_recall"), true_positives / positives.max(1.0));
+            scalars.set(&format!("held_out_{name}_precision"), true_positives / predicted.max(1.0));
+            scalars.set("held_out_held_object_accuracy", held / held_out.len().max(1) as f64);
         }
     });
     Ok(())
@@ -106,35 +107,35 @@ fn frames(frame_store: &FrameStore, seed: u64, step: u64, count: usize, wanted: 
         .collect()
 }
 
-/// Draws frames: what the encoder reads and what is known of them.
+/// Draws frames: images [n, 3, side, side] of bytes, and the perception targets.
 fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> anyhow::Result<(Tensor, FrameLabels)> {
     let spec = encoder.spec();
-    let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, Sight)> {
+    let draw = |renderer: &mut Renderer, &frame: &usize| -> anyhow::Result<(Vec<u8>, PerceptionTargets)> {
         let (scene, world) = frame_store.state(frame)?;
         let frame = renderer.draw(scene, &world);
-        Ok((spec.image(frame), Sight::of(scene, &world, frame)))
+        Ok((spec.image(frame), PerceptionTargets::of(scene, &world, frame)))
     };
-    let drawn: Vec<(Vec<u8>, Sight)> =
+    let drawn: Vec<(Vec<u8>, PerceptionTargets)> =
         frames.par_iter().map_init(|| Renderer::new(House::FRAME), draw).collect::<anyhow::Result<_>>()?;
     let n = drawn.len() as i64;
-    let (images, sights): (Vec<Vec<u8>>, Vec<Sight>) = drawn.into_iter().unzip();
-    let side = encoder.spec().input;
-    let held: Vec<i64> = sights.iter().map(|sight| i64::from(sight.held)).collect();
-    let gather = |part: fn(&Sight) -> &[u8]| sights.iter().flat_map(part).copied().collect::<Vec<u8>>();
-    let depth: Vec<f32> = sights.iter().flat_map(|sight| sight.depth.iter().copied()).collect();
+    let (images, each): (Vec<Vec<u8>>, Vec<PerceptionTargets>) = drawn.into_iter().unzip();
+    let side = encoder.spec().image_size;
+    let held: Vec<i64> = each.iter().map(|target| i64::from(target.held)).collect();
+    let gather = |part: fn(&PerceptionTargets) -> &[u8]| each.iter().flat_map(part).copied().collect::<Vec<u8>>();
+    let depth: Vec<f32> = each.iter().flat_map(|target| target.depth.iter().copied()).collect();
     let device = encoder.device();
-    let known = FrameLabels {
-        marks: Tensor::from_slice(&gather(|sight| &sight.marks))
-            .view([n, MARKS as i64, SIDE, SIDE])
+    let targets = FrameLabels {
+        marks: Tensor::from_slice(&gather(|target| &target.cell_labels))
+            .view([n, CELL_LABELS as i64, SIDE, SIDE])
             .to_device(device)
             .to_kind(Kind::Float),
         depth: Tensor::from_slice(&depth).view([n, 1, SIDE, SIDE]).to_device(device),
         held: Tensor::from_slice(&held).to_device(device),
     };
-    Ok((Tensor::from_slice(&images.concat()).view([n, 3, side, side]), known))
+    Ok((Tensor::from_slice(&images.concat()).view([n, 3, side, side]), targets))
 }
 
-/// FrameStore for tests.
+/// A small frame store for tests.
 #[cfg(test)]
 pub mod testing {
     use super::*;
@@ -161,11 +162,11 @@ pub mod testing {
         FrameStore::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
     }
 
-    /// Notes what is reported.
-    pub struct Notes(pub Vec<Scalars>);
+    /// RecordedScalars what is reported.
+    pub struct RecordedScalars(pub Vec<Scalars>);
 
-    impl Report for Notes {
-        fn step(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+    impl ProgressLogger for RecordedScalars {
+        fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
             self.0.push(scalars.clone());
             Ok(())
         }
@@ -176,7 +177,7 @@ pub mod testing {
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::testing::{Notes, frame_store};
+    use super::testing::{RecordedScalars, frame_store};
     use super::*;
     use crate::nets::precision::Precision;
     use tch::Device;
@@ -187,22 +188,22 @@ mod tests {
         let frame_store = frame_store();
         assert_eq!(frame_store.frames(), 10);
         let mut preset = Preset::named("l-bc").unwrap();
-        preset.visual.channels = vec![4, 4, 8, 16];
-        preset.visual_training.optimisation.batch = 8;
-        preset.visual_training.optimisation.schedule.warmup_steps = 2;
+        preset.visual_encoder.channels = vec![4, 4, 8, 16];
+        preset.visual_encoder_training.optimisation.batch_size = 8;
+        preset.visual_encoder_training.optimisation.schedule.warmup_steps = 2;
         (preset.report_every, preset.save_every) = (1, 100);
         let mut losses = |precision, steps| -> Vec<f64> {
             preset.precision = precision;
-            preset.visual_training.optimisation.steps = steps;
+            preset.visual_encoder_training.optimisation.steps = steps;
             tch::manual_seed(2);
             let store = nn::VarStore::new(Device::Cpu);
-            let encoder = HouseEncoder::new(&(store.root() / "encoder"), &preset.visual);
+            let encoder = HouseEncoder::new(&(store.root() / "encoder"), &preset.visual_encoder);
             let folder = tempfile::tempdir().unwrap();
             let (path, stop) = (folder.path().join("visual.safetensors"), AtomicBool::new(false));
             let state = TrainingState { path: &path, identity: &BTreeMap::new() };
-            let mut notes = Notes(Vec::new());
-            assert!(train(&store, &encoder, &frame_store, &preset, state, &mut notes, &stop).unwrap());
-            notes.0.iter().map(|scalars| scalars.values["marks"]).collect()
+            let mut recorded = RecordedScalars(Vec::new());
+            assert!(train(&store, &encoder, &frame_store, &preset, state, &mut recorded, &stop).unwrap());
+            recorded.0.iter().map(|scalars| scalars.values["cell_label_loss"]).collect()
         };
         let (full, mixed) = (losses(Precision::Full, 90), losses(Precision::Mixed, 2));
         assert!(full[89] < 0.5 * full[0], "{} then {}", full[0], full[89]);

@@ -15,13 +15,15 @@ use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::algo::chain::PairSource;
 use sprint_explorer::data::features::{FeatureHeader, FeatureWriter, Features};
 use sprint_explorer::data::items::{ActionLabel, Items, Span};
-use sprint_explorer::data::selection::{Named, Past};
+use sprint_explorer::data::selection::{HistoryStart, ObjectTarget};
 use sprint_explorer::nets::device::best_device;
 use sprint_explorer::nets::visual_encoder::VisualEncoder;
-use sprint_explorer::train::batches::Batches;
+use sprint_explorer::train::batch_sampler::BatchSampler;
 use sprint_explorer::train::preset::Preset;
 use sprint_explorer::train::trainer::Trainer;
-use sprint_explorer::train::training_data::{ConditioningTable, Maps, Pool, Rows, TrainingData, joined};
+use sprint_explorer::train::training_data::{
+    ChainingPool, ConditioningTable, EmbeddingTable, FeatureMaps, TrainingData, joint_text,
+};
 use sprint_explorer::train::training_state::TrainingState;
 use tch::{Device, Kind, Tensor};
 
@@ -50,7 +52,7 @@ fn main() -> anyhow::Result<()> {
 /// Past the warm-up, in which the policy has less to compute.
 fn warm(mut preset: Preset) -> Preset {
     if let Some(iql) = &mut preset.iql {
-        iql.warmup_share = 0.0;
+        iql.cloning_fraction = 0.0;
     }
     preset
 }
@@ -62,28 +64,38 @@ fn measure(preset: &Preset, device: Device, baselines: &mut Baselines) -> anyhow
         Ok(Tensor::randn([texts.len() as i64, width], (Kind::Float, Device::Cpu)) / (width as f64).sqrt())
     };
     let texts: Vec<&str> = items.texts.iter().map(String::as_str).collect();
-    let told = match (&preset.policy.goal, &preset.policy.attention) {
+    let conditioning = match (&preset.policy.goal_channels, &preset.policy.attention) {
         (Some(_), _) => ConditioningTable::Goals,
         (None, Some(_)) => {
-            ConditioningTable::Words((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect())
+            ConditioningTable::TokenIds((0..TEXTS).map(|text| (2..2 + 5 + i64::from(text % 10)).collect()).collect())
         }
-        (None, None) => ConditioningTable::Sentences(Rows::new(&embed(&texts)?, device)?),
+        (None, None) => ConditioningTable::SentenceEmbeddings(EmbeddingTable::new(&embed(&texts)?, device)?),
     };
     let pool = match preset.chaining.as_ref().map(|chaining| chaining.pairs) {
         Some(PairSource::Pool(count)) => {
-            let pairs = Pool::draw(&items, preset.seed, count);
-            let texts: Vec<String> = pairs.iter().map(|&pair| joined(&items, pair)).collect();
+            let pairs = ChainingPool::draw(&items, preset.seed, count);
+            let texts: Vec<String> = pairs.iter().map(|&pair| joint_text(&items, pair)).collect();
             let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>())?;
-            Some(Pool::new(&items, pairs, &joint, device)?)
+            Some(ChainingPool::new(&items, pairs, &joint, device)?)
         }
         _ => None,
     };
-    let networks =
-        Networks::new(VisualEncoder::house(&preset.visual, device), &preset.policy, preset.critic.as_ref(), device);
-    let material = TrainingData { items: &items, maps: Maps::on(&features, device), told, pool, embed: &embed };
-    let (judged, batch) = (networks.critic.is_some(), preset.training.batch);
+    let networks = Networks::new(
+        VisualEncoder::house(&preset.visual_encoder, device),
+        &preset.policy,
+        preset.critic.as_ref(),
+        device,
+    );
+    let data = TrainingData {
+        items: &items,
+        feature_maps: FeatureMaps::on(&features, device),
+        conditioning,
+        pool,
+        embed: &embed,
+    };
+    let (judged, batch) = (networks.critic.is_some(), preset.training.batch_size);
     let batches =
-        Batches::new(material, preset.policy.history, judged, preset.chaining.as_ref(), (preset.seed, batch), device);
+        BatchSampler::new(data, preset.policy.history, judged, preset.chaining.as_ref(), (preset.seed, batch), device);
     let state = TrainingState { path: Path::new(""), identity: &BTreeMap::new() };
     let trainer = Trainer { networks: &networks, preset, state };
     let mut update = trainer.update()?;
@@ -98,7 +110,7 @@ fn measure(preset: &Preset, device: Device, baselines: &mut Baselines) -> anyhow
             updating.push(between.elapsed().as_secs_f64() * 1e3);
         }
     }
-    let pairs = preset.chaining.as_ref().map_or(0, |chaining| chaining.batch);
+    let pairs = preset.chaining.as_ref().map_or(0, |chaining| chaining.batch_size);
     let least = updating.iter().copied().fold(f64::INFINITY, f64::min);
     let least_gathering = gathering.iter().copied().fold(f64::INFINITY, f64::min);
     let (update, gather) = (median(updating), median(gathering));
@@ -121,7 +133,7 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 
 fn features(preset: &Preset) -> anyhow::Result<Features> {
     let folder = tempfile::tempdir()?;
-    let numbers = preset.visual.map() as u64;
+    let numbers = preset.visual_encoder.map() as u64;
     let header =
         FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: u64::from(FRAMES), numbers };
     let mut writer = FeatureWriter::open(folder.path(), header.clone())?;
@@ -154,7 +166,7 @@ fn items() -> Items {
         held_out: Vec::new(),
         firsts: (0..=FRAMES / (3 * SPAN)).map(|trajectory| trajectory * 3 * SPAN).chain([FRAMES]).collect(),
         withheld: Default::default(),
-        past: Past::Trajectory,
-        named: Named::Ahead,
+        history_start: HistoryStart::Trajectory,
+        object_target: ObjectTarget::Next,
     }
 }

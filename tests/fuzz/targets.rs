@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
 use sprint_explorer::agent::checkpoint::Networks;
-use sprint_explorer::agent::config::Config;
+use sprint_explorer::agent::config::CheckpointConfig;
 use sprint_explorer::agent::policy_source::PolicySource;
 use sprint_explorer::data::alfred::{self, tasks as lists};
 use sprint_explorer::data::features::{self, Features};
@@ -31,8 +31,8 @@ use sprint_explorer::report::charts::training_curves;
 use sprint_explorer::report::compare::Comparison;
 use sprint_explorer::run_dir::reader::RecordedRun;
 use sprint_explorer::run_dir::writer::RunWriter;
-use sprint_explorer::train::collect::{Collection, Demonstrator, Manner, Source};
-use sprint_explorer::train::metrics::{Report, Scalars};
+use sprint_explorer::train::collect::{Collection, DemonstrationSettings, ExpertKind, TaskSource};
+use sprint_explorer::train::metrics::{ProgressLogger, Scalars};
 use sprint_explorer::train::preset::Preset;
 use sprint_explorer::tui::config;
 use tch::Device;
@@ -180,8 +180,8 @@ fn finished(at: &Path) -> anyhow::Result<()> {
 
 struct Silent;
 
-impl Report for Silent {
-    fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+impl ProgressLogger for Silent {
+    fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
         Ok(())
     }
 }
@@ -190,9 +190,9 @@ impl Report for Silent {
 fn collected(at: &Path, file: &str) -> Vec<Vec<u8>> {
     let collection = Collection {
         out: at.to_owned(),
-        source: Source::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
+        tasks: TaskSource::Generated { episodes: 3, lengths: vec![1, 2], annotations: 1 },
         seed: 3,
-        manner: Manner { demonstrator: Demonstrator::ScanningExpert, pace: TurnTiming::Late, noise: 0.0 },
+        settings: DemonstrationSettings { expert: ExpertKind::Scanning, turn_timing: TurnTiming::Late, noise: 0.0 },
         learner: None,
     };
     collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
@@ -271,25 +271,27 @@ fn embedding(at: &Path) -> anyhow::Result<()> {
 }
 
 fn checkpoint(at: &Path) -> anyhow::Result<()> {
-    Config::read(at).map(drop)
+    CheckpointConfig::read(at).map(drop)
 }
 
 /// Small networks, and their configuration beside them.
 fn tensors(at: &Path) -> Vec<Vec<u8>> {
     let mut config: serde_json::Value = serde_json::from_slice(&shipped("config.json")).unwrap();
-    config["visual"]["channels"] = serde_json::json!([1, 1, 1, 1]);
+    config["visual_encoder"]["channels"] = serde_json::json!([1, 1, 1, 1]);
     config["policy"]["channels"] = serde_json::json!([1, 1, 1, 1]);
     config["policy"]["hidden"] = serde_json::json!([2]);
     config["policy"]["embedding"] = 2.into();
     std::fs::write(at.join("config.json"), config.to_string()).unwrap();
-    let config = Config::read(at).unwrap();
-    Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu).save(at, &config).unwrap();
+    let config = CheckpointConfig::read(at).unwrap();
+    Networks::new(config.build_visual_encoder(Device::Cpu).unwrap(), &config.policy, None, Device::Cpu)
+        .save(at, &config)
+        .unwrap();
     vec![std::fs::read(at.join("model.safetensors")).unwrap()]
 }
 
 fn loaded(at: &Path) -> anyhow::Result<()> {
     weights::read_with_metadata(&at.join("model.safetensors"))?;
-    Networks::load(at, &Config::read(at)?, Device::Cpu).map(drop)
+    Networks::load(at, &CheckpointConfig::read(at)?, Device::Cpu).map(drop)
 }
 
 fn presets(_: &Path) -> Vec<Vec<u8>> {

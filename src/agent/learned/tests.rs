@@ -22,11 +22,11 @@ fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
     let embedder = Embedder::new(SentenceEncoder::load(&folder, Device::Cpu).unwrap(), None);
     let embedding = embedder.encoder().width() as i64;
     let small = small();
-    let config = Config {
-        policy: PolicySpec { embedding, goal, ..small.policy },
+    let config = CheckpointConfig {
+        policy: PolicySpec { embedding, goal_channels: goal, ..small.policy },
         critic: Some(CriticSpec {
             channels: [4; 4],
-            halved: false,
+            downsample: false,
             hidden: vec![8],
             dropout: 0.2,
             action_embedding: 4,
@@ -35,9 +35,13 @@ fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
         }),
         ..small
     };
-    let networks =
-        Networks::new(config.eyes(Device::Cpu).unwrap(), &config.policy, config.critic.as_ref(), Device::Cpu);
-    Some(LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).unwrap())
+    let networks = Networks::new(
+        config.build_visual_encoder(Device::Cpu).unwrap(),
+        &config.policy,
+        config.critic.as_ref(),
+        Device::Cpu,
+    );
+    LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
 }
 
 /// A fresh agent whose logits are all but equal, so that whatever rounds otherwise decides otherwise; nothing where there is no
@@ -115,7 +119,7 @@ fn an_agent_says_how_much_of_an_instruction_it_reads() {
     let read = agent.reading("take the mug").unwrap();
     assert!(read.tokens > 3 && read.cut == 0, "{read:?}");
     assert_eq!(fresh(Some([4; 4])).unwrap().reading("take the mug"), None, "it is shown its goal");
-    agent.config.policy.attention = Some(AttentionSpec { words: 9, layers: 1, heads: 1, inner: 4 });
+    agent.config.policy.attention = Some(AttentionSpec { vocabulary_size: 9, layers: 1, heads: 1, feedforward: 4 });
     assert_eq!(agent.reading("take the mug"), Some(Reading { tokens: 3, cut: 0 }));
     assert_eq!(agent.reading(&"mug ".repeat(130)), Some(Reading { tokens: 128, cut: 2 }));
 }
@@ -182,7 +186,7 @@ fn a_decision_depends_on_its_own_slot_alone_bit_for_bit() {
 }
 
 /// What a shipped agent thinks first.
-fn first_thought(name: &str, change: impl Fn(&mut Config)) -> Option<ActionDistribution> {
+fn first_thought(name: &str, change: impl Fn(&mut CheckpointConfig)) -> Option<ActionDistribution> {
     let mut agent = shipped(name)?;
     change(&mut agent.config);
     Some(thoughts(&mut agent, 3, &[0, 1, 2]).remove(0))
@@ -192,7 +196,7 @@ fn first_thought(name: &str, change: impl Fn(&mut Config)) -> Option<ActionDistr
 fn frequent_actions_lose_as_much_as_the_adjustment_says() {
     let mut ahead = Vec::new();
     let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
-    for adjustment in [None, Some(LogitAdjustment { strength: 0.5, shares })] {
+    for adjustment in [None, Some(LogitAdjustment { strength: 0.5, action_frequencies: shares })] {
         let Some(thought) = first_thought("first", |config| config.logit_adjustment = adjustment.clone()) else {
             return;
         };

@@ -21,49 +21,49 @@ use crate::house::view::Candidate;
 use crate::language::phrases;
 use crate::language::story::Story;
 
-/// The longest disturbance, in steps.
+/// The longest run of random actions, in steps.
 const LONGEST: u32 = 4;
 /// More steps than this beyond three times the expert's give an episode up.
 const SLACK: u32 = 40;
 
-/// Who demonstrates, or corrects.
+/// The expert that demonstrates, or says what a learner should have done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Demonstrator {
-    /// Turns around until it has seen what it goes for, as someone must who only sees.
+pub enum ExpertKind {
+    /// Turns around until the object it goes for is in view.
     #[default]
-    ScanningExpert,
-    /// Goes straight for things, seen or not, as ALFRED's planner did.
-    Expert,
+    Scanning,
+    /// Goes straight for objects, in view or not, as ALFRED's planner did: it knows where they are.
+    Privileged,
 }
 
-impl Demonstrator {
-    fn policy(self, pace: TurnTiming) -> Box<dyn Policy> {
+impl ExpertKind {
+    fn policy(self, turn_timing: TurnTiming) -> Box<dyn Policy> {
         match self {
-            Demonstrator::ScanningExpert => Box::new(ScanningExpert::new(pace)),
-            Demonstrator::Expert => Box::new(ExpertPolicy::of(pace)),
+            ExpertKind::Scanning => Box::new(ScanningExpert::new(turn_timing)),
+            ExpertKind::Privileged => Box::new(ExpertPolicy::of(turn_timing)),
         }
     }
 }
 
-/// How tasks are demonstrated.
+/// Which expert demonstrates tasks, and what disturbs it.
 #[derive(Clone, Copy, Debug)]
-pub struct Manner {
-    /// Who says what is right in every state.
-    pub demonstrator: Demonstrator,
-    /// Which of several ways is right.
-    pub pace: TurnTiming,
-    /// The share of steps at which chance takes over for a few steps.
+pub struct DemonstrationSettings {
+    /// The expert whose choice is the label of every state.
+    pub expert: ExpertKind,
+    /// When it turns and acts, of the steps at which it may.
+    pub turn_timing: TurnTiming,
+    /// The fraction of steps at which random actions begin, for up to four steps.
     pub noise: f64,
 }
 
-/// What a task itself says. Of a single skill, the instruction is its sentence.
-pub(crate) fn own_words(task: &Task) -> Annotation {
+/// A task's own words as an annotation. Of a single skill, the instruction is its sentence.
+pub(crate) fn own_annotation(task: &Task) -> Annotation {
     let alone = task.subtasks.len() == 1 && task.sentences.is_empty();
     let steps = if alone { vec![task.instruction.clone()] } else { task.sentences.clone() };
     Annotation { goal: task.instruction.clone(), steps }
 }
 
-/// What the grammar says of a task, several times over.
+/// Annotations of a task by the grammar, `times` of them.
 pub(crate) fn phrasings(
     scene: &Scene,
     start: &World,
@@ -80,16 +80,13 @@ pub(crate) fn phrasings(
 
 /// A task that is about to be demonstrated.
 pub(crate) struct Demonstration<'a> {
-    /// What to do.
     pub task: &'a Task,
-    /// Where.
     pub setting: Setting,
-    /// The trajectory's.
+    /// The trajectory's id.
     pub id: String,
-    /// What is said of it.
+    /// The first is the instruction that a learner gets.
     pub annotations: Vec<Annotation>,
-    /// How.
-    pub manner: Manner,
+    pub settings: DemonstrationSettings,
 }
 
 impl Demonstration<'_> {
@@ -100,9 +97,10 @@ impl Demonstration<'_> {
         rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<Option<Trajectory>> {
         let Task { roles, subtasks, .. } = self.task;
-        let told = self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
+        let instruction =
+            self.annotations.first().map_or(self.task.instruction.clone(), |annotation| annotation.goal.clone());
         let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
-        let mut rollout = Rollout::new(HouseEnvironment::of_task(self.task, house, Grading::Class), told, None);
+        let mut rollout = Rollout::new(HouseEnvironment::of_task(self.task, house, Grading::Class), instruction, None);
         rollout.horizon = Some(3 * self.task.expert_steps + SLACK + 1);
         if let Some(learner) = learner.as_deref_mut() {
             learner.reset(0, rng.random());
@@ -110,9 +108,9 @@ impl Demonstration<'_> {
             learner.set_sampling(rng.random());
         }
         // Some episodes are left undisturbed.
-        let noise = if rng.random_bool(0.3) { 0.0 } else { self.manner.noise };
+        let noise = if rng.random_bool(0.3) { 0.0 } else { self.settings.noise };
         let mut policy = DisturbedPolicy {
-            demonstrator: self.manner.demonstrator.policy(self.manner.pace),
+            demonstrator: self.settings.expert.policy(self.settings.turn_timing),
             learner,
             learner_until: self.task.horizon,
             noise,

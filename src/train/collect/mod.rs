@@ -1,9 +1,9 @@
 //! Collects demonstrations in generated houses or of given tasks.
 
 mod demonstration;
+mod task_source;
 
 use std::collections::BTreeSet;
-use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,53 +14,35 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tch::Device;
 
-use self::demonstration::{Demonstration, own_words, phrasings};
-pub use self::demonstration::{Demonstrator, Manner};
-use super::metrics::{Report, Scalars};
+use self::demonstration::{Demonstration, own_annotation, phrasings};
+pub use self::demonstration::{DemonstrationSettings, ExpertKind};
+use self::task_source::PER_HOUSE;
+pub use self::task_source::TaskSource;
+use super::metrics::{ProgressLogger, Scalars};
 use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
 use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter};
 use crate::data::ensure_free;
 use crate::domain::task::SceneRef;
-use crate::domain::{Room, Task, Trajectory};
-use crate::episode::scenes::{Scenes, Setting};
+use crate::domain::{Room, Trajectory};
+use crate::episode::scenes::Setting;
 use crate::house::generate;
 
-/// What to collect.
+/// A dataset of demonstrations to be made.
 pub struct Collection {
-    /// The dataset's folder.
+    /// The dataset's folder, which must not hold anything yet.
     pub out: PathBuf,
-    /// Of what.
-    pub source: Source,
+    /// The tasks that are demonstrated.
+    pub tasks: TaskSource,
     /// Drives houses, tasks, words and chance.
     pub seed: u64,
-    /// How.
-    pub manner: Manner,
-    /// A checkpoint that acts instead of the demonstrator, with its sentence encoder: the demonstrator then only says what it
+    /// Which expert demonstrates, and how much random actions disturb it.
+    pub settings: DemonstrationSettings,
+    /// A checkpoint that acts instead of the expert, with its sentence encoder: the expert then only says what it
     /// would do, and finishes what is left at the horizon.
     pub learner: Option<(PathBuf, SharedEmbedder)>,
 }
 
-/// What is demonstrated.
-pub enum Source {
-    /// Tasks that the generator finds in houses of its own.
-    Generated {
-        /// How many trajectories.
-        episodes: usize,
-        /// Task lengths, drawn uniformly; a length may be listed more than once.
-        lengths: Vec<usize>,
-        /// Phrasings of each trajectory.
-        annotations: usize,
-    },
-    /// Each of these tasks once, in its own words.
-    Tasks {
-        /// The tasks.
-        tasks: Vec<Task>,
-        /// Where they play.
-        scenes: Scenes,
-    },
-}
-
-/// What a collection came to.
+/// How a collection ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collected {
     /// How many demonstrations were kept.
@@ -69,22 +51,18 @@ pub struct Collected {
     pub stopped: bool,
 }
 
-/// Episodes in one house.
-const PER_HOUSE: usize = 4;
-/// Houses, or given tasks, between two writes, at most.
-const GROUP: usize = 32;
 /// Generated houses, at most: where fewer tasks than wished for can be demonstrated it must end some time.
 const HOUSES: u64 = 1_000_000;
 
 impl Collection {
     /// Collects; the same trajectories for any number of threads. Stopped, it keeps the first of them. A task that the
-    /// demonstrator cannot do gives no trajectory.
+    /// expert cannot do gives no trajectory.
     ///
     /// # Errors
     /// When a given task does not fit its scene, or the folder holds something already, which is found before anything is written;
     /// when the folder cannot be written to, or the learner not be loaded.
-    pub fn run(&self, report: &mut dyn Report, stop: &AtomicBool) -> anyhow::Result<Collected> {
-        if let Source::Tasks { tasks, scenes } = &self.source {
+    pub fn run(&self, logger: &mut dyn ProgressLogger, stop: &AtomicBool) -> anyhow::Result<Collected> {
+        if let TaskSource::Tasks { tasks, scenes } = &self.tasks {
             scenes.check(tasks)?;
         }
         ensure_free::check(&self.out)?;
@@ -92,32 +70,32 @@ impl Collection {
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();
         let (mut next, mut stopped) = (0u64, false);
-        while let Some(lots) = self.source.lots(next, counts.trajectories as usize) {
-            next = lots.end;
-            let endless = matches!(self.source, Source::Generated { .. }) && next >= HOUSES;
+        while let Some(numbers) = self.tasks.numbers(next, counts.trajectories as usize) {
+            next = numbers.end;
+            let endless = matches!(self.tasks, TaskSource::Generated { .. }) && next >= HOUSES;
             anyhow::ensure!(!endless, "too few of the generated tasks could be demonstrated");
-            let lot = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
+            let collect = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
                 let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
-                if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.lot(number, learner.as_mut()) }
+                if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.house_or_task(number, learner.as_mut()) }
             };
             let made: Vec<Vec<Trajectory>> =
-                lots.into_par_iter().map_init(|| self.load(), lot).collect::<anyhow::Result<_>>()?;
+                numbers.into_par_iter().map_init(|| self.load(), collect).collect::<anyhow::Result<_>>()?;
             if stop.load(Ordering::Relaxed) {
-                // Of this group some lots may be missing.
+                // Of this group some trajectories may be missing.
                 stopped = true;
                 break;
             }
-            let missing = self.source.most() - counts.trajectories as usize;
+            let missing = self.tasks.most() - counts.trajectories as usize;
             for trajectory in made.into_iter().flatten().take(missing) {
                 count(&trajectory, &mut counts);
                 self.keep_scene(&trajectory.scene, &writer, &mut scenes)?;
                 writer.trajectory(&trajectory)?;
             }
-            report.step(&Scalars::new("episodes", self.source.done(next, &counts), self.source.most() as u64))?;
+            logger.log(&Scalars::new("episodes", self.tasks.done(next, &counts), self.tasks.most() as u64))?;
         }
         writer.finish(&DatasetManifest {
             format_version: DatasetManifest::FORMAT,
-            source: self.source.name().into(),
+            source: self.tasks.name().into(),
             counts: [("train".to_string(), counts)].into(),
             scenes: scenes.len() as u64,
             held_out: Vec::new(),
@@ -133,7 +111,7 @@ impl Collection {
         writer: &DatasetWriter,
         kept: &mut BTreeSet<String>,
     ) -> anyhow::Result<()> {
-        if let (SceneRef::Named(name), Source::Tasks { scenes, .. }) = (reference, &self.source)
+        if let (SceneRef::Named(name), TaskSource::Tasks { scenes, .. }) = (reference, &self.tasks)
             && kept.insert(name.clone())
         {
             writer.scene(&scenes.scene(reference)?.0)?;
@@ -147,18 +125,18 @@ impl Collection {
     }
 
     /// The trajectories of one house, or of one given task.
-    fn lot(&self, number: u64, learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
+    fn house_or_task(&self, number: u64, learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(number + 1);
-        match &self.source {
-            Source::Generated { lengths, annotations, .. } => {
+        match &self.tasks {
+            TaskSource::Generated { lengths, annotations, .. } => {
                 self.house(number, (lengths, *annotations), learner, &mut rng)
             }
-            Source::Tasks { tasks, scenes } => {
+            TaskSource::Tasks { tasks, scenes } => {
                 let Some(task) = tasks.get(number as usize) else { return Ok(Vec::new()) };
                 let setting = scenes.setting(task).with_context(|| format!("task {:?}", task.id))?;
-                let (id, annotations) = (task.id.clone(), vec![own_words(task)]);
-                let demonstration = Demonstration { task, setting, id, annotations, manner: self.manner };
+                let (id, annotations) = (task.id.clone(), vec![own_annotation(task)]);
+                let demonstration = Demonstration { task, setting, id, annotations, settings: self.settings };
                 Ok(demonstration.play(learner, &mut rng)?.into_iter().collect())
             }
         }
@@ -184,44 +162,10 @@ impl Collection {
             let id = format!("{}-{position}", scene.name);
             let annotations = phrasings(&scene, &start, &task, annotations, rng);
             let setting = Setting { scene: scene.clone(), world: start };
-            let demonstration = Demonstration { task: &task, setting, id, annotations, manner: self.manner };
+            let demonstration = Demonstration { task: &task, setting, id, annotations, settings: self.settings };
             made.extend(demonstration.play(learner.as_deref_mut(), rng)?);
         }
         Ok(made)
-    }
-}
-
-impl Source {
-    /// Which lots come next, when those before `next` gave so many trajectories.
-    fn lots(&self, next: u64, made: usize) -> Option<Range<u64>> {
-        let count = match self {
-            Source::Generated { episodes, .. } => GROUP.min(episodes.saturating_sub(made).div_ceil(PER_HOUSE)),
-            Source::Tasks { tasks, .. } => GROUP.min(tasks.len() - (next as usize).min(tasks.len())),
-        };
-        (count > 0).then(|| next..next + count as u64)
-    }
-
-    /// The most trajectories that there will be.
-    fn most(&self) -> usize {
-        match self {
-            Source::Generated { episodes, .. } => *episodes,
-            Source::Tasks { tasks, .. } => tasks.len(),
-        }
-    }
-
-    /// How far it has come, of [`Source::most`].
-    fn done(&self, next: u64, counts: &Counts) -> u64 {
-        match self {
-            Source::Generated { .. } => counts.trajectories,
-            Source::Tasks { .. } => next,
-        }
-    }
-
-    fn name(&self) -> &'static str {
-        match self {
-            Source::Generated { .. } => "generated",
-            Source::Tasks { .. } => "tasks",
-        }
     }
 }
 
@@ -242,8 +186,9 @@ mod tests {
     use crate::data::dataset::Dataset;
     use crate::data::json;
     use crate::domain::trajectory::Annotation;
-    use crate::domain::{Class, Role};
+    use crate::domain::{Class, Role, Task};
     use crate::episode::rollout::Rollout;
+    use crate::episode::scenes::Scenes;
     use crate::house::House;
     use crate::house::expert::TurnTiming;
     use crate::house::grading::{Grader, Grading};
@@ -251,13 +196,13 @@ mod tests {
     use crate::nets::embedding_cache::Embedder;
     use crate::nets::sentence::default_folder;
 
-    const UNDISTURBED: Manner =
-        Manner { demonstrator: Demonstrator::ScanningExpert, pace: TurnTiming::Late, noise: 0.0 };
+    const UNDISTURBED: DemonstrationSettings =
+        DemonstrationSettings { expert: ExpertKind::Scanning, turn_timing: TurnTiming::Late, noise: 0.0 };
 
     struct Silent;
 
-    impl Report for Silent {
-        fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+    impl ProgressLogger for Silent {
+        fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
             Ok(())
         }
     }
@@ -276,15 +221,15 @@ mod tests {
     }
 
     #[test]
-    fn given_tasks_are_demonstrated_in_their_own_words_and_their_scenes_kept() {
+    fn given_tasks_are_demonstrated_in_their_own_annotation_and_their_scenes_kept() {
         let folder = tempfile::tempdir().unwrap();
         let tasks = tasks(folder.path());
         let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
         let collection = Collection {
             out: folder.path().join("D"),
-            source: Source::Tasks { tasks: tasks.clone(), scenes },
+            tasks: TaskSource::Tasks { tasks: tasks.clone(), scenes },
             seed: 1,
-            manner: UNDISTURBED,
+            settings: UNDISTURBED,
             learner: None,
         };
         assert_eq!(
@@ -293,8 +238,8 @@ mod tests {
         );
         let dataset = Dataset::open(&collection.out).unwrap();
         let made: Vec<Trajectory> = dataset.trajectories().unwrap().collect::<Result<_, _>>().unwrap();
-        let told = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
-        assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![told]));
+        let own = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
+        assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![own]));
         let scene = dataset.scenes().unwrap().into_values().next().unwrap();
         let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None);
         let mut rollout =
@@ -303,15 +248,15 @@ mod tests {
         assert!(rollout.end().is_some(), "the demonstration, played again, completes the task");
     }
 
-    /// How many steps the same tasks take, demonstrated in each of two manners.
-    fn steps(manners: [Manner; 2]) -> Vec<(usize, usize)> {
+    /// How many steps the same tasks take, demonstrated by each of two settings.
+    fn steps(both: [DemonstrationSettings; 2]) -> Vec<(usize, usize)> {
         let folder = tempfile::tempdir().unwrap();
-        let [one, other] = manners.map(|manner| {
+        let [one, other] = both.map(|settings| {
             let collection = Collection {
-                out: folder.path().join(format!("{manner:?}")),
-                source: Source::Generated { episodes: 12, lengths: vec![1], annotations: 1 },
+                out: folder.path().join(format!("{settings:?}")),
+                tasks: TaskSource::Generated { episodes: 12, lengths: vec![1], annotations: 1 },
                 seed: 2,
-                manner,
+                settings,
                 learner: None,
             };
             collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
@@ -327,12 +272,12 @@ mod tests {
     }
 
     #[test]
-    fn who_is_prompt_is_done_sooner() {
-        let expert = Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED };
-        let pairs = steps([expert, Manner { pace: TurnTiming::Early, ..expert }]);
-        let saved: Vec<_> = pairs.iter().filter(|(steady, prompt)| prompt < steady).collect();
-        let (steady, prompt) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-        assert!(prompt < steady && !saved.is_empty(), "{pairs:?}");
+    fn an_expert_that_turns_early_is_done_sooner() {
+        let expert = DemonstrationSettings { expert: ExpertKind::Privileged, ..UNDISTURBED };
+        let pairs = steps([expert, DemonstrationSettings { turn_timing: TurnTiming::Early, ..expert }]);
+        let saved: Vec<_> = pairs.iter().filter(|(late, early)| early < late).collect();
+        let (late, early) = pairs.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+        assert!(early < late && !saved.is_empty(), "{pairs:?}");
     }
 
     #[test]
@@ -346,12 +291,12 @@ mod tests {
         let again = |number: usize| Task { id: format!("again-{number}"), ..task.clone() };
         let collection = Collection {
             out: folder.path().join("D"),
-            source: Source::Tasks {
+            tasks: TaskSource::Tasks {
                 tasks: (0..8).map(again).collect(),
                 scenes: Scenes::in_folder(Some(folder.path().to_owned())),
             },
             seed: 1,
-            manner: UNDISTURBED,
+            settings: UNDISTURBED,
             learner: Some((first, Arc::new(std::sync::Mutex::new(sentences)))),
         };
         collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
@@ -363,8 +308,8 @@ mod tests {
     }
 
     #[test]
-    fn the_seeker_looks_around_for_what_the_expert_goes_for_unseen() {
-        let pairs = steps([UNDISTURBED, Manner { demonstrator: Demonstrator::Expert, ..UNDISTURBED }]);
+    fn the_scanning_expert_looks_around_for_what_the_privileged_one_goes_for_unseen() {
+        let pairs = steps([UNDISTURBED, DemonstrationSettings { expert: ExpertKind::Privileged, ..UNDISTURBED }]);
         let longer = pairs.iter().filter(|(looks, goes)| looks > goes).count();
         assert!(longer > pairs.len() / 2, "{pairs:?}");
     }
@@ -373,8 +318,8 @@ mod tests {
     fn a_stopped_collection_keeps_what_came_first() {
         /// Stops at the first word of progress.
         struct Stopping<'a>(&'a AtomicBool);
-        impl Report for Stopping<'_> {
-            fn step(&mut self, _: &Scalars) -> anyhow::Result<()> {
+        impl ProgressLogger for Stopping<'_> {
+            fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
                 self.0.store(true, Ordering::Relaxed);
                 Ok(())
             }
@@ -382,9 +327,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let collection = |name: &str| Collection {
             out: folder.path().join(name),
-            source: Source::Generated { episodes: 150, lengths: vec![1], annotations: 1 },
+            tasks: TaskSource::Generated { episodes: 150, lengths: vec![1], annotations: 1 },
             seed: 4,
-            manner: UNDISTURBED,
+            settings: UNDISTURBED,
             learner: None,
         };
         let made = |collection: &Collection| -> Vec<Trajectory> {
@@ -405,9 +350,9 @@ mod tests {
         let mut tasks = tasks(folder.path());
         let collected = |tasks: &[Task]| {
             let scenes = Scenes::in_folder(Some(folder.path().to_owned()));
-            let source = Source::Tasks { tasks: tasks.to_vec(), scenes };
+            let tasks = TaskSource::Tasks { tasks: tasks.to_vec(), scenes };
             let collection =
-                Collection { out: folder.path().join("D"), source, seed: 1, manner: UNDISTURBED, learner: None };
+                Collection { out: folder.path().join("D"), tasks, seed: 1, settings: UNDISTURBED, learner: None };
             collection.run(&mut Silent, &AtomicBool::new(false))
         };
         assert_eq!(collected(&tasks).unwrap(), Collected { trajectories: 1, stopped: false });

@@ -1,4 +1,4 @@
-//! Batches: drawn items as tensors. What is drawn is a function of the seed and the step alone.
+//! Batches: sampled items as tensors. What is sampled is a function of the seed and the step alone.
 
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -11,62 +11,62 @@ use crate::algo::chain::{Chaining, PairSource, cut_chance};
 use crate::data::items::{Item, Span};
 use crate::nets::visual::SIDE;
 
-/// Keeps the stream of random numbers of chaining apart from that of the items.
+/// Mixed into the seed: pairs are drawn from another random stream than items.
 const CHAINING: u64 = 0x63a1;
-/// And that of goals.
+/// The same for goals.
 const GOALS: u64 = 0x90a1;
 
-/// Makes batches of one training.
-pub struct Batches<'a> {
-    material: TrainingData<'a>,
+/// Samples the batches of one training, on a thread of its own ahead of the updates.
+pub struct BatchSampler<'a> {
+    data: TrainingData<'a>,
     /// Frames in an observation.
     history: u32,
-    /// Whether the next observation is needed too.
-    judged: bool,
+    /// Whether the next observation is gathered too, which critics alone need.
+    with_next: bool,
     chaining: Option<&'a Chaining>,
     seed: u64,
     size: usize,
     device: Device,
 }
 
-impl<'a> Batches<'a> {
-    /// Batches of `size` items for networks that see `history` frames on `device`; `judged` says that a critic reads them.
+impl<'a> BatchSampler<'a> {
+    /// Samples batches of `size` items for networks that see `history` frames on `device`; a critic needs them `with_next`.
     pub fn new(
-        material: TrainingData<'a>,
+        data: TrainingData<'a>,
         history: i64,
-        judged: bool,
+        with_next: bool,
         chaining: Option<&'a Chaining>,
         (seed, size): (u64, usize),
         device: Device,
-    ) -> Batches<'a> {
-        Batches { material, history: history as u32, judged, chaining, seed, size, device }
+    ) -> BatchSampler<'a> {
+        BatchSampler { data, history: history as u32, with_next, chaining, seed, size, device }
     }
 
-    /// The batch of a step.
+    /// The batch of a step: `size` base items and, where skills are chained, pairs of them.
     ///
     /// # Errors
     /// When a frame has no label, or a sentence cannot be embedded.
     pub fn at(&self, step: u64) -> anyhow::Result<Batch> {
-        let items = self.draw(&self.material.items.training, step, self.size);
+        let items = self.draw(&self.data.items.training, step, self.size);
         let pairs = self.chaining.map(|chaining| self.pairs(chaining, &items, step)).transpose()?;
         Ok(Batch { base: self.base(&items)?, pairs })
     }
 
-    /// Items of some spans, each told its own text or goal.
+    /// Items of some spans; with goals, each ends at a random later frame of its trajectory.
     fn draw(&self, spans: &[Span], step: u64, size: usize) -> Vec<Item> {
-        let mut items = self.material.items.draw(spans, self.seed, step, size);
-        if let ConditioningTable::Goals = self.material.told {
-            let mut rng = self.chance(GOALS, step);
+        let mut items = self.data.items.draw(spans, self.seed, step, size);
+        if let ConditioningTable::Goals = self.data.conditioning {
+            let mut rng = self.random_stream(GOALS, step);
             for item in &mut items {
-                item.end = rng.random_range(self.material.items.goals(item));
+                item.end = rng.random_range(self.data.items.goals(item));
             }
         }
         items
     }
 
-    /// Transitions of items, each told its own text or goal.
+    /// Transitions of items, each conditioned on its own text or goal.
     fn base(&self, items: &[Item]) -> anyhow::Result<Transitions> {
-        self.transitions(items, self.told(items)?)
+        self.transitions(items, self.conditioning(items)?)
     }
 
     /// The same items of held-out spans every time, in chunks.
@@ -78,7 +78,7 @@ impl<'a> Batches<'a> {
         items.chunks(chunk).map(|items| self.base(items)).collect()
     }
 
-    fn chance(&self, purpose: u64, step: u64) -> ChaCha8Rng {
+    fn random_stream(&self, purpose: u64, step: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ purpose);
         rng.set_stream(step.wrapping_add(1));
         rng
@@ -86,11 +86,12 @@ impl<'a> Batches<'a> {
 
     /// Pairs (A, B): from the batch by a permutation, or from the pool.
     fn pairs(&self, chaining: &Chaining, items: &[Item], step: u64) -> anyhow::Result<ChainedPairs> {
-        let mut rng = self.chance(CHAINING, step);
-        let (first, second, joint) = match (chaining.pairs, &self.material.pool) {
+        let mut rng = self.random_stream(CHAINING, step);
+        let (first, second, joint) = match (chaining.pairs, &self.data.pool) {
             (PairSource::Pool(_), Some(pool)) => {
-                let drawn: Vec<usize> = (0..chaining.batch).map(|_| rng.random_range(0..pool.pairs.len())).collect();
-                let mut of = |text: u32| pool.item(self.material.items, text, &mut rng);
+                let drawn: Vec<usize> =
+                    (0..chaining.batch_size).map(|_| rng.random_range(0..pool.pairs.len())).collect();
+                let mut of = |text: u32| pool.item(self.data.items, text, &mut rng);
                 let first: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].0)).collect();
                 let second: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].1)).collect();
                 (first, second, pool.joint.rows(drawn.into_iter(), self.device)?)
@@ -98,29 +99,31 @@ impl<'a> Batches<'a> {
             _ => {
                 let mut order: Vec<usize> = (0..items.len()).collect();
                 order.shuffle(&mut rng);
-                let first = items[..chaining.batch.min(items.len())].to_vec();
+                let first = items[..chaining.batch_size.min(items.len())].to_vec();
                 let second: Vec<Item> = order[..first.len()].iter().map(|&i| items[i]).collect();
-                let joint = match chaining.aggregate > 0.0 {
-                    true => self.material.embed_joint(&first, &second)?.to_device(self.device),
+                let joint = match chaining.aggregate_weight > 0.0 {
+                    true => self.data.embed_joint(&first, &second)?.to_device(self.device),
                     false => Tensor::from(0.0),
                 };
                 (first, second, joint)
             }
         };
         let cut: Vec<f32> = first.iter().map(|item| flag(rng.random_bool(cut_chance(item.end - item.frame)))).collect();
-        let joint = match chaining.aggregate > 0.0 {
+        let joint = match chaining.aggregate_weight > 0.0 {
             true => Some((joint.shallow_clone(), self.transitions(&second, joint)?)),
             false => None,
         };
-        let first = self.transitions(&first, self.told(&second)?)?;
+        let first = self.transitions(&first, self.conditioning(&second)?)?;
         Ok(ChainedPairs { first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
     }
 
-    /// What items are told.
-    fn told(&self, items: &[Item]) -> anyhow::Result<Tensor> {
-        match &self.material.told {
-            ConditioningTable::Sentences(rows) => rows.rows(items.iter().map(|item| item.text as usize), self.device),
-            ConditioningTable::Words(texts) => {
+    /// What networks are conditioned on for these items: embeddings [n, width], token ids [n, longest], or goal observations.
+    fn conditioning(&self, items: &[Item]) -> anyhow::Result<Tensor> {
+        match &self.data.conditioning {
+            ConditioningTable::SentenceEmbeddings(rows) => {
+                rows.rows(items.iter().map(|item| item.text as usize), self.device)
+            }
+            ConditioningTable::TokenIds(texts) => {
                 let texts: Vec<&[i64]> =
                     items.iter().map(|item| texts.get(item.text as usize).map_or(&[][..], Vec::as_slice)).collect();
                 let longest = texts.iter().map(|text| text.len()).max().unwrap_or(0);
@@ -133,19 +136,21 @@ impl<'a> Batches<'a> {
             ConditioningTable::Goals => {
                 let at_goal = |item: &Item| Item { frame: item.end, ..*item };
                 let goals: Vec<Item> = items.iter().map(at_goal).collect();
-                let maps =
-                    self.material.maps.gather(goals.iter().flat_map(|goal| goal.stack(self.history)), self.device)?;
+                let maps = self
+                    .data
+                    .feature_maps
+                    .gather(goals.iter().flat_map(|goal| goal.stack(self.history)), self.device)?;
                 Ok(maps.view([items.len() as i64, -1, SIDE, SIDE]).to_kind(Kind::Float))
             }
         }
     }
 
-    fn transitions(&self, items: &[Item], told: Tensor) -> anyhow::Result<Transitions> {
+    fn transitions(&self, items: &[Item], conditioning: Tensor) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
         let (mut actions, mut objects, mut taken) = (Vec::new(), Vec::new(), Vec::new());
-        let named: Vec<i64> = items.iter().map(|item| i64::from(self.material.items.object_target(item))).collect();
+        let named: Vec<i64> = items.iter().map(|item| i64::from(self.data.items.object_target(item))).collect();
         for item in items {
-            let label = self.material.items.labels.get(item.frame as usize).copied().flatten();
+            let label = self.data.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
             objects.push(i64::from(label.object));
@@ -153,15 +158,15 @@ impl<'a> Batches<'a> {
         }
         let terminal: Vec<f32> = items.iter().map(|item| flag(item.is_last())).collect();
         // Both observations share all frames but two, which are gathered once.
-        let last = u32::from(self.judged);
+        let last = u32::from(self.with_next);
         let stack = |item: &Item| Item { frame: item.frame + last, ..*item }.stack(self.history + last);
-        let maps = self.material.maps.gather(items.iter().flat_map(stack), self.device)?;
+        let maps = self.data.feature_maps.gather(items.iter().flat_map(stack), self.device)?;
         let maps = maps.view([n, i64::from(self.history + last), -1, SIDE, SIDE]);
         let seen = |from: i64| maps.narrow(1, from, i64::from(self.history));
         Ok(Transitions {
             observation: seen(0),
-            next: self.judged.then(|| seen(1)),
-            conditioning: told,
+            next: self.with_next.then(|| seen(1)),
+            conditioning,
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
             object_target: Tensor::from_slice(&named).to_device(self.device),

@@ -1,38 +1,38 @@
-//! Measures a new checkpoint in generated houses and writes its model card.
+//! Validates a new checkpoint in generated houses and writes its model card.
 
 use std::path::Path;
 
-use super::bar::Bars;
+use super::progress::Progress;
 use super::streams::say;
 use crate::agent::LearnedPolicy;
-use crate::agent::config::Config;
+use crate::agent::config::CheckpointConfig;
 use crate::agent::learned::SharedEmbedder;
 use crate::data::atomic_file;
 use crate::nets::device::best_device;
 use crate::train::model_card::card;
-use crate::train::preset::Appraisal;
-use crate::train::validation::appraise;
+use crate::train::preset::ValidationSpec;
+use crate::train::validation;
 
-/// Measures the checkpoint in `folder` and writes its card.
+/// Validates the checkpoint in `folder`; writes and prints its model card.
 ///
 /// # Errors
 /// When it cannot be loaded, or the card not be written.
-pub fn appraised(
+pub fn validate(
     folder: &Path,
-    appraisal: &Appraisal,
+    spec: &ValidationSpec,
     sentences: SharedEmbedder,
-    mut bars: Bars,
+    mut progress: Progress,
 ) -> anyhow::Result<()> {
     let mut policy = LearnedPolicy::load(folder, sentences, best_device())?;
-    let findings = appraise(&mut policy, appraisal, &mut bars)?;
-    bars.end();
-    let text = card(&name(folder), &Config::read(folder)?, &findings);
+    let report = validation::validate(&mut policy, spec, &mut progress)?;
+    progress.end();
+    let text = card(&name(folder), &CheckpointConfig::read(folder)?, &report);
     atomic_file::write(&folder.join("README.md"), text.as_bytes())?;
     say(text.trim_end());
     Ok(())
 }
 
-/// What a folder is called.
+/// A folder's name, as cards and configurations give it.
 pub fn name(folder: &Path) -> String {
     folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -1,0 +1,120 @@
+//! Progress of long commands on standard error: a bar in a terminal, else a line now and then.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::streams::say;
+use crate::train::metrics::{ProgressLogger, Scalars};
+
+/// The stages of a command, one after the other, each with how far it is, the time that is left, and the latest numbers.
+pub struct Progress {
+    terminal: bool,
+    stage: String,
+    bar: ProgressBar,
+    began: Instant,
+    /// Where the stage was when it began: a resumed one does not begin at 0.
+    first: u64,
+    last_line: Instant,
+}
+
+/// The time between two lines without a terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+
+impl Progress {
+    /// Shows nothing until the first [`Progress::show`].
+    pub fn new() -> Progress {
+        let (terminal, now) = (std::io::stderr().is_terminal(), Instant::now());
+        Progress { terminal, stage: String::new(), bar: ProgressBar::hidden(), began: now, first: 0, last_line: now }
+    }
+
+    /// `done` of `total` of a stage; `message` is empty where there is nothing new to say.
+    pub fn show(&mut self, stage: &str, done: u64, total: u64, message: &str) {
+        if self.stage != stage {
+            self.begin(stage, done);
+        }
+        if self.terminal {
+            self.bar.set_length(total);
+            self.bar.set_position(done);
+            if !message.is_empty() {
+                self.bar.set_message(message.to_string());
+            }
+        } else if done >= total || self.last_line.elapsed() >= BETWEEN_LINES {
+            self.line(done, total, message);
+        }
+    }
+
+    /// Takes the bar off the screen.
+    pub fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn begin(&mut self, stage: &str, done: u64) {
+        self.end();
+        (self.stage, self.first) = (stage.to_string(), done);
+        self.began = Instant::now();
+        self.last_line = self.began;
+        if self.terminal {
+            let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {eta} left {msg}");
+            self.bar = ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            self.bar.set_prefix(stage.to_string());
+        }
+    }
+
+    fn line(&mut self, done: u64, total: u64, message: &str) {
+        self.last_line = Instant::now();
+        let rate = self.began.elapsed().as_secs_f64() / done.saturating_sub(self.first).max(1) as f64;
+        let left = rate * total.saturating_sub(done) as f64;
+        say(format!("{} {done}/{total}  {left:.0} s left  {message}", self.stage).trim_end());
+    }
+}
+
+impl ProgressLogger for Progress {
+    /// Every step that has numbers is a line without a terminal.
+    fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
+        let Scalars { stage, step, of, values } = scalars;
+        let numbers: Vec<String> = values.iter().map(|(name, value)| format!("{name} {value:.3}")).collect();
+        let numbers = numbers.join("  ");
+        if self.terminal || numbers.is_empty() {
+            self.show(stage, *step, *of, &numbers);
+            return Ok(());
+        }
+        if self.stage != *stage {
+            self.begin(stage, *step);
+        }
+        self.line(*step, *of, &numbers);
+        Ok(())
+    }
+}
+
+/// One stage that several threads work at.
+pub struct Counter {
+    stage: &'static str,
+    total: u64,
+    progress: Mutex<(Progress, u64)>,
+}
+
+impl Counter {
+    /// Nothing is done yet of `total`.
+    pub fn new(stage: &'static str, total: u64) -> Counter {
+        Counter { stage, total, progress: Mutex::new((Progress::new(), 0)) }
+    }
+
+    /// So many more are done.
+    pub fn add(&self, count: u64) {
+        if let Ok(mut guard) = self.progress.lock() {
+            let (progress, done) = &mut *guard;
+            *done += count;
+            progress.show(self.stage, *done, self.total, "");
+        }
+    }
+
+    /// Takes the bar off the screen.
+    pub fn end(&self) {
+        if let Ok(guard) = self.progress.lock() {
+            guard.0.end();
+        }
+    }
+}
