@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use anyhow::ensure;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::stop;
 use super::streams::say;
+use super::value_names;
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::house::expert::TurnTiming;
@@ -24,8 +25,8 @@ pub struct Collect {
     /// The dataset folder to write
     out: PathBuf,
     /// Where to collect
-    #[arg(long, default_value = "generated")]
-    scenes: SceneSource,
+    #[arg(long, default_value = "generated", value_parser = ["generated"])]
+    scenes: String,
     /// The tasks to demonstrate, each once and in its own words, instead of tasks in generated houses
     #[arg(long, value_name = "TASKS", conflicts_with_all = ["scenes", "episodes", "lengths", "annotations"])]
     tasks: Option<PathBuf>,
@@ -39,8 +40,8 @@ pub struct Collect {
     #[arg(long, value_delimiter = ',', default_values_t = [1, 1, 1, 2])]
     lengths: Vec<usize>,
     /// The expert that demonstrates, or says what a learner should have done
-    #[arg(long, value_enum, default_value = "scanning-expert")]
-    demonstrator: Demonstrator,
+    #[arg(long, default_value = ExpertKind::SCANNING, value_parser = value_names::expert())]
+    demonstrator: ExpertKind,
     /// The expert turns and acts as early as it may instead of as late, so that a learner need not hit the last moment
     #[arg(long)]
     prompt: bool,
@@ -55,27 +56,12 @@ pub struct Collect {
     learner: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum SceneSource {
-    /// Generated houses
-    Generated,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Demonstrator {
-    /// Turns around until the object it goes for is in view
-    ScanningExpert,
-    /// Goes straight for objects, in view or not, as ALFRED's planner did
-    Expert,
-}
-
 impl Collect {
     /// Collects.
     ///
     /// # Errors
     /// When the folder cannot be written to.
     pub fn run(self) -> anyhow::Result<ExitStatus> {
-        let SceneSource::Generated = self.scenes;
         ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not between 0 and 1", self.noise);
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
         ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
@@ -95,12 +81,8 @@ impl Collect {
                 TaskSource::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations }
             }
         };
-        let expert = match self.demonstrator {
-            Demonstrator::ScanningExpert => ExpertKind::Scanning,
-            Demonstrator::Expert => ExpertKind::Privileged,
-        };
         let turn_timing = if self.prompt { TurnTiming::Early } else { TurnTiming::Late };
-        let settings = DemonstrationSettings { expert, turn_timing, noise: self.noise };
+        let settings = DemonstrationSettings { expert: self.demonstrator, turn_timing, noise: self.noise };
         let collection = Collection { out: self.out, tasks, seed: self.seed, settings, learner };
         let stop = stop::on_signals()?;
         let mut progress = Progress::new();

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::domain::Room;
 use crate::eval::tasks::sample::Phrasing;
+use crate::train::collect::ExpertKind;
 
 /// The kind of a room.
 pub fn room() -> impl TypedValueParser<Value = Room> {
@@ -18,6 +19,15 @@ pub fn phrasing() -> impl TypedValueParser<Value = Phrasing> {
     named([
         PossibleValue::new(Phrasing::GRAMMAR).help("The program's own grammar"),
         PossibleValue::new(Phrasing::ANNOTATORS).help("What people wrote of the demonstrations"),
+    ])
+}
+
+/// The expert that demonstrates.
+pub fn expert() -> impl TypedValueParser<Value = ExpertKind> {
+    named([
+        PossibleValue::new(ExpertKind::SCANNING).help("Turns around until the object it goes for is in view"),
+        PossibleValue::new(ExpertKind::PRIVILEGED)
+            .help("Goes straight for objects, in view or not, as ALFRED's planner did"),
     ])
 }
 
@@ -42,6 +52,10 @@ mod tests {
         assert_eq!(
             [Phrasing::GRAMMAR.parse(), Phrasing::ANNOTATORS.parse()],
             [Ok(Phrasing::Grammar), Ok(Phrasing::Annotators)]
+        );
+        assert_eq!(
+            [ExpertKind::SCANNING.parse(), ExpertKind::PRIVILEGED.parse()],
+            [Ok(ExpertKind::Scanning), Ok(ExpertKind::Privileged)]
         );
         assert!("attic".parse::<Room>().is_err() && "poems".parse::<Phrasing>().is_err());
     }

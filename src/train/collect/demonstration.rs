@@ -1,6 +1,7 @@
 //! One task demonstrated: what the demonstrator would do in every state, while chance or a learner disturbs what is done.
 
 use std::ops::ControlFlow;
+use std::str::FromStr;
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -37,10 +38,27 @@ pub enum ExpertKind {
 }
 
 impl ExpertKind {
+    /// The scanning expert's name on the command line.
+    pub const SCANNING: &str = "scanning-expert";
+    /// The privileged expert's name on the command line.
+    pub const PRIVILEGED: &str = "expert";
+
     fn policy(self, turn_timing: TurnTiming) -> Box<dyn Policy> {
         match self {
             ExpertKind::Scanning => Box::new(ScanningExpert::new(turn_timing)),
             ExpertKind::Privileged => Box::new(ExpertPolicy::of(turn_timing)),
+        }
+    }
+}
+
+impl FromStr for ExpertKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ExpertKind, String> {
+        match text {
+            ExpertKind::SCANNING => Ok(ExpertKind::Scanning),
+            ExpertKind::PRIVILEGED => Ok(ExpertKind::Privileged),
+            _ => Err(format!("{text:?} is neither {} nor {}", ExpertKind::SCANNING, ExpertKind::PRIVILEGED)),
         }
     }
 }
