@@ -6,7 +6,7 @@ use crate::program::encoder_home;
 #[test]
 fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() {
     let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     assert!(session.is_taken());
     session.press("i");
@@ -50,7 +50,7 @@ fn time_travel_forks_are_kept_opened_and_verified() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     for step in ["main 1/1", "main 2/2", "main 3/3", "main 4/4"] {
         session.press("n");
@@ -112,7 +112,7 @@ fn time_travel_forks_are_kept_opened_and_verified() {
 #[test]
 fn a_huge_paste_and_a_storm_of_resizes_do_no_harm() {
     let mut session = Session::start(&["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"]);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     session.press("i\x1b[200~");
     session.press(&"carry the mug ".repeat(75_000));
@@ -139,7 +139,7 @@ fn a_huge_paste_and_a_storm_of_resizes_do_no_harm() {
 fn signals_end_it_and_restore_the_terminal() {
     for name in ["-TERM", "-INT", "-HUP"] {
         let mut session = Session::start(&["--policy", "random", "--graphics", "ascii", "--paused"]);
-        session.see("ActionDistribution");
+        session.see("Mind");
         session.press(" ");
         session.see("running");
         session.signal(name);

@@ -61,7 +61,7 @@ pub struct ValueMap {
     /// What was measured.
     pub measure: Measure,
     /// The cells that are done.
-    pub heights: Vec<CellValue>,
+    pub cells: Vec<CellValue>,
     /// How many cells there are.
     pub of: usize,
 }
@@ -69,7 +69,7 @@ pub struct ValueMap {
 impl ValueMap {
     /// The lowest and the highest value, looking one way or the best.
     pub fn range(&self, heading: Option<Heading>) -> Option<(f32, f32)> {
-        let values = self.heights.iter().map(|height| height.facing(heading).1);
+        let values = self.cells.iter().map(|height| height.facing(heading).1);
         values.map(|value| (value, value)).reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
@@ -77,7 +77,7 @@ impl ValueMap {
     pub fn shares(&self, heading: Option<Heading>) -> HashMap<Cell, f32> {
         let Some((low, high)) = self.range(heading) else { return HashMap::new() };
         let share = |value: f32| if high > low { (value - low) / (high - low) } else { 0.5 };
-        self.heights.iter().map(|height| (height.cell, share(height.facing(heading).1))).collect()
+        self.cells.iter().map(|height| (height.cell, share(height.facing(heading).1))).collect()
     }
 }
 
@@ -87,11 +87,11 @@ fn looks<'a>(environment: &'a mut HouseEnvironment, instruction: &'a str) -> Obs
 }
 
 /// Puts the agent on every cell, looking each way, and asks the policy. `visit` sees what is there after every cell; it, or
-/// `stop`, ends the survey early.
+/// `stop`, ends it early.
 ///
 /// # Errors
 /// Whatever the policy reports.
-pub fn survey(
+pub fn compute(
     policy: &mut dyn Policy,
     scene: &Arc<Scene>,
     world: &World,
@@ -101,7 +101,7 @@ pub fn survey(
 ) -> anyhow::Result<ValueMap> {
     let mut environment = HouseEnvironment::new(House::new(scene.clone(), world.clone()), None);
     let (instruction, of) = (instruction.to_string(), scene.cells.len());
-    let mut found = ValueMap { instruction, measure: Measure::Confidence, heights: Vec::with_capacity(of), of };
+    let mut found = ValueMap { instruction, measure: Measure::Confidence, cells: Vec::with_capacity(of), of };
     // From where the agent is outwards: what matters most comes first.
     let mut cells = scene.cells.clone();
     let here = world.agent.cell;
@@ -129,7 +129,7 @@ pub fn survey(
                 None => decision.distribution.map_or(0.0, |it| it.actions.into_iter().flatten().fold(0.0, f32::max)),
             };
         }
-        found.heights.push(CellValue { cell, values });
+        found.cells.push(CellValue { cell, values });
         if !visit(&found) {
             break;
         }
@@ -156,21 +156,21 @@ mod tests {
         let stop = AtomicBool::new(false);
         let mut policy = RandomPolicy::new();
         let mut seen = 0;
-        let all = survey(&mut policy, &scene, &world, "go", &stop, &mut |found| {
+        let all = compute(&mut policy, &scene, &world, "go", &stop, &mut |found| {
             seen += 1;
-            found.heights.len() == seen
+            found.cells.len() == seen
         });
         let all = all.unwrap();
-        assert_eq!((all.heights.len(), all.of, seen), (scene.cells.len(), scene.cells.len(), scene.cells.len()));
-        assert_eq!(all.heights[0].cell, world.agent.cell, "from the agent outwards");
+        assert_eq!((all.cells.len(), all.of, seen), (scene.cells.len(), scene.cells.len(), scene.cells.len()));
+        assert_eq!(all.cells[0].cell, world.agent.cell, "from the agent outwards");
         for heading in [None, Some(Heading::West)] {
             let shares = all.shares(heading);
             assert_eq!(shares.len(), scene.cells.len());
             assert!(shares.values().all(|share| (0.0..=1.0).contains(share)));
         }
-        let few = survey(&mut policy, &scene, &world, "go", &stop, &mut |found| found.heights.len() < 3).unwrap();
-        assert_eq!(few.heights.len(), 3);
+        let few = compute(&mut policy, &scene, &world, "go", &stop, &mut |found| found.cells.len() < 3).unwrap();
+        assert_eq!(few.cells.len(), 3);
         stop.store(true, Ordering::Relaxed);
-        assert!(survey(&mut policy, &scene, &world, "go", &stop, &mut |_| true).unwrap().heights.is_empty());
+        assert!(compute(&mut policy, &scene, &world, "go", &stop, &mut |_| true).unwrap().cells.is_empty());
     }
 }

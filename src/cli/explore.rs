@@ -15,13 +15,13 @@ use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
-use crate::explore::episode_source::{EpisodeSource, Start};
+use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
+use crate::explore::exploration::Exploration;
 use crate::explore::plain;
-use crate::explore::session::Session;
-use crate::tui::config::Config;
+use crate::tui::config::ExplorerConfig;
 use crate::tui::graphics::Protocol;
 use crate::tui::screen;
-use crate::tui::update::Farewell;
+use crate::tui::update::ExitReason;
 
 /// Where the explorer starts, and who acts.
 #[derive(Args)]
@@ -82,16 +82,16 @@ impl Display {
     /// Explores until the person leaves.
     ///
     /// # Errors
-    /// When the engine cannot be opened, or there is no terminal.
+    /// When the exploration cannot be opened, or there is no terminal.
     pub fn show(
         self,
         kind: PolicyKind,
         manual: bool,
-        open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
+        open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
-            plain::run(open()?, kind, input, out)?;
+            plain::run(open()?, input, out)?;
             return Ok(ExitStatus::Ok);
         }
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
@@ -110,10 +110,11 @@ impl Display {
         let history = Some(logging::path().with_file_name("history"));
         let bandwidth = self.bandwidth.filter(|&kilobytes| kilobytes > 0).map(|kilobytes| 1000 * u64::from(kilobytes));
         let runs = !self.paused;
-        let screen = screen::Screen { protocol, policy: kind, manual, runs, config, memory, history, bandwidth, log };
+        let screen =
+            screen::ScreenOptions { protocol, policy: kind, manual, runs, config, memory, history, bandwidth, log };
         match screen::run(screen, open)? {
-            Farewell::Signal(_) => Ok(ExitStatus::Interrupted),
-            Farewell::Asked | Farewell::WorkerGone => Ok(ExitStatus::Ok),
+            ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
+            ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
         }
     }
 
@@ -124,12 +125,12 @@ impl Display {
 }
 
 /// What the person has set in `sprint/explorer.toml` of the configuration folder.
-fn settings() -> anyhow::Result<Config> {
-    let Ok(base) = etcetera::choose_base_strategy() else { return Ok(Config::default()) };
+fn settings() -> anyhow::Result<ExplorerConfig> {
+    let Ok(base) = etcetera::choose_base_strategy() else { return Ok(ExplorerConfig::default()) };
     let path = base.config_dir().join("sprint").join("explorer.toml");
     match std::fs::read_to_string(&path) {
-        Ok(text) => Config::parse(&text).with_context(|| path.display().to_string()),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Config::default()),
+        Ok(text) => ExplorerConfig::parse(&text).with_context(|| path.display().to_string()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(ExplorerConfig::default()),
         Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
     }
 }
@@ -171,30 +172,30 @@ impl Explore {
         // The screen shows what is wrong with an agent; a script is told by the exit code.
         let needed = display.plain && from.checkpoint.is_some() && kind == PolicyKind::Agent;
         display.show(kind, manual, move || {
-            let mut engine = from.engine(kind)?;
+            let mut exploration = from.exploration(kind)?;
             if needed {
-                engine.choose(kind)?;
+                exploration.choose(kind)?;
             }
-            Ok(engine)
+            Ok(exploration)
         })
     }
 }
 
 impl Origin {
-    fn engine(&self, kind: PolicyKind) -> anyhow::Result<Session> {
+    fn exploration(&self, kind: PolicyKind) -> anyhow::Result<Exploration> {
         let (start, scenes) = self.start()?;
-        let openings = EpisodeSource::new(start, self.seed, scenes);
+        let source = EpisodeSource::new(start, self.seed, scenes);
         let policies = Policies::new(policy_source::agents(self.checkpoint.as_deref()));
-        Session::new(openings, policies, kind, self.instruction.as_deref())
+        Exploration::new(source, policies, kind, self.instruction.as_deref())
     }
 
-    fn start(&self) -> anyhow::Result<(Start, Scenes)> {
+    fn start(&self) -> anyhow::Result<(EpisodeOrigin, Scenes)> {
         if let Some(task) = &self.task {
             let (path, wanted) = taskset::split_reference(task);
             let set = taskset::read(&path)?.value;
             let scenes = Scenes::of(&path, &set);
             let index = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
-            return Ok((Start::Tasks { tasks: set.tasks, index }, scenes));
+            return Ok((EpisodeOrigin::Tasks { tasks: set.tasks, index }, scenes));
         }
         let none = Scenes::in_folder(None);
         if let Some(name) = &self.scene {
@@ -213,8 +214,8 @@ impl Origin {
             if trajectories.is_empty() {
                 bail!("{}: no demonstration was recorded in {name}", self.data.display());
             }
-            return Ok((Start::Recorded { scene, trajectories }, none));
+            return Ok((EpisodeOrigin::Recorded { scene, trajectories }, none));
         }
-        Ok((Start::Generated(self.room), none))
+        Ok((EpisodeOrigin::Generated(self.room), none))
     }
 }

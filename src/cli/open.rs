@@ -10,8 +10,8 @@ use super::explore::Display;
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
-use crate::explore::episode_source::{EpisodeSource, Start};
-use crate::explore::session::Session;
+use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
+use crate::explore::exploration::Exploration;
 use crate::run_dir::reader::RecordedRun;
 
 /// Which episode, and how to show it.
@@ -86,24 +86,24 @@ impl Open {
         let kind = kind_of(&acts);
         let checkpoint = self.checkpoint.clone();
         let explored = recorded.manifest.policy == "explored";
-        let open = move || -> anyhow::Result<Session> {
+        let open = move || -> anyhow::Result<Exploration> {
             let scenes = recorded.scenes;
-            let start = Start::Tasks { tasks: vec![task], index: 0 };
+            let start = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };
             let policies = Policies::new(policy_source::agents(checkpoint.as_deref()));
-            let openings = EpisodeSource::new(start, 0, scenes);
-            let mut engine = Session::new(openings, policies, kind, None)?;
+            let source = EpisodeSource::new(start, 0, scenes);
+            let mut exploration = Exploration::new(source, policies, kind, None)?;
             if explored {
-                engine.unlimited();
+                exploration.unlimited();
             }
             // Without its policy an episode can still be seen, step by step.
-            let found = summon(&mut engine, kind, &acts);
+            let found = summon(&mut exploration, kind, &acts);
             let thinks = found.is_ok();
             if thinks {
-                engine.begin_as(acts);
+                exploration.begin_as(acts);
             }
-            engine.retrace(&episode, &author, thinks)?;
-            engine.seek(reference.step.unwrap_or(0));
-            Ok(engine)
+            exploration.retrace(&episode, &author, thinks)?;
+            exploration.seek(reference.step.unwrap_or(0));
+            Ok(exploration)
         };
         self.display.paused().show(kind, false, open)
     }
@@ -119,13 +119,13 @@ fn kind_of(author: &Author) -> PolicyKind {
 }
 
 /// Loads the policy that acted: for an agent the checkpoint of the same hash.
-fn summon(engine: &mut Session, kind: PolicyKind, author: &Author) -> anyhow::Result<()> {
+fn summon(exploration: &mut Exploration, kind: PolicyKind, author: &Author) -> anyhow::Result<()> {
     if kind != PolicyKind::Agent {
-        return engine.choose(kind);
+        return exploration.choose(kind);
     }
-    for number in 1..=engine.checkpoints().len() {
-        engine.checkpoint(&number.to_string())?;
-        if engine.author().checkpoint == author.checkpoint {
+    for number in 1..=exploration.checkpoints().len() {
+        exploration.checkpoint(&number.to_string())?;
+        if exploration.author().checkpoint == author.checkpoint {
             return Ok(());
         }
     }

@@ -6,6 +6,7 @@ use clap::{Args, Command};
 use clap_complete::Shell;
 
 use super::exit_status::ExitStatus;
+use crate::explore::verb;
 
 /// Prints a completion script.
 #[derive(Args)]
@@ -27,7 +28,7 @@ impl Completions {
     }
 }
 
-/// Prints the manual page, each subcommand's after the program's own.
+/// Prints the manual page, each subcommand's after the program's own, and the explorer's verbs.
 ///
 /// # Errors
 /// When standard output cannot be written.
@@ -38,6 +39,7 @@ pub fn man(mut program: Command) -> anyhow::Result<ExitStatus> {
     for command in program.get_subcommands().filter(|command| command.get_name() != "help") {
         clap_mangen::Man::new(command.clone()).render(&mut page)?;
     }
+    page.extend(verb::man_section().into_bytes());
     std::io::stdout().write_all(&page)?;
     Ok(ExitStatus::Ok)
 }

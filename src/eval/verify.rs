@@ -15,7 +15,7 @@ use crate::agent::policy_source::PolicySource;
 use crate::agent::{Decision, Policy, PolicyState};
 use crate::data::json;
 use crate::domain::Task;
-use crate::episode::branches::{FRAMES, Moment, look_back};
+use crate::episode::branches::{FRAMES, SavedState, look_back};
 use crate::episode::record::{Author, Episode, EpisodeKey, TraceStep};
 use crate::episode::rollout::Rollout;
 use crate::episode::scenes::Setting;
@@ -273,7 +273,7 @@ impl Again<'_> {
             None => Some(author.clone()),
             Some(_) => named.cloned(),
         };
-        let mut past: VecDeque<Moment> = VecDeque::new();
+        let mut past: VecDeque<SavedState> = VecDeque::new();
         for (number, recorded) in (1..).zip(&episode.trace) {
             if number <= episode.prefix_steps {
                 // The expert led here, unseen by the run's policy.
@@ -300,7 +300,7 @@ impl Again<'_> {
                     self.verdict.missing.push(acts.policy.clone());
                 }
                 if let Some(policy) = policy.as_deref_mut() {
-                    let before: Vec<Moment> = past.iter().cloned().collect();
+                    let before: Vec<SavedState> = past.iter().cloned().collect();
                     look_back(policy, &acts, &mut rollout, &before, number - 1);
                 }
                 summoned = Some(acts);
@@ -317,7 +317,7 @@ impl Again<'_> {
                     self.verdict.choices += 1;
                 }
             }
-            past.push_front(Moment::of(&rollout, &author, PolicyState::Nothing));
+            past.push_front(SavedState::of(&rollout, &author, PolicyState::Nothing));
             past.truncate(FRAMES - 1);
             if let Some(found) = self.act(&mut rollout, number, recorded)? {
                 return Ok(Some(found));
@@ -343,7 +343,7 @@ mod tests {
     use crate::agent::learned::tests::undecided;
     use crate::agent::policy_source::MakePolicy;
     use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
-    use crate::episode::branches::{Taken, Tree};
+    use crate::episode::branches::{TakenStep, Tree};
     use crate::episode::scenes::Scenes;
     use crate::eval::evaluation::tests::{options, tasks};
     use crate::eval::evaluation::{Evaluation, evaluate};
@@ -367,7 +367,7 @@ mod tests {
         let mut policy = RandomPolicy::new();
         policy.reset(0, 9);
         let random = Author { policy: "random".into(), checkpoint: None, seed: 9, sampling: false };
-        let mut tree = Tree::new(Moment::of(&rollout, &random, policy.state(0)));
+        let mut tree = Tree::new(SavedState::of(&rollout, &random, policy.state(0)));
         for step in 0..8 {
             if step == 5 {
                 rollout.instruction = "Dance.".into();
@@ -379,14 +379,14 @@ mod tests {
                 decision.action = Action::navigate(ActionType::LookUp);
             }
             let tick = rollout.carry_out(decision.clone()).unwrap();
-            let taken = Taken {
+            let taken = TakenStep {
                 decision,
                 step: TraceStep::of(&tick, &rollout),
                 instruction: rollout.instruction.as_str().into(),
                 author: if by_hand { Author::hand() } else { random.clone() },
                 values: None,
             };
-            let moment = Moment::of(&rollout, &random, policy.state(0));
+            let moment = SavedState::of(&rollout, &random, policy.state(0));
             tree.grow(taken, || moment, String::new);
         }
         SessionExport { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }

@@ -27,13 +27,13 @@ pub enum Condition {
 /// What conditions ask of a state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// The step.
+    /// How many steps led to it.
     pub step: u32,
     /// Subtasks that are done.
     pub completed: u32,
     /// The last action was impossible.
     pub failed: bool,
-    /// V.
+    /// V, where there are critics.
     pub value: Option<f32>,
     /// By how much the best choice leads the second.
     pub gap: Option<f32>,
@@ -106,10 +106,10 @@ impl fmt::Display for Condition {
 }
 
 /// By how much the best choice leads the second: in Q where there are critics, else in probability.
-pub fn gap(mind: Option<&ActionDistribution>, values: Option<&Values>) -> Option<f32> {
-    let mut found: Vec<f32> = match (values, mind) {
+pub fn gap(distribution: Option<&ActionDistribution>, values: Option<&Values>) -> Option<f32> {
+    let mut found: Vec<f32> = match (values, distribution) {
         (Some(values), _) => values.choices.iter().map(|choice| choice.q).collect(),
-        (None, Some(mind)) => mind.actions.iter().flatten().copied().collect(),
+        (None, Some(distribution)) => distribution.actions.iter().flatten().copied().collect(),
         (None, None) => return None,
     };
     found.sort_by(|a, b| b.total_cmp(a));

@@ -1,15 +1,15 @@
 //! Everything that could be done now, as rows of a table: how likely, how good.
 
-use super::session::Snapshot;
+use super::exploration::Snapshot;
 use crate::agent::{ActionDistribution, Decision, Values};
 use crate::domain::{Action, ActionType, Class};
 
 /// A thing that could be done now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// What.
+    /// The action.
     pub kind: ActionType,
-    /// To the nearest of which class.
+    /// The class whose nearest instance it is done to.
     pub class: Option<Class>,
     /// How likely the policy is to do it.
     pub probability: Option<f32>,
@@ -57,9 +57,9 @@ impl Sort {
 /// Every legal action, interactions once for each class that is a candidate.
 pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
     let class_of = |action: Action| action.target.and_then(|target| now.world.class_of(&now.scene, target));
-    let mind = decision.distribution.as_ref();
-    let joint = match mind {
-        Some(mind) => mind.joint(&now.candidates),
+    let distribution = decision.distribution.as_ref();
+    let joint = match distribution {
+        Some(distribution) => distribution.joint(&now.candidates),
         None => legal(now),
     };
     let row = |(kind, class, p): (ActionType, Option<Class>, f32)| {
@@ -67,11 +67,11 @@ pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sor
         Choice {
             kind,
             class,
-            probability: mind.map(|_| p),
+            probability: distribution.map(|_| p),
             q: values.and_then(|values| values.q(kind, class)),
             advantage: values.and_then(|values| values.advantage(kind, class)),
             chosen: is(decision.action),
-            greedy: mind.is_some_and(|mind| is(mind.greedy)),
+            greedy: distribution.is_some_and(|distribution| is(distribution.greedy)),
         }
     };
     let mut rows: Vec<Choice> = joint.into_iter().map(row).collect();
@@ -100,13 +100,13 @@ fn legal(now: &Snapshot) -> Vec<(ActionType, Option<Class>, f32)> {
 mod tests {
     use super::*;
     use crate::agent::value_estimates::ChoiceValue;
+    use crate::explore::session::SessionEvent;
     use crate::explore::testing;
-    use crate::explore::worker::Report;
 
     #[test]
     fn every_legal_choice_is_a_row_and_the_table_sorts() {
-        let now = testing::snapshot(&mut testing::engine());
-        let Report::Thought(decision, ..) = testing::thought(&now) else { panic!() };
+        let now = testing::snapshot(&mut testing::exploration());
+        let SessionEvent::Decided(decision, ..) = testing::decided(&now) else { panic!() };
         let rows = choices(&now, &decision, None, Sort::Probability);
         assert_eq!(rows.len(), 5 + 3, "five to navigate, two pickups, one open");
         assert_eq!((rows[0].kind, rows[0].class.unwrap().name(), rows[0].chosen), (ActionType::Pickup, "Mug", true));

@@ -9,12 +9,14 @@ use rand_chacha::rand_core::SeedableRng;
 use crate::domain::scene::Room;
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, Trajectory, World};
+use crate::episode::rollout::Rollout;
 use crate::episode::scenes::Scenes;
-use crate::house::generate;
+use crate::house::grading::{Grader, Grading};
+use crate::house::{House, generate};
 
 /// An episode's start.
 #[derive(Clone, Debug)]
-pub struct Opening {
+pub struct EpisodeStart {
     /// The floor plan.
     pub scene: Arc<Scene>,
     /// The state at the start.
@@ -27,20 +29,36 @@ pub struct Opening {
     pub limited: bool,
 }
 
-/// Where to begin.
-pub enum Start {
+impl EpisodeStart {
+    /// The episode at its first step, told the task's words.
+    pub fn rollout(&self) -> Rollout {
+        let house = House::new(self.scene.clone(), self.world.clone());
+        match &self.task {
+            // What a person made up is not graded.
+            Some(task) if task.subtasks.is_empty() => Rollout::in_house(house, task.instruction.clone(), None, None),
+            Some(task) => {
+                let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
+                Rollout::in_house(house, task.instruction.clone(), Some(grader), self.limited.then_some(task.horizon))
+            }
+            None => Rollout::in_house(house, "look around".into(), None, None),
+        }
+    }
+}
+
+/// Where episodes come from.
+pub enum EpisodeOrigin {
     /// In the generated house of this room and the seed.
     Generated(Room),
     /// Where demonstrations of one scene began; the seed picks among them.
     Recorded {
-        /// The scene.
+        /// Their floor plan.
         scene: Arc<Scene>,
-        /// The demonstrations.
+        /// At least one; their starts and tasks are used, not their actions.
         trajectories: Vec<Trajectory>,
     },
     /// At one task of a set.
     Tasks {
-        /// The tasks.
+        /// The whole set; after the last comes the first.
         tasks: Vec<Task>,
         /// Which one, from 0.
         index: usize,
@@ -49,7 +67,7 @@ pub enum Start {
 
 /// The sequence of episodes.
 pub struct EpisodeSource {
-    start: Start,
+    origin: EpisodeOrigin,
     seed: u64,
     scenes: Scenes,
 }
@@ -58,9 +76,9 @@ pub struct EpisodeSource {
 const LENGTH: usize = 2;
 
 impl EpisodeSource {
-    /// Episodes from `start` on; `scenes` holds those that tasks name.
-    pub fn new(start: Start, seed: u64, scenes: Scenes) -> EpisodeSource {
-        EpisodeSource { start, seed, scenes }
+    /// Episodes of that origin; `scenes` holds those that tasks name.
+    pub fn new(origin: EpisodeOrigin, seed: u64, scenes: Scenes) -> EpisodeSource {
+        EpisodeSource { origin, seed, scenes }
     }
 
     /// The seed of the present episode.
@@ -70,17 +88,17 @@ impl EpisodeSource {
 
     /// To the next episode: the next seed, or the next task.
     pub fn advance(&mut self) {
-        match &mut self.start {
-            Start::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
-            Start::Generated(_) | Start::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
+        match &mut self.origin {
+            EpisodeOrigin::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
+            EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
         }
     }
 
     /// To the episode of that seed; for a task set, to the task of that number.
     pub fn seek(&mut self, seed: u64) {
-        match &mut self.start {
-            Start::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
-            Start::Generated(_) | Start::Recorded { .. } => self.seed = seed,
+        match &mut self.origin {
+            EpisodeOrigin::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
+            EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = seed,
         }
     }
 
@@ -88,9 +106,9 @@ impl EpisodeSource {
     ///
     /// # Errors
     /// When a scene or task cannot be opened.
-    pub fn open(&self) -> anyhow::Result<Opening> {
-        match &self.start {
-            Start::Generated(room) => {
+    pub fn open(&self) -> anyhow::Result<EpisodeStart> {
+        match &self.origin {
+            EpisodeOrigin::Generated(room) => {
                 let (scene, world) = generate::house(*room, self.seed);
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
                 let reference = SceneRef::Generated { room: *room, seed: self.seed };
@@ -98,20 +116,20 @@ impl EpisodeSource {
                     .rev()
                     .find_map(|length| generate::task(&scene, &world, reference.clone(), length, &mut rng));
                 let world = task.as_ref().and_then(|task| task.start.clone()).unwrap_or(world);
-                Ok(Opening { scene: Arc::new(scene), world, reference, task, limited: false })
+                Ok(EpisodeStart { scene: Arc::new(scene), world, reference, task, limited: false })
             }
-            Start::Recorded { scene, trajectories } => {
+            EpisodeOrigin::Recorded { scene, trajectories } => {
                 let at = self.seed as usize % trajectories.len().max(1);
                 let trajectory = trajectories.get(at).context("no demonstration was recorded in this scene")?;
                 let world = trajectory.start.clone();
                 let (reference, task) = (trajectory.scene.clone(), Some(task_of(trajectory)));
-                Ok(Opening { scene: scene.clone(), world, reference, task, limited: false })
+                Ok(EpisodeStart { scene: scene.clone(), world, reference, task, limited: false })
             }
-            Start::Tasks { tasks, index } => {
+            EpisodeOrigin::Tasks { tasks, index } => {
                 let task = tasks.get(*index).context("the task set is empty")?;
                 let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
                 let (scene, world, reference) = (setting.scene, setting.world, task.scene.clone());
-                Ok(Opening { scene, world, reference, task: Some(task.clone()), limited: true })
+                Ok(EpisodeStart { scene, world, reference, task: Some(task.clone()), limited: true })
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Why a thing can be acted on now, or cannot: what the inspector says of everything in a house.
 
-use super::session::Snapshot;
+use super::exploration::Snapshot;
 use crate::domain::world::Parent;
 use crate::domain::{Action, ActionType, Class, Instance, Scene, World};
 use crate::house::{rules, view};
@@ -8,9 +8,9 @@ use crate::house::{rules, view};
 /// A thing, as the inspector shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thing {
-    /// Which.
+    /// Which fixture or object of the house.
     pub instance: Instance,
-    /// Its class.
+    /// The class that the agent knows it by.
     pub class: Class,
     /// Its state in words: open, on, clean, ...
     pub state: String,
@@ -175,13 +175,13 @@ mod tests {
 
     #[test]
     fn another_state_is_told_by_what_changed() {
-        let mut engine = testing::engine();
-        engine.choose(crate::agent::registry::PolicyKind::Expert).unwrap();
-        let start = engine.snapshot();
-        while engine.progress().unwrap().completed_at.is_empty() {
-            engine.step().unwrap();
+        let mut exploration = testing::exploration();
+        exploration.choose(crate::agent::registry::PolicyKind::Expert).unwrap();
+        let start = exploration.snapshot();
+        while exploration.progress().unwrap().completed_at.is_empty() {
+            exploration.step().unwrap();
         }
-        let now = engine.snapshot();
+        let now = exploration.snapshot();
         assert!(stands(&now.scene, &start.world).ends_with("the hand is empty"));
         assert!(stands(&now.scene, &now.world).ends_with("holds the mug"));
         assert!(changes(&now.scene, &start.world, &now.world).contains(&"mug in the hand".to_string()));
@@ -190,8 +190,8 @@ mod tests {
 
     #[test]
     fn every_thing_says_what_can_be_done_or_why_not() {
-        let mut engine = testing::engine();
-        let now = engine.snapshot();
+        let mut exploration = testing::exploration();
+        let now = exploration.snapshot();
         let things = things(&now);
         assert_eq!(things.len(), now.scene.fixtures.len() + now.world.objects.len());
         let could: usize = things.iter().map(|thing| thing.possible.len()).sum();

@@ -1,9 +1,11 @@
-//! An explorer session without a screen, and the plain mode that speaks lines instead of drawing.
+//! The explorer without a screen: a [`session::Session`] takes commands and tells events; the plain mode writes them as lines,
+//! and `tui` draws them.
 
 pub mod breakpoints;
-pub mod chained;
+pub mod chain_report;
 pub mod choices;
 pub mod episode_source;
+pub mod exploration;
 pub mod inspect;
 pub mod plain;
 pub mod session;
@@ -11,6 +13,5 @@ pub mod session_export;
 pub mod side_by_side;
 pub mod timeline;
 pub mod verb;
-pub mod worker;
 #[cfg(test)]
 pub mod testing;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::episode_source::{EpisodeSource, Start};
-use super::session::{Session, Snapshot};
-use super::worker::Report;
+use super::episode_source::{EpisodeOrigin, EpisodeSource};
+use super::exploration::{Exploration, Snapshot};
+use super::session::SessionEvent;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::agent::value_estimates::ChoiceValue;
 use crate::agent::{ActionDistribution, Decision, Values};
@@ -14,8 +14,8 @@ use crate::episode::scenes::Scenes;
 use crate::house::testing::{kitchen, named};
 use crate::house::view::{Candidate, Frame, Sighting, View, code};
 
-/// An engine in the kitchen with the task to put a mug into the sink.
-pub fn engine() -> Session {
+/// An exploration in the kitchen with the task to put a mug into the sink.
+pub fn exploration() -> Exploration {
     let (scene, world) = kitchen();
     let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
     let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };
@@ -36,15 +36,15 @@ pub fn engine() -> Session {
         boxes: vec![],
         choices: vec![],
     };
-    let start = Start::Recorded { scene, trajectories: vec![trajectory] };
-    let openings = EpisodeSource::new(start, 5, Scenes::in_folder(None));
+    let start = EpisodeOrigin::Recorded { scene, trajectories: vec![trajectory] };
+    let source = EpisodeSource::new(start, 5, Scenes::in_folder(None));
     let policies = Policies::new(Vec::new());
-    Session::new(openings, policies, PolicyKind::Random, None).unwrap()
+    Exploration::new(source, policies, PolicyKind::Random, None).unwrap()
 }
 
-/// The engine's state with a made-up frame: a mug on a table before a wall.
-pub fn snapshot(engine: &mut Session) -> Snapshot {
-    let mut now = engine.snapshot();
+/// The exploration's state with a made-up frame: a mug on a table before a wall.
+pub fn snapshot(exploration: &mut Exploration) -> Snapshot {
+    let mut now = exploration.snapshot();
     let (scene, world) = (&now.scene, &now.world);
     let seen = ["DiningTable", "Mug", "Plate", "Fridge"].map(|name| named(scene, world, name));
     let boxes: [[u16; 4]; 4] = [[40, 160, 299, 260], [80, 130, 110, 165], [180, 150, 240, 170], [230, 20, 299, 150]];
@@ -89,7 +89,7 @@ pub fn snapshot(engine: &mut Session) -> Snapshot {
 }
 
 /// What a policy might think of that.
-pub fn thought(now: &Snapshot) -> Report {
+pub fn decided(now: &Snapshot) -> SessionEvent {
     let mut actions = [None; ActionType::COUNT];
     let shares = [(0, 0.08), (1, 0.02), (2, 0.12), (3, 0.01), (4, 0.06), (5, 0.66), (7, 0.05)];
     for (at, p) in shares {
@@ -106,7 +106,7 @@ pub fn thought(now: &Snapshot) -> Report {
     let weighs = |kind: ActionType| objects.iter().map(move |&(class, p, _)| (kind, class, p));
     let choices = [ActionType::Pickup, ActionType::Open].into_iter().flat_map(weighs).collect();
     let action = now.candidates[0].action();
-    Report::Thought(
+    SessionEvent::Decided(
         Decision {
             action,
             distribution: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),

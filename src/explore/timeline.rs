@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::domain::ActionType;
-use crate::episode::branches::{Taken, Tree};
+use crate::episode::branches::{TakenStep, Tree};
 use crate::house::view::Frame;
 
 /// What was tried, for the screen.
@@ -12,18 +12,18 @@ pub struct Timeline {
     /// The step in hand.
     pub at: u32,
     /// The steps of the branch in hand.
-    pub beats: Vec<Beat>,
+    pub steps: Vec<TimelineStep>,
     /// Other branches leave it at the start.
     pub forks_at_start: bool,
-    /// Every branch.
-    pub branches: Vec<Bough>,
+    /// All branches, in the order in which they began.
+    pub branches: Vec<BranchSummary>,
     /// The number of the one in hand.
     pub branch: usize,
 }
 
 /// A step on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beat {
+pub struct TimelineStep {
     /// What was done.
     pub kind: ActionType,
     /// It could be done.
@@ -33,7 +33,7 @@ pub struct Beat {
     /// A person chose it.
     pub by_hand: bool,
     /// The agent was told something else before it.
-    pub told: bool,
+    pub instructed: bool,
     /// Other branches leave after it.
     pub forks: bool,
     /// The entropy of the choice, in nats.
@@ -48,8 +48,8 @@ pub struct Beat {
 
 /// A branch in the list of branches.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Bough {
-    /// Its name.
+pub struct BranchSummary {
+    /// As a person or the session named it.
     pub name: String,
     /// Why it began.
     pub why: String,
@@ -61,19 +61,19 @@ pub struct Bough {
     pub completed: u32,
 }
 
-impl Beat {
-    fn of(taken: &Taken, before: Option<&Taken>, forks: bool) -> Beat {
-        let mind = taken.decision.distribution.as_ref();
+impl TimelineStep {
+    fn of(taken: &TakenStep, before: Option<&TakenStep>, forks: bool) -> TimelineStep {
+        let distribution = taken.decision.distribution.as_ref();
         let kind = taken.decision.action.kind;
-        Beat {
+        TimelineStep {
             kind,
             done: taken.step.outcome.is_done(),
             completed: taken.step.subtask.map(|subtask| subtask + 1),
             by_hand: taken.author.is_hand(),
-            told: before.is_some_and(|before| before.instruction != taken.instruction),
+            instructed: before.is_some_and(|before| before.instruction != taken.instruction),
             forks,
-            entropy: mind.map(|mind| mind.entropy),
-            chosen: mind.and_then(|mind| mind.actions[kind.index()]),
+            entropy: distribution.map(|distribution| distribution.entropy),
+            chosen: distribution.and_then(|distribution| distribution.actions[kind.index()]),
             value: taken.values.as_ref().map(|values| values.state),
             q: taken.values.as_ref().and_then(|values| values.q(kind, taken.step.class)),
         }
@@ -81,19 +81,20 @@ impl Beat {
 
     /// Something to jump to.
     pub fn is_event(&self) -> bool {
-        self.completed.is_some() || !self.done || self.told || self.forks
+        self.completed.is_some() || !self.done || self.instructed || self.forks
     }
 }
 
 impl Timeline {
     /// The branch in hand of a tree.
     pub fn of(tree: &Tree) -> Timeline {
-        let steps: Vec<&Taken> = tree.steps().collect();
+        let steps: Vec<&TakenStep> = tree.steps().collect();
         let mut forks = tree.forks();
         let forks_at_start = forks.next().unwrap_or(false);
         let before = std::iter::once(None).chain(steps.iter().copied().map(Some));
-        let beats = steps.iter().zip(before).zip(forks).map(|((taken, before), forks)| Beat::of(taken, before, forks));
-        let boughs = tree.branches().iter().enumerate().map(|(at, branch)| Bough {
+        let steps =
+            steps.iter().zip(before).zip(forks).map(|((taken, before), forks)| TimelineStep::of(taken, before, forks));
+        let branches = tree.branches().iter().enumerate().map(|(at, branch)| BranchSummary {
             name: branch.name.clone(),
             why: branch.why.clone(),
             left: branch.left,
@@ -102,17 +103,17 @@ impl Timeline {
         });
         Timeline {
             at: tree.at(),
-            beats: beats.collect(),
+            steps: steps.collect(),
             forks_at_start,
-            branches: boughs.collect(),
+            branches: branches.collect(),
             branch: tree.branch(),
         }
     }
 
     /// The next event after the step in hand (or, backwards, the last before it); the end of the branch without any.
     pub fn event(&self, forward: bool) -> u32 {
-        let last = self.beats.len() as u32;
-        let mut events = (1..=last).zip(&self.beats).filter(|(_, beat)| beat.is_event()).map(|(step, _)| step);
+        let last = self.steps.len() as u32;
+        let mut events = (1..=last).zip(&self.steps).filter(|(_, step)| step.is_event()).map(|(step, _)| step);
         match forward {
             true => events.find(|&step| step > self.at).unwrap_or(last),
             false => events.take_while(|&step| step < self.at).last().unwrap_or(0),
@@ -121,27 +122,48 @@ impl Timeline {
 
     /// The step that completed a subtask, from 1.
     pub fn subtask(&self, number: u32) -> Option<u32> {
-        (1..).zip(&self.beats).find(|(_, beat)| beat.completed == Some(number)).map(|(step, _)| step)
+        (1..).zip(&self.steps).find(|(_, step)| step.completed == Some(number)).map(|(step, _)| step)
+    }
+}
+
+/// Which step of which branch is in hand.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BranchPosition {
+    /// The step in hand.
+    pub step: u32,
+    /// The last step of the branch.
+    pub of: u32,
+    /// The branch's name.
+    pub branch: String,
+    /// What led here, in words; nothing at the start.
+    pub last_step: Option<String>,
+}
+
+impl BranchPosition {
+    /// The place in hand of a tree.
+    pub fn of(tree: &Tree) -> BranchPosition {
+        let branch = tree.branches().get(tree.branch()).map_or_else(String::new, |branch| branch.name.clone());
+        BranchPosition { step: tree.at(), of: tree.last(), branch, last_step: tree.last_taken().map(words) }
     }
 }
 
 /// How two branches part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Divergence {
-    /// Their names.
+    /// The names of the branch in hand and the other one.
     pub names: [String; 2],
     /// How many steps they share.
     pub shared: u32,
     /// The steps after that, side by side.
-    pub rows: Vec<Parted>,
+    pub rows: Vec<DivergenceRow>,
     /// What the agent saw on both, side by side in one picture, at the steps that are named.
-    pub sights: Option<(Arc<Frame>, [u32; 2])>,
+    pub frames: Option<(Arc<Frame>, [u32; 2])>,
 }
 
 /// A step of two branches that have parted.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parted {
-    /// Which step.
+pub struct DivergenceRow {
+    /// Counted from 1.
     pub step: u32,
     /// What each did, in words; nothing where it is over.
     pub sides: [Option<String>; 2],
@@ -160,14 +182,14 @@ impl Divergence {
             let of = |side: usize| stories[side].get(step as usize);
             let side = |side: usize| of(side).and_then(|(_, taken)| taken.map(words));
             let same = matches!((of(0), of(1)), (Some((a, _)), Some((b, _))) if a.world == b.world);
-            Parted { step, sides: [side(0), side(1)], same }
+            DivergenceRow { step, sides: [side(0), side(1)], same }
         });
-        Divergence { names: [name(one), name(other)], shared, rows: rows.collect(), sights: None }
+        Divergence { names: [name(one), name(other)], shared, rows: rows.collect(), frames: None }
     }
 }
 
 /// A step in words.
-pub fn words(taken: &Taken) -> String {
+pub fn words(taken: &TakenStep) -> String {
     let class = taken.step.class.map_or(String::new(), |class| format!(" {}", class.name()));
     let hand = if taken.author.is_hand() { " (you)" } else { "" };
     let done = taken.step.subtask.map_or(String::new(), |subtask| format!(" · subtask {} done", subtask + 1));
@@ -183,34 +205,34 @@ mod tests {
 
     #[test]
     fn events_are_what_one_jumps_to() {
-        let mut engine = testing::engine();
-        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        let mut exploration = testing::exploration();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         for _ in 0..4 {
-            engine.act(Action::navigate(ActionType::LookDown)).unwrap();
+            exploration.act(Action::navigate(ActionType::LookDown)).unwrap();
         }
-        engine.instruct("dance").unwrap();
-        engine.act(Action::navigate(ActionType::RotateLeft)).unwrap();
-        let time = Timeline::of(engine.tree());
+        exploration.instruct("dance").unwrap();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        let time = Timeline::of(exploration.tree());
         let events: Vec<u32> =
-            (1..).zip(&time.beats).filter(|(_, beat)| beat.is_event()).map(|(step, _)| step).collect();
+            (1..).zip(&time.steps).filter(|(_, step)| step.is_event()).map(|(step, _)| step).collect();
         assert_eq!(events.last(), Some(&6), "the new instruction");
         assert!(events.len() >= 2, "and a look beyond the limit: {events:?}");
         assert_eq!(time.event(false), events[events.len() - 2]);
         assert_eq!(time.event(true), 6);
-        engine.seek(0);
-        assert_eq!(Timeline::of(engine.tree()).event(true), events[0]);
+        exploration.seek(0);
+        assert_eq!(Timeline::of(exploration.tree()).event(true), events[0]);
     }
 
     #[test]
     fn parted_branches_are_told_side_by_side() {
-        let mut engine = testing::engine();
+        let mut exploration = testing::exploration();
         let turn = |kind| Action::navigate(kind);
-        engine.act(turn(ActionType::RotateLeft)).unwrap();
-        engine.act(turn(ActionType::RotateLeft)).unwrap();
-        engine.seek(1);
-        engine.act(turn(ActionType::RotateRight)).unwrap();
-        engine.act(turn(ActionType::LookUp)).unwrap();
-        let parted = engine.divergence(0);
+        exploration.act(turn(ActionType::RotateLeft)).unwrap();
+        exploration.act(turn(ActionType::RotateLeft)).unwrap();
+        exploration.seek(1);
+        exploration.act(turn(ActionType::RotateRight)).unwrap();
+        exploration.act(turn(ActionType::LookUp)).unwrap();
+        let parted = exploration.divergence(0);
         assert_eq!((parted.names.clone(), parted.shared), (["b1".into(), "main".into()], 1));
         assert_eq!(parted.rows.len(), 2);
         assert_eq!(parted.rows[0].sides, [Some("RotateRight (you)".into()), Some("RotateLeft (you)".into())]);

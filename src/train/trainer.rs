@@ -234,7 +234,8 @@ mod tests {
     fn features(preset: &Preset) -> Features {
         let folder = tempfile::tempdir().unwrap();
         let numbers = preset.visual_encoder.map() as u64;
-        let header = FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
+        let header =
+            FeatureHeader { format_version: 1, encoder: "e".into(), dataset: "d".into(), maps: FRAMES, numbers };
         tch::manual_seed(4);
         let maps = Tensor::rand([FRAMES as i64, numbers as i64], (Kind::Half, Device::Cpu));
         let mut bytes = vec![0; maps.numel() * 2];

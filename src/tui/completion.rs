@@ -6,7 +6,7 @@ use crate::domain::Class;
 impl App {
     /// Instructions that the typed text begins, the last used first: what was told before, then things in view.
     pub fn completions(&self) -> Vec<String> {
-        let typed = self.editor.text();
+        let typed = self.input.editor.text();
         let mut found: Vec<String> = Vec::new();
         let bare = |text: &str| text.trim_end_matches('.').to_lowercase();
         let mut add = |text: String| {
@@ -15,8 +15,8 @@ impl App {
             }
         };
         let begins = |text: &str| text.to_lowercase().starts_with(&typed.to_lowercase());
-        self.editor.history().iter().rev().filter(|text| begins(text)).for_each(|text| add(text.clone()));
-        self.examples.iter().filter(|text| begins(text)).for_each(|text| add(text.clone()));
+        self.input.editor.history().iter().rev().filter(|text| begins(text)).for_each(|text| add(text.clone()));
+        self.session.examples.iter().filter(|text| begins(text)).for_each(|text| add(text.clone()));
         let (head, word) = typed.rsplit_once(' ').map_or(("", typed), |(head, word)| (head, word));
         if !word.is_empty() {
             for name in self.things_in_view().iter().filter(|name| name.starts_with(&word.to_lowercase())) {
@@ -28,7 +28,7 @@ impl App {
 
     /// The names of the things that the frame shows, each once.
     pub fn things_in_view(&self) -> Vec<&'static str> {
-        let Some(now) = &self.now else { return Vec::new() };
+        let Some(now) = &self.session.now else { return Vec::new() };
         let classes = now.view.sightings.iter().filter_map(|seen| now.world.class_of(&now.scene, seen.instance));
         let mut names: Vec<&str> = classes.map(Class::spoken).collect();
         names.sort_unstable();

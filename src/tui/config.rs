@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use serde::Deserialize;
 
+use super::key_name::parse_key;
 use super::theme::Scheme;
 use crate::explore::verb;
 use crate::explore::verb::Verb;
@@ -24,8 +25,8 @@ struct File {
 
 /// What a person has set.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Config {
-    /// The colours.
+pub struct ExplorerConfig {
+    /// The colour scheme of the text.
     pub scheme: Scheme,
     /// The mouse is heard from the start.
     pub mouse: bool,
@@ -42,7 +43,7 @@ pub struct Remapped {
     pub verb: Verb,
 }
 
-impl Config {
+impl ExplorerConfig {
     /// The format version that is read.
     pub const FORMAT: u32 = 1;
 
@@ -50,17 +51,17 @@ impl Config {
     ///
     /// # Errors
     /// Names the field, and the key or verb that is not one.
-    pub fn parse(text: &str) -> anyhow::Result<Config> {
+    pub fn parse(text: &str) -> anyhow::Result<ExplorerConfig> {
         let file: File = toml::from_str(text)?;
-        let (found, known) = (file.format_version, Config::FORMAT);
+        let (found, known) = (file.format_version, ExplorerConfig::FORMAT);
         anyhow::ensure!(found == known, "format_version is {found}, this program reads {known}");
         let mut keys = Vec::new();
         for (name, line) in &file.keys {
-            let (code, modifiers) = key(name).ok_or_else(|| anyhow::anyhow!("keys: {name:?} is no key"))?;
+            let (code, modifiers) = parse_key(name).ok_or_else(|| anyhow::anyhow!("keys: {name:?} is no key"))?;
             let verb = verb::parse(line).map_err(|complaint| anyhow::anyhow!("keys.{name}: {complaint}"))?;
             keys.push(Remapped { code, modifiers, verb });
         }
-        Ok(Config { scheme: file.theme, mouse: file.mouse, keys })
+        Ok(ExplorerConfig { scheme: file.theme, mouse: file.mouse, keys })
     }
 
     /// What a key means by these settings.
@@ -72,47 +73,23 @@ impl Config {
     }
 }
 
-/// Reads `x`, `ctrl-x`, `alt-x`, `f5`, `space`, `enter`, `tab`, `left`, ...
-fn key(name: &str) -> Option<(KeyCode, KeyModifiers)> {
-    let (modifiers, name) = match name.split_once('-') {
-        Some(("ctrl", rest)) if !rest.is_empty() => (KeyModifiers::CONTROL, rest),
-        Some(("alt", rest)) if !rest.is_empty() => (KeyModifiers::ALT, rest),
-        _ => (KeyModifiers::NONE, name),
-    };
-    let mut letters = name.chars();
-    let code = match (letters.next(), letters.next(), name) {
-        (Some(letter), None, _) => KeyCode::Char(letter),
-        (_, _, "space") => KeyCode::Char(' '),
-        (_, _, "enter") => KeyCode::Enter,
-        (_, _, "tab") => KeyCode::Tab,
-        (_, _, "backspace") => KeyCode::Backspace,
-        (_, _, "left") => KeyCode::Left,
-        (_, _, "right") => KeyCode::Right,
-        (_, _, "up") => KeyCode::Up,
-        (_, _, "down") => KeyCode::Down,
-        (_, _, "home") => KeyCode::Home,
-        (_, _, "end") => KeyCode::End,
-        (_, _, "pageup") => KeyCode::PageUp,
-        (_, _, "pagedown") => KeyCode::PageDown,
-        (Some('f'), ..) => KeyCode::F(name[1..].parse().ok().filter(|number| (1..=12).contains(number))?),
-        _ => return None,
-    };
-    Some((code, modifiers))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::agent::registry::PolicyKind;
+    use crate::explore::session::SessionCommand;
 
     #[test]
     fn keys_and_colours_are_read() {
         let text = "format_version = 1\ntheme = \"high-contrast\"\nmouse = true\n[keys]\nctrl-r = \"policy random\"\nf5 = \"run\"\n";
-        let config = Config::parse(text).unwrap();
+        let config = ExplorerConfig::parse(text).unwrap();
         assert_eq!((config.scheme, config.mouse), (Scheme::HighContrast, true));
-        assert!(!Config::default().mouse);
+        assert!(!ExplorerConfig::default().mouse);
         let press = |code, modifiers| config.verb(KeyEvent::new(code, modifiers));
-        assert_eq!(press(KeyCode::Char('r'), KeyModifiers::CONTROL), Some(Verb::Policy(PolicyKind::Random)));
+        assert_eq!(
+            press(KeyCode::Char('r'), KeyModifiers::CONTROL),
+            Some(Verb::Ask(SessionCommand::Choose(PolicyKind::Random)))
+        );
         assert_eq!(press(KeyCode::F(5), KeyModifiers::NONE), Some(Verb::ToggleRun));
         assert_eq!(press(KeyCode::Char('r'), KeyModifiers::NONE), None);
     }
@@ -127,7 +104,7 @@ mod tests {
             ("format_version = 1\n[keys]\nhyper-x = \"run\"", "hyper-x"),
             ("format_version = 1\n[keys]\nx = \"dance\"", "keys.x: unknown verb"),
         ] {
-            let error = format!("{:#}", Config::parse(text).unwrap_err());
+            let error = format!("{:#}", ExplorerConfig::parse(text).unwrap_err());
             assert!(error.contains(part), "{error}");
         }
     }

@@ -24,7 +24,7 @@ pub const LEGEND: u16 = 3;
 /// status: keys, graphics
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
+pub struct ScreenLayout {
     /// The first row.
     pub header: Rect,
     /// What the agent sees.
@@ -32,18 +32,18 @@ pub struct Layout {
     /// Hand and interactions.
     pub reach: Rect,
     /// What the policy thinks.
-    pub mind: Rect,
-    /// The subtasks.
+    pub distribution: Rect,
+    /// The subtasks, and what the current one waits for.
     pub task: Rect,
-    /// The events.
+    /// The newest lines of the log.
     pub log: Rect,
     /// The floor plan.
     pub map: Rect,
-    /// The timeline.
+    /// The steps of the branch in hand.
     pub time: Rect,
     /// What a page fills: everything between the header and the timeline.
     pub page: Rect,
-    /// The instruction.
+    /// The instruction, or the line that is typed.
     pub instruction: Rect,
     /// The last row.
     pub status: Rect,
@@ -51,7 +51,7 @@ pub struct Layout {
 
 /// The parts of the page of branches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Branches {
+pub struct BranchesLayout {
     /// The tree of branches.
     pub list: Rect,
     /// Everything under it.
@@ -65,9 +65,9 @@ pub struct Branches {
 /// What the panels on the right need: the map, a gap, and words.
 const NARROWEST_RIGHT: u16 = 46;
 
-impl Layout {
+impl ScreenLayout {
     /// The layout of a screen; `None` when it is too small.
-    pub fn of(screen: Rect) -> Option<Layout> {
+    pub fn of(screen: Rect) -> Option<ScreenLayout> {
         if screen.width < SMALLEST.0 || screen.height < SMALLEST.1 {
             return None;
         }
@@ -79,20 +79,20 @@ impl Layout {
         let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
         let sees = 1 + left / 2;
         let right = width - left - 2;
-        let mind = if body >= 30 { 13 } else { 9 };
-        let below = body - mind;
+        let distribution = if body >= 30 { 13 } else { 9 };
+        let below = body - distribution;
         let map = (right * 45 / 100).max(22).min(2 * below + 2).min(80);
         let words = right - map - 2;
         let task = (below / 2).clamp(6, 12);
         let x = left + 2;
-        Some(Layout {
+        Some(ScreenLayout {
             header: rect(0, 0, width, 1),
             sees: rect(0, 1, left, sees),
             reach: rect(0, 1 + sees, left, body - sees),
-            mind: rect(x, 1, right, mind),
-            task: rect(x, 1 + mind, words, task),
-            log: rect(x, 1 + mind + task, words, below - task),
-            map: rect(x + words + 2, 1 + mind, map, below),
+            distribution: rect(x, 1, right, distribution),
+            task: rect(x, 1 + distribution, words, task),
+            log: rect(x, 1 + distribution + task, words, below - task),
+            map: rect(x + words + 2, 1 + distribution, map, below),
             time: rect(0, height - 3, width, 1),
             page: rect(0, 1, width, body),
             instruction: rect(0, height - 2, width, 1),
@@ -113,7 +113,7 @@ impl Layout {
     }
 
     /// The parts of the page of branches: the list of so many branches, the steps side by side, and two square pictures.
-    pub fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> Branches {
+    pub fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> BranchesLayout {
         let page = self.page;
         let tall = (many as u16).saturating_add(2).clamp(4, page.height / 2);
         let list = Rect { height: tall, ..page };
@@ -125,7 +125,7 @@ impl Layout {
         let columns = (2 * rows * down / across).min(widest);
         let (rows, columns) = (rows as u16, columns as u16);
         let frames = Rect { x: below.right() - columns, y: below.y + 2, width: columns, height: rows };
-        Branches { list, below, steps: Rect { width: below.width - columns - 2, ..below }, frames }
+        BranchesLayout { list, below, steps: Rect { width: below.width - columns - 2, ..below }, frames }
     }
 
     /// How many interactions the list shows at a time.
@@ -143,12 +143,12 @@ mod tests {
     #[test]
     fn panels_fill_the_screen_without_overlap_at_every_size() {
         for (width, height) in [(80, 24), (81, 25), (100, 30), (120, 36), (200, 60), (250, 24), (80, 100), (400, 120)] {
-            let layout = Layout::of(Rect::new(0, 0, width, height)).unwrap();
+            let layout = ScreenLayout::of(Rect::new(0, 0, width, height)).unwrap();
             let panels = [
                 layout.header,
                 layout.sees,
                 layout.reach,
-                layout.mind,
+                layout.distribution,
                 layout.task,
                 layout.log,
                 layout.map,
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_smaller_screen_is_not_drawn() {
-        assert!(Layout::of(Rect::new(0, 0, 79, 24)).is_none());
-        assert!(Layout::of(Rect::new(0, 0, 80, 23)).is_none());
+        assert!(ScreenLayout::of(Rect::new(0, 0, 79, 24)).is_none());
+        assert!(ScreenLayout::of(Rect::new(0, 0, 80, 23)).is_none());
     }
 }

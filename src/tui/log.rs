@@ -19,10 +19,10 @@ pub enum Tone {
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct LogEntry {
     /// At which step.
     pub step: Option<u32>,
-    /// What happened.
+    /// An action, or a sentence about what happened.
     pub text: String,
     /// What it came to.
     pub outcome: String,
@@ -35,18 +35,18 @@ const MOST: usize = 500;
 
 /// What happened, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct Log {
-    entries: VecDeque<Entry>,
+pub struct EventLog {
+    entries: VecDeque<LogEntry>,
 }
 
-impl Log {
+impl EventLog {
     /// The lines, oldest first.
-    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &Entry> {
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> {
         self.entries.iter()
     }
 
     /// Adds a line, unless it is the last one again. The oldest makes room.
-    pub fn write(&mut self, entry: Entry) {
+    pub fn write(&mut self, entry: LogEntry) {
         if self.entries.back() == Some(&entry) {
             return;
         }
@@ -57,7 +57,7 @@ impl Log {
     }
 
     /// The last thing that was done at a step, with what it came to.
-    pub fn done_at(&self, step: u32) -> Option<&Entry> {
+    pub fn done_at(&self, step: u32) -> Option<&LogEntry> {
         self.entries.iter().rev().find(|entry| entry.step == Some(step) && !entry.outcome.is_empty())
     }
 }
@@ -66,13 +66,13 @@ impl Log {
 mod tests {
     use super::*;
 
-    fn entry(step: u32, text: &str, outcome: &str) -> Entry {
-        Entry { step: Some(step), text: text.into(), outcome: outcome.into(), tone: Tone::Done }
+    fn entry(step: u32, text: &str, outcome: &str) -> LogEntry {
+        LogEntry { step: Some(step), text: text.into(), outcome: outcome.into(), tone: Tone::Done }
     }
 
     #[test]
     fn the_log_keeps_the_newest_lines_and_none_twice_in_a_row() {
-        let mut log = Log::default();
+        let mut log = EventLog::default();
         for step in 0..MOST as u32 + 3 {
             log.write(entry(step, "turn", "ok"));
             log.write(entry(step, "turn", "ok"));

@@ -18,21 +18,21 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use termprofile::TermProfile;
 
 use super::app::{App, Graphics};
-use super::config::Config;
+use super::config::ExplorerConfig;
 use super::graphics::coarse::COARSEST;
-use super::graphics::encoder::Encoder;
+use super::graphics::encoder::PictureEncoder;
 use super::graphics::{Protocol, detect, inline};
 use super::history;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
-use super::update::{Effect, Farewell, Msg, update};
+use super::update::{Effect, ExitReason, Msg, update};
+use super::worker;
 use crate::agent::registry::PolicyKind;
-use crate::explore::session::Session;
-use crate::explore::worker;
-use crate::explore::worker::{Command, Going};
+use crate::explore::exploration::Exploration;
+use crate::explore::session::{RunMode, SessionCommand};
 
 /// What the screen is started with.
-pub struct Screen {
+pub struct ScreenOptions {
     /// How to show pictures; `None` to find out.
     pub protocol: Option<Protocol>,
     /// Who decides at first.
@@ -42,7 +42,7 @@ pub struct Screen {
     /// The policy runs as soon as it is there.
     pub runs: bool,
     /// What a person has set.
-    pub config: Config,
+    pub config: ExplorerConfig,
     /// Where it is remembered what a terminal answered.
     pub memory: Option<PathBuf>,
     /// Where instructions are kept for later sessions.
@@ -65,9 +65,9 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// # Errors
 /// When there is no terminal, or the worker stopped.
 pub fn run(
-    screen: Screen,
-    open: impl FnOnce() -> anyhow::Result<Session> + Send + 'static,
-) -> anyhow::Result<Farewell> {
+    screen: ScreenOptions,
+    open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
+) -> anyhow::Result<ExitReason> {
     // The screen strips colours itself where there are none: kitty's placeholders carry a number in theirs.
     crossterm::style::force_color_output(true);
     let ability = ability();
@@ -80,39 +80,40 @@ pub fn run(
     let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
     app.config = screen.config;
-    app.bandwidth = screen.bandwidth;
-    app.mouse = app.config.mouse;
-    if app.mouse {
-        terminal::hear_mouse(&mut io::stdout(), true)?;
+    app.traffic.limit = screen.bandwidth;
+    app.terminal.mouse = app.config.mouse;
+    if app.terminal.mouse {
+        terminal::report_mouse(&mut io::stdout(), true)?;
     }
     if let Some(path) = &screen.history {
         let remembered = history::read(path);
-        app.newcomer = remembered.is_first;
-        remembered.instructions.iter().for_each(|instruction| app.editor.remember(instruction));
+        app.input.newcomer = remembered.is_first;
+        remembered.instructions.iter().for_each(|instruction| app.input.editor.remember(instruction));
         keep(path, None);
     }
 
-    let reports = tell.clone();
+    let events = tell.clone();
     let gone = Gone(tell.clone());
-    let report = move |report| {
+    let tell_event = move |event| {
         let _ = &gone;
-        reports.send(Msg::Report(report)).is_ok()
+        // Whoever does not listen any more commands nothing any more either.
+        drop(events.send(Msg::Session(event)));
     };
-    let commands = worker::start(open, report, terminal::say_last_words)?;
+    let commands = worker::start(open, tell_event, terminal::say_last_words)?;
     let pictures = tell.clone();
     if screen.runs && !screen.manual {
-        commands.send(Command::Go(Some(Going::Policy)))?;
+        commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
     }
-    let encoder = Encoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
+    let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
     read_keys(tell)?;
-    let farewell = converse(Conversation::new(app, display, commands, encoder, screen.history), &messages);
+    let exit = run_loop(ScreenLoop::new(app, display, commands, encoder, screen.history), &messages);
     drop(guard);
-    if !matches!(farewell, Ok(Farewell::WorkerGone)) {
+    if !matches!(exit, Ok(ExitReason::WorkerGone)) {
         let_work_end(&messages, Instant::now() + PATIENCE / 2);
     }
-    match farewell? {
-        Farewell::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
-        farewell => Ok(farewell),
+    match exit? {
+        ExitReason::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
+        exit => Ok(exit),
     }
 }
 
@@ -141,12 +142,12 @@ impl Drop for Gone {
     }
 }
 
-/// The screen's side of it all: the state, the display that shows it, and those who work for it.
-pub struct Conversation<W: Write> {
+/// The state, the display that shows it, and the threads that work for it.
+pub struct ScreenLoop<W: Write> {
     app: App,
     display: Terminal<CrosstermBackend<W>>,
-    commands: Sender<Command>,
-    encoder: Encoder,
+    commands: Sender<SessionCommand>,
+    encoder: PictureEncoder,
     /// Where instructions are kept for later sessions.
     history: Option<PathBuf>,
     /// The step that the meter of bytes counted last, and the bytes written until then.
@@ -155,17 +156,17 @@ pub struct Conversation<W: Write> {
     since: (Instant, u64),
 }
 
-impl<W: Write> Conversation<W> {
-    /// Begins.
+impl<W: Write> ScreenLoop<W> {
+    /// Nothing is shown yet.
     pub fn new(
         app: App,
         display: Terminal<CrosstermBackend<W>>,
-        commands: Sender<Command>,
-        encoder: Encoder,
+        commands: Sender<SessionCommand>,
+        encoder: PictureEncoder,
         history: Option<PathBuf>,
-    ) -> Conversation<W> {
+    ) -> ScreenLoop<W> {
         let since = (Instant::now(), terminal::WRITTEN.load(Ordering::Relaxed));
-        Conversation { app, display, commands, encoder, history, metered: (0, 0), since }
+        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since }
     }
 
     /// Draws the state and sends it out whole.
@@ -183,7 +184,7 @@ impl<W: Write> Conversation<W> {
     ///
     /// # Errors
     /// When the terminal cannot be written.
-    pub fn hear(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<Farewell>> {
+    pub fn on_messages(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<ExitReason>> {
         let mut encode = false;
         for msg in messages {
             for effect in update(&mut self.app, msg) {
@@ -199,9 +200,9 @@ impl<W: Write> Conversation<W> {
                             keep(path, Some(&instruction));
                         }
                     }
-                    Effect::Mouse(on) => terminal::hear_mouse(self.display.backend_mut(), on)?,
+                    Effect::Mouse(on) => terminal::report_mouse(self.display.backend_mut(), on)?,
                     Effect::Repaint => self.repaint()?,
-                    Effect::Quit(farewell) => return Ok(Some(farewell)),
+                    Effect::Quit(exit) => return Ok(Some(exit)),
                 }
             }
         }
@@ -226,51 +227,51 @@ impl<W: Write> Conversation<W> {
     /// Takes in the terminal's size, should a message about it have been missed.
     fn measure(&mut self) -> io::Result<()> {
         let size = self.display.size()?;
-        if size != self.app.size {
-            self.hear([Msg::Resize(size)])?;
+        if size != self.app.terminal.size {
+            self.on_messages([Msg::Resize(size)])?;
         }
         Ok(())
     }
 
     /// Makes pictures coarser or finer, so that steps keep to what they may cost.
     fn budget(&mut self) {
-        let (Some(most), Some(cost)) = (self.app.bandwidth, self.app.bytes) else { return };
+        let (Some(most), Some(cost)) = (self.app.traffic.limit, self.app.traffic.of_step) else { return };
         if cost > most {
-            self.app.coarseness = (self.app.coarseness + 1).min(COARSEST);
+            self.app.traffic.coarseness = (self.app.traffic.coarseness + 1).min(COARSEST);
         } else if 3 * cost < most {
-            self.app.coarseness = self.app.coarseness.saturating_sub(1);
+            self.app.traffic.coarseness = self.app.traffic.coarseness.saturating_sub(1);
         }
     }
 
     /// Notes what the newest steps cost on the wire.
     fn meter(&mut self) {
-        let step = self.app.now.as_ref().map_or(0, |now| now.step);
+        let step = self.app.session.now.as_ref().map_or(0, |now| now.step);
         let (before, bytes_before) = self.metered;
         if step != before {
             let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
-            self.app.bytes = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
+            self.app.traffic.of_step = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
             self.metered = (step, bytes);
             self.budget();
         }
         let (since, before) = self.since;
         if since.elapsed() >= METERED {
             let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
-            self.app.bytes_a_second = Some(((bytes - before) as f32 / since.elapsed().as_secs_f32()) as u64);
+            self.app.traffic.of_second = Some(((bytes - before) as f32 / since.elapsed().as_secs_f32()) as u64);
             self.since = (Instant::now(), bytes);
         }
     }
 }
 
 /// Takes in messages until one of them ends it.
-fn converse(mut conversation: Conversation<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<Farewell> {
+fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<ExitReason> {
     loop {
-        conversation.measure()?;
-        conversation.show()?;
+        screen.measure()?;
+        screen.show()?;
         let first = messages.recv().context("all threads are gone")?;
         // What came meanwhile is taken in before the next drawing: only the newest state is drawn.
         let all = std::iter::once(first).chain(messages.try_iter().take(4 * QUEUE));
-        if let Some(farewell) = conversation.hear(all)? {
-            return Ok(farewell);
+        if let Some(exit) = screen.on_messages(all)? {
+            return Ok(exit);
         }
     }
 }

@@ -53,16 +53,16 @@ impl Drop for Guard {
 }
 
 /// Asks for buttons and the wheel, in SGR form; not for every motion, which would cost a slow link.
-const HEAR_MOUSE: &[u8] = b"\x1b[?1000h\x1b[?1006h";
+const REPORT_MOUSE: &[u8] = b"\x1b[?1000h\x1b[?1006h";
 const LEAVE_MOUSE: &[u8] = b"\x1b[?1006l\x1b[?1000l";
 
 /// Asks the terminal to send what the mouse does, or no longer.
 ///
 /// # Errors
 /// When the terminal cannot be written.
-pub fn hear_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
+pub fn report_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
     MOUSE.store(on, Ordering::SeqCst);
-    out.write_all(if on { HEAR_MOUSE } else { LEAVE_MOUSE })
+    out.write_all(if on { REPORT_MOUSE } else { LEAVE_MOUSE })
 }
 
 /// Notes that the terminal holds pictures, and the sequence by which it should forget them in the end.

@@ -18,15 +18,15 @@ pub struct Theme {
     pub chosen: Style,
     /// A key to press.
     pub key: Style,
-    /// Bars.
+    /// Bars of probabilities and scores.
     pub bar: Style,
-    /// Done.
+    /// What was done or went well.
     pub good: Style,
-    /// Impossible.
+    /// What was impossible or went wrong.
     pub bad: Style,
     /// Worth noticing.
     pub note: Style,
-    /// The instruction.
+    /// What the agent is told.
     pub instruction: Style,
 }
 
@@ -95,7 +95,7 @@ impl Scheme {
 /// What the terminal can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ability {
-    /// Its colours.
+    /// How many colours it has.
     pub colours: TermProfile,
     /// It shows characters beyond ASCII.
     pub unicode: bool,

@@ -19,19 +19,19 @@ use ratatui::{Terminal, TerminalOptions, Viewport};
 use sprint_explorer::agent::registry::{Policies, PolicyKind};
 use sprint_explorer::domain::scene::Room;
 use sprint_explorer::episode::scenes::Scenes;
-use sprint_explorer::explore::episode_source::{EpisodeSource, Start};
-use sprint_explorer::explore::session::Session;
-use sprint_explorer::explore::worker;
-use sprint_explorer::explore::worker::{Command, Going, Pace};
+use sprint_explorer::explore::episode_source::{EpisodeOrigin, EpisodeSource};
+use sprint_explorer::explore::exploration::Exploration;
+use sprint_explorer::explore::session::{RunMode, SessionCommand, StepRate};
 use sprint_explorer::tui::app::{App, Graphics};
-use sprint_explorer::tui::graphics::classes::{self, Letters};
-use sprint_explorer::tui::graphics::encoder::Encoder;
+use sprint_explorer::tui::graphics::encoder::PictureEncoder;
+use sprint_explorer::tui::graphics::letters::{self, Letters};
 use sprint_explorer::tui::graphics::overlay::Overlay;
 use sprint_explorer::tui::graphics::{Job, Picture, Protocol};
-use sprint_explorer::tui::screen::Conversation;
+use sprint_explorer::tui::screen::ScreenLoop;
 use sprint_explorer::tui::terminal::{Counted, WRITTEN};
 use sprint_explorer::tui::theme::Ability;
 use sprint_explorer::tui::update::Msg;
+use sprint_explorer::tui::worker;
 
 const KEYS: usize = 600;
 const BETWEEN: Duration = Duration::from_millis(11);
@@ -41,9 +41,9 @@ const LIMITS: (Duration, Duration) = (Duration::from_millis(5), Duration::from_m
 /// Steps over which bytes and times of frames are taken.
 const STEPS: usize = 60;
 
-fn engine() -> anyhow::Result<Session> {
-    let openings = EpisodeSource::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
-    Session::new(openings, Policies::new(Vec::new()), PolicyKind::Expert, None)
+fn exploration() -> anyhow::Result<Exploration> {
+    let source = EpisodeSource::new(EpisodeOrigin::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
+    Exploration::new(source, Policies::new(Vec::new()), PolicyKind::Expert, None)
 }
 
 /// What a protocol is measured at, and what a typical step may cost.
@@ -67,8 +67,8 @@ fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
     ];
     let mut missed = Vec::new();
     for Target { protocol, cells: (width, height), kilobytes: most, encoding: longest } in targets {
-        let mut engine = engine()?;
-        engine.choose(PolicyKind::Expert)?;
+        let mut exploration = exploration()?;
+        exploration.choose(PolicyKind::Expert)?;
         let cells = Size { width, height };
         let area = Rect::from((ratatui::layout::Position::ORIGIN, cells));
         let viewport = Viewport::Fixed(area);
@@ -76,7 +76,7 @@ fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
         let mut display = Terminal::with_options(backend, TerminalOptions { viewport })?;
         let (mut sizes, mut times) = (Vec::new(), Vec::new());
         for _ in 0..STEPS {
-            let now = engine.snapshot();
+            let now = exploration.snapshot();
             let job = Job {
                 frame: now.frame.clone(),
                 overlay: Overlay::Colour,
@@ -84,7 +84,7 @@ fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
                 in_tmux: false,
                 recent: Vec::new(),
                 letters: Arc::new(Letters::of(&now.scene, &now.world)),
-                classes: Arc::new(classes::names(&now.scene, &now.world)),
+                classes: Arc::new(letters::names(&now.scene, &now.world)),
                 labels: Vec::new(),
                 protocol,
                 cells,
@@ -97,8 +97,8 @@ fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
             display.draw(|frame| frame.render_widget(&picture, area))?;
             Write::flush(display.backend_mut())?;
             sizes.push(WRITTEN.load(std::sync::atomic::Ordering::Relaxed) - before);
-            if engine.end().is_some() || engine.step().is_err() {
-                engine.next_episode()?;
+            if exploration.end().is_some() || exploration.step().is_err() {
+                exploration.next_episode()?;
             }
         }
         sizes.sort_unstable();
@@ -129,17 +129,14 @@ fn main() -> anyhow::Result<()> {
     let (tell, messages) = sync_channel(64);
     let reports = tell.clone();
     let open = || {
-        let openings = EpisodeSource::new(Start::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
+        let source = EpisodeSource::new(EpisodeOrigin::Generated(Room::Kitchen), 1, Scenes::in_folder(None));
         let policies = Policies::new(Vec::new());
-        Session::new(openings, policies, PolicyKind::Random, Some("look around"))
+        Exploration::new(source, policies, PolicyKind::Random, Some("look around"))
     };
-    let commands = worker::start(
-        open,
-        move |report| reports.send((None, Msg::Report(report))).is_ok(),
-        |error| panic!("{error}"),
-    )?;
+    let commands =
+        worker::start(open, move |event| drop(reports.send((None, Msg::Session(event)))), |error| panic!("{error}"))?;
     let pictures = tell.clone();
-    let encoder = Encoder::start(move |picture| pictures.send((None, Msg::Picture(picture))).is_ok())?;
+    let encoder = PictureEncoder::start(move |picture| pictures.send((None, Msg::Picture(picture))).is_ok())?;
     let size = Size { width: 120, height: 36 };
     let viewport = Viewport::Fixed(Rect::from((ratatui::layout::Position::ORIGIN, size)));
     let backend = CrosstermBackend::new(BufWriter::new(Counted::new(io::sink())));
@@ -147,9 +144,9 @@ fn main() -> anyhow::Result<()> {
     let graphics =
         Graphics { protocol: Protocol::HalfBlocks, reason: "bench".into(), cell_pixels: (8, 16), in_tmux: false };
     let app = App::new(size, graphics, Ability::FULL, PolicyKind::Random, false);
-    commands.send(Command::Pace((0..9).fold(Pace::START, |pace, _| pace.faster())))?;
-    commands.send(Command::Go(Some(Going::Policy)))?;
-    let mut conversation = Conversation::new(app, display, commands, encoder, None);
+    commands.send(SessionCommand::StepRate((0..9).fold(StepRate::default(), |rate, _| rate.faster())))?;
+    commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
+    let mut screen = ScreenLoop::new(app, display, commands, encoder, None);
 
     std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(500));
@@ -176,8 +173,8 @@ fn main() -> anyhow::Result<()> {
                 msg
             })
             .collect();
-        conversation.hear(batch)?;
-        conversation.show()?;
+        screen.on_messages(batch)?;
+        screen.show()?;
         waits.extend(pressed.iter().map(Instant::elapsed));
     }
     waits.sort();

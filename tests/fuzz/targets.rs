@@ -309,7 +309,7 @@ fn settings(_: &Path) -> Vec<Vec<u8>> {
 }
 
 fn setting(at: &Path) -> anyhow::Result<()> {
-    config::Config::parse(&std::fs::read_to_string(at.join("explorer.toml"))?).map(drop)
+    config::ExplorerConfig::parse(&std::fs::read_to_string(at.join("explorer.toml"))?).map(drop)
 }
 
 fn progress(_: &Path) -> Vec<Vec<u8>> {

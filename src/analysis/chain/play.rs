@@ -49,10 +49,10 @@ impl Handover {
 pub struct ChainRun {
     /// How each link came out, as far as it got.
     pub outcomes: Vec<LinkOutcome>,
-    /// For every step, how warm each link was: V under its instruction, or without critics the probability that its
+    /// For every step, the value of each link: V under its instruction, or without critics the probability that its
     /// instruction gives to what was done.
-    pub heat: Vec<Vec<f32>>,
-    /// The heat is V.
+    pub link_values: Vec<Vec<f32>>,
+    /// They are V.
     pub by_value: bool,
     /// The link in force at every step.
     pub in_force: Vec<usize>,
@@ -144,7 +144,7 @@ impl LinkFollower<'_> {
         let action = decision.action;
         let class = action.target.and_then(|target| rollout.env.class_of(target));
         let values = |policy: &mut dyn Policy, rollout: &mut Rollout| policy.values(0, &mut rollout.observation());
-        let mut heat = Vec::with_capacity(self.chain.links.len());
+        let mut link_values = Vec::with_capacity(self.chain.links.len());
         let mut next = None;
         for (link, instruction) in self.chain.links.iter().enumerate() {
             let value = match asked(policy, rollout, instruction, values)? {
@@ -160,9 +160,9 @@ impl LinkFollower<'_> {
                     decided.distribution.and_then(|it| it.actions[action.kind.index()]).unwrap_or(0.0)
                 }
             };
-            heat.push(value);
+            link_values.push(value);
         }
-        self.run.heat.push(heat);
+        self.run.link_values.push(link_values);
         self.run.in_force.push(self.link);
         let Some(next) = next else { return Ok(None) };
         let both = self.chain.links[self.link..=self.link + 1].join(" ");
@@ -218,14 +218,14 @@ mod tests {
         let mut policy = RandomPolicy::new();
         let mut seen = 0;
         let play = chain.play(&mut policy, false, &AtomicBool::new(false), &mut |_| seen += 1).unwrap();
-        assert_eq!(seen, play.heat.len());
+        assert_eq!(seen, play.link_values.len());
         assert_eq!(play.outcomes.len(), 2);
         let first = &play.outcomes[0];
         assert!(first.reached && first.done.is_some() && first.handover.is_none());
         assert_eq!(play.outcomes[1].reached, first.done == Some(true));
         let steps: u32 = play.outcomes.iter().map(|outcome| outcome.steps).sum();
-        assert_eq!((play.heat.len(), play.in_force.len()), (steps as usize, steps as usize));
-        assert!(play.heat.iter().all(|heat| heat.len() == 2) && !play.by_value);
+        assert_eq!((play.link_values.len(), play.in_force.len()), (steps as usize, steps as usize));
+        assert!(play.link_values.iter().all(|values| values.len() == 2) && !play.by_value);
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! A branch as it is written down: as an episode of a run.
 
-use super::Moment;
+use super::SavedState;
 use super::tree::Tree;
 use crate::episode::record::{Author, Episode};
 
 impl Tree {
     /// The start as a branch left it: since the tree began, a reset may have begun to grade what is told there.
-    pub fn beginning(&self, branch: usize) -> Moment {
+    pub fn beginning(&self, branch: usize) -> SavedState {
         let mut start = self.start().clone();
         if let Some((next, Some(taken))) = self.story(branch).get(1)
             && start.grader.is_none()

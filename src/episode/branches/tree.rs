@@ -1,7 +1,7 @@
 //! The tree of steps itself.
 
-use super::moment::Moment;
-use super::taken::Taken;
+use super::saved_state::SavedState;
+use super::taken_step::TakenStep;
 use crate::agent::PolicyState;
 
 /// A state's place in the tree.
@@ -10,8 +10,8 @@ pub type Place = usize;
 struct Twig {
     parent: Option<Place>,
     step: u32,
-    taken: Option<Taken>,
-    moment: Moment,
+    taken: Option<TakenStep>,
+    moment: SavedState,
     children: Vec<Place>,
 }
 
@@ -56,7 +56,7 @@ pub enum Growth {
 
 impl Tree {
     /// Only the start.
-    pub fn new(start: Moment) -> Tree {
+    pub fn new(start: SavedState) -> Tree {
         let twig = Twig { parent: None, step: 0, taken: None, moment: start, children: Vec::new() };
         let main = Branch { name: "main".into(), tip: 0, left: None, why: "the start".into() };
         Tree { twigs: vec![twig], branches: vec![main], branch: 0, line: vec![0], at: 0 }
@@ -73,24 +73,24 @@ impl Tree {
     }
 
     /// The state in hand.
-    pub fn moment(&self) -> &Moment {
+    pub fn saved_state(&self) -> &SavedState {
         &self.twigs[self.line[self.at as usize]].moment
     }
 
     /// Replaces what the start is like, while nothing was tried from it.
-    pub fn begin_with(&mut self, start: Moment) {
+    pub fn begin_with(&mut self, start: SavedState) {
         if self.twigs.len() == 1 {
             self.twigs[0].moment = start;
         }
     }
 
     /// The states up to the one in hand.
-    pub fn past(&self) -> impl DoubleEndedIterator<Item = &Moment> + ExactSizeIterator {
+    pub fn past(&self) -> impl DoubleEndedIterator<Item = &SavedState> + ExactSizeIterator {
         self.line[..=self.at as usize].iter().map(|&place| &self.twigs[place].moment)
     }
 
     /// The steps of the branch in hand, from the first.
-    pub fn steps(&self) -> impl Iterator<Item = &Taken> {
+    pub fn steps(&self) -> impl Iterator<Item = &TakenStep> {
         self.line.iter().filter_map(|&place| self.twigs[place].taken.as_ref())
     }
 
@@ -100,17 +100,17 @@ impl Tree {
     }
 
     /// The state at the start.
-    pub fn start(&self) -> &Moment {
+    pub fn start(&self) -> &SavedState {
         &self.twigs[0].moment
     }
 
     /// The step that led to the state in hand.
-    pub fn last_taken(&self) -> Option<&Taken> {
+    pub fn last_taken(&self) -> Option<&TakenStep> {
         self.twigs[self.line[self.at as usize]].taken.as_ref()
     }
 
     /// The step that follows the state in hand on its branch.
-    pub fn next(&self) -> Option<&Taken> {
+    pub fn next(&self) -> Option<&TakenStep> {
         let place = *self.line.get(self.at as usize + 1)?;
         self.twigs[place].taken.as_ref()
     }
@@ -121,7 +121,7 @@ impl Tree {
     }
 
     /// The states of a branch with the steps that led to them, from the start.
-    pub fn story(&self, branch: usize) -> Vec<(&Moment, Option<&Taken>)> {
+    pub fn story(&self, branch: usize) -> Vec<(&SavedState, Option<&TakenStep>)> {
         let line = self.branches.get(branch).map_or_else(Vec::new, |branch| self.line_to(branch.tip));
         line.into_iter().map(|place| (&self.twigs[place].moment, self.twigs[place].taken.as_ref())).collect()
     }
@@ -150,9 +150,9 @@ impl Tree {
     }
 
     /// Goes to a step of the branch in hand, or to its end.
-    pub fn seek(&mut self, step: u32) -> &Moment {
+    pub fn seek(&mut self, step: u32) -> &SavedState {
         self.at = step.min(self.last());
-        self.moment()
+        self.saved_state()
     }
 
     /// Takes another branch in hand, at the same step or its end.
@@ -178,7 +178,12 @@ impl Tree {
     }
 
     /// Adds a step that was taken from the state in hand, and what came of it; goes there. `why` says what was new about it.
-    pub fn grow(&mut self, taken: Taken, moment: impl FnOnce() -> Moment, why: impl FnOnce() -> String) -> Growth {
+    pub fn grow(
+        &mut self,
+        taken: TakenStep,
+        moment: impl FnOnce() -> SavedState,
+        why: impl FnOnce() -> String,
+    ) -> Growth {
         let from = self.line[self.at as usize];
         if self.next().is_some_and(|next| next.is_same(&taken)) {
             self.at += 1;
@@ -244,10 +249,10 @@ mod tests {
     use crate::episode::record::{Author, TraceStep};
     use crate::house::Outcome;
 
-    fn moment(x: i16) -> Moment {
+    fn saved_state(x: i16) -> SavedState {
         let mut world = World::default();
         world.agent.cell.x = x;
-        Moment {
+        SavedState {
             world: Arc::new(world),
             grader: None,
             horizon: None,
@@ -257,7 +262,7 @@ mod tests {
         }
     }
 
-    fn taken(kind: ActionType, told: &str) -> Taken {
+    fn taken(kind: ActionType, told: &str) -> TakenStep {
         let step = TraceStep {
             kind,
             target: None,
@@ -267,7 +272,7 @@ mod tests {
             instruction: None,
             author: None,
         };
-        Taken {
+        TakenStep {
             decision: Decision::of(Action::navigate(kind)),
             step,
             instruction: told.into(),
@@ -277,12 +282,12 @@ mod tests {
     }
 
     fn grow(tree: &mut Tree, kind: ActionType, x: i16) -> Growth {
-        tree.grow(taken(kind, "go"), || moment(x), || "why".into())
+        tree.grow(taken(kind, "go"), || saved_state(x), || "why".into())
     }
 
     /// main: ahead, ahead, left; b1 leaves it after the first step, to the right.
     fn forked() -> Tree {
-        let mut tree = Tree::new(moment(0));
+        let mut tree = Tree::new(saved_state(0));
         for (kind, x) in [(ActionType::MoveAhead, 1), (ActionType::MoveAhead, 2), (ActionType::RotateLeft, 3)] {
             assert_eq!(grow(&mut tree, kind, x), Growth::Longer);
         }
@@ -299,7 +304,7 @@ mod tests {
         assert_eq!(tree.shared(0, 1), 1);
         assert!(tree.switch(0));
         assert_eq!((tree.at(), tree.last()), (2, 3), "the same step of the other branch");
-        assert_eq!(tree.moment().world.agent.cell.x, 2);
+        assert_eq!(tree.saved_state().world.agent.cell.x, 2);
         assert_eq!(tree.forks().collect::<Vec<_>>(), [false, true, false, false]);
     }
 
@@ -309,7 +314,7 @@ mod tests {
         tree.seek(1);
         assert_eq!(grow(&mut tree, ActionType::MoveAhead, 99), Growth::Known);
         assert_eq!((tree.branch(), tree.at()), (0, 2), "back on main");
-        assert_eq!(tree.moment().world.agent.cell.x, 2);
+        assert_eq!(tree.saved_state().world.agent.cell.x, 2);
         tree.seek(0);
         assert_eq!(grow(&mut tree, ActionType::MoveAhead, 99), Growth::Known);
     }
@@ -319,7 +324,7 @@ mod tests {
         let mut tree = forked();
         tree.switch(0);
         tree.seek(2);
-        let growth = tree.grow(taken(ActionType::RotateLeft, "stop"), || moment(5), || "told stop".into());
+        let growth = tree.grow(taken(ActionType::RotateLeft, "stop"), || saved_state(5), || "told stop".into());
         assert_eq!(growth, Growth::Forked(2));
         assert_eq!(tree.branches()[2].why, "told stop");
     }

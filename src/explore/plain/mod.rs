@@ -1,59 +1,78 @@
 //! The explorer without a screen: a verb a line in, plain lines out. For screen readers, scripts, and pipes.
 
+mod chains;
 mod obey;
-mod say;
-mod work;
+mod render;
 
 use std::io::{BufRead, Write};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
-use super::breakpoints::Condition;
-use super::chained::Chained;
+use super::chain_report::ChainReport;
 use super::choices::Sort;
-use super::session::Session;
+use super::exploration::{Exploration, Snapshot};
+use super::session::{Session, SessionCommand, SessionEvent};
+use super::timeline::BranchPosition;
 use super::verb::{Verb, parse};
-use crate::agent::registry::PolicyKind;
-use crate::analysis::chain::Chain;
+use crate::agent::{Decision, Values};
+use crate::analysis::value_map::ValueMap;
 use crate::domain::Heading;
-use say::opening;
+use render::{at, compare, divergence, opening, step_line};
 
-/// What a session without a screen remembers beside the episode.
-struct Plain {
-    engine: Session,
-    /// Where runs stop.
-    breaks: Vec<Condition>,
+/// A session without a screen, and what was last told of it.
+struct Plain<W> {
+    session: Session,
+    events: Receiver<SessionEvent>,
+    out: W,
+    state: Option<Box<Snapshot>>,
+    decided: Option<(Decision, String, Option<Values>)>,
+    position: Option<BranchPosition>,
     /// The other instruction of the last comparison.
-    other: Option<String>,
-    /// The chain that was followed last.
-    chain: Option<Chain>,
-    /// What each policy made of it, the first one's first.
-    followed: Vec<Chained>,
+    compared: Option<String>,
+    /// What each policy made of the chain, the first one's first.
+    chains: Vec<ChainReport>,
+    map: Option<Arc<ValueMap>>,
     /// The heading whose values are told; the best without one.
     heading: Option<Heading>,
     /// How choices are sorted.
     sort: Sort,
 }
 
+/// Whether what was asked for was done. If not, that was told.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    Given,
+    Refused,
+}
+
+/// How long work in the background is waited for before it is asked whether it still goes on.
+const PATIENCE: Duration = Duration::from_millis(20);
+
 /// Obeys lines until `quit` or the end of the input.
 ///
 /// # Errors
 /// When reading or writing fails.
-pub fn run(engine: Session, kind: PolicyKind, input: impl BufRead, mut out: impl Write) -> anyhow::Result<()> {
+pub fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<()> {
+    let (tell, events) = channel();
+    let session = Session::on_request(exploration, Arc::new(move |event| drop(tell.send(event))));
     let mut plain = Plain {
-        engine,
-        breaks: Vec::new(),
-        other: None,
-        chain: None,
-        followed: Vec::new(),
+        session,
+        events,
+        out,
+        state: None,
+        decided: None,
+        position: None,
+        compared: None,
+        chains: Vec::new(),
+        map: None,
         heading: None,
         sort: Sort::Probability,
     };
-    opening(&plain.engine.snapshot(), &mut out)?;
-    if !plain.engine.has_policy()
-        && let Err(error) = plain.engine.choose(kind)
-    {
-        writeln!(out, "error: {error:#}")?;
-    }
-    out.flush()?;
+    opening(&plain.state()?, &mut plain.out)?;
+    plain.session.begin();
+    plain.take_events(Echo::Everything)?;
+    plain.out.flush()?;
     for line in input.lines() {
         let line = line?;
         let line = line.trim();
@@ -63,25 +82,132 @@ pub fn run(engine: Session, kind: PolicyKind, input: impl BufRead, mut out: impl
         match parse(line) {
             Ok(Verb::Quit) => break,
             Ok(verb) => {
-                if let Err(error) = plain.obey(verb, &mut out) {
-                    writeln!(out, "error: {error:#}")?;
+                if let Err(error) = plain.obey(verb) {
+                    writeln!(plain.out, "error: {error:#}")?;
                 }
             }
-            Err(complaint) => writeln!(out, "error: {complaint}")?,
+            Err(complaint) => writeln!(plain.out, "error: {complaint}")?,
         }
-        out.flush()?;
+        plain.out.flush()?;
     }
     Ok(())
 }
 
+/// What of the events is written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Echo {
+    Everything,
+    /// What went wrong.
+    Errors,
+}
+
+impl<W: Write> Plain<W> {
+    /// Asks for something, and writes what comes of it until it is over.
+    fn ask(&mut self, command: SessionCommand) -> anyhow::Result<Answer> {
+        self.session.apply(command);
+        self.take_events(Echo::Everything)
+    }
+
+    /// Asks for something that is written otherwise.
+    fn ask_quietly(&mut self, command: SessionCommand) -> anyhow::Result<Answer> {
+        self.session.apply(command);
+        self.take_events(Echo::Errors)
+    }
+
+    /// The present state.
+    fn state(&mut self) -> anyhow::Result<Snapshot> {
+        self.ask_quietly(SessionCommand::Show)?;
+        self.state.take().map(|now| *now).ok_or_else(|| anyhow::anyhow!("the state was not told"))
+    }
+
+    /// What the policy would do now, unless that failed and was told.
+    fn decision(&mut self) -> anyhow::Result<Option<(Decision, String, Option<Values>)>> {
+        self.ask_quietly(SessionCommand::Decide)?;
+        Ok(self.decided.take())
+    }
+
+    /// Takes in events until no run and no work is under way.
+    fn take_events(&mut self, echo: Echo) -> anyhow::Result<Answer> {
+        let mut answer = Answer::Given;
+        loop {
+            // Asked first: what ends meanwhile has told everything by then.
+            let (runs, works) = (self.session.interval().is_some(), self.session.is_working());
+            while let Ok(event) = self.events.try_recv() {
+                self.on_event(event, echo, &mut answer)?;
+            }
+            if runs {
+                self.session.advance();
+                self.out.flush()?;
+            } else if !works {
+                return Ok(answer);
+            } else if let Ok(event) = self.events.recv_timeout(PATIENCE) {
+                self.on_event(event, echo, &mut answer)?;
+            }
+        }
+    }
+
+    fn on_event(&mut self, event: SessionEvent, echo: Echo, answer: &mut Answer) -> anyhow::Result<()> {
+        let out = &mut self.out;
+        match event {
+            SessionEvent::Refused(reason) | SessionEvent::Failed(reason) => {
+                *answer = Answer::Refused;
+                writeln!(out, "error: {reason}")?;
+            }
+            SessionEvent::AlreadyOver(_) => {
+                *answer = Answer::Refused;
+                writeln!(out, "error: the episode is over; `back`, `reset` or `next`")?;
+            }
+            SessionEvent::State(now) => self.state = Some(now),
+            SessionEvent::Decided(decision, words, values) => self.decided = Some((decision, words, values)),
+            SessionEvent::Chain(report) => self.take_in(*report),
+            SessionEvent::ValueMap(map, _) => self.map = Some(map),
+            SessionEvent::At(position) => {
+                if echo == Echo::Everything {
+                    at(&position, out)?;
+                }
+                self.position = Some(position);
+            }
+            SessionEvent::Stepped(step) => step_line(&step, out)?,
+            SessionEvent::Instructed { old, new, note } => writeln!(out, "instruction: {new} (was: {old}; {note})")?,
+            SessionEvent::PolicyChosen(kind) => writeln!(out, "policy: {}", kind.name())?,
+            SessionEvent::CheckpointChosen(name) => writeln!(out, "checkpoint: {name}")?,
+            SessionEvent::Sampling(Some(seed)) => writeln!(out, "actions are drawn with seed {seed} from here on")?,
+            SessionEvent::Sampling(None) => writeln!(out, "the likeliest actions from here on")?,
+            SessionEvent::Stopped(why) => writeln!(out, "stopped: {why}")?,
+            SessionEvent::Breakpoints(conditions) => {
+                let all: Vec<String> = conditions.iter().map(ToString::to_string).collect();
+                writeln!(out, "runs stop at: {}", if all.is_empty() { "nothing".into() } else { all.join("; ") })?;
+            }
+            SessionEvent::Diverged(parted) => divergence(&parted, out)?,
+            SessionEvent::Compared(contrast) => {
+                compare(&contrast, out)?;
+                self.compared = Some(contrast.sides[1].instruction.clone());
+            }
+            SessionEvent::Noted(what) => writeln!(out, "{what}")?,
+            // A step's own line says that the episode is over, and what is slow is waited for.
+            SessionEvent::Ended(_) | SessionEvent::Running(_) | SessionEvent::Busy(_) | SessionEvent::Working(_) => {}
+        }
+        Ok(())
+    }
+
+    /// Keeps what a policy made of the chain, in place of what it made before; another chain takes the place of all.
+    fn take_in(&mut self, report: ChainReport) {
+        self.chains.retain(|known| known.is_same_chain(&report));
+        match self.chains.iter_mut().find(|known| known.who == report.who) {
+            Some(known) => *known = report,
+            None => self.chains.push(report),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::run;
     use crate::explore::testing;
 
     fn say(lines: &str) -> String {
         let mut out = Vec::new();
-        run(testing::engine(), PolicyKind::Random, lines.as_bytes(), &mut out).unwrap();
+        run(testing::exploration(), lines.as_bytes(), &mut out).unwrap();
         String::from_utf8(out).unwrap()
     }
 

@@ -1,22 +1,26 @@
-//! Everything a person can do in the explorer: one list for keys, palette, help and the plain mode.
+//! Everything a person can do in the explorer. [`table::VERBS`] is the one list of it.
 
-mod doc;
+mod documents;
+pub mod entry;
 mod fuzzy_match;
+mod line;
 mod parse;
+pub mod table;
 
-pub use fuzzy_match::{SAID, Said, matching};
-pub use parse::{TIMES, parse};
-
-use std::path::PathBuf;
+pub use documents::{man_section, markdown_table};
+pub use fuzzy_match::matching;
+pub use line::DRAWS;
+pub use parse::parse;
 
 use super::breakpoints::Condition;
-use crate::agent::registry::PolicyKind;
-use crate::analysis::chain::Draws;
-use crate::domain::{ActionType, Heading};
+use super::session::SessionCommand;
+use crate::domain::Heading;
 
 /// One thing that a person can do.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verb {
+    /// What the session does as it is asked.
+    Ask(SessionCommand),
     /// Go on: replay the recording, or at its end let the policy act; or pause.
     ToggleRun,
     /// Let the policy act from here, also where something else was recorded.
@@ -27,62 +31,24 @@ pub enum Verb {
     Faster,
     /// A slower pace.
     Slower,
-    /// Back to the start, with the present instruction.
-    Reset,
-    /// The next episode.
-    Next,
-    /// The episode of that seed, or the task of that number.
-    Seed(u64),
     /// Begin to type an instruction.
     Edit,
-    /// Tell the agent something.
-    Instruct(String),
     /// Take over, or give back.
     ToggleManual,
-    /// Let that policy decide.
-    Policy(PolicyKind),
     /// Let the next policy decide.
     NextPolicy,
-    /// Another checkpoint becomes the agent.
-    Checkpoint(String),
-    /// Another seed of the policy's chance, and actions drawn by it.
-    Sample(u64),
-    /// The likeliest actions again.
-    Greedy,
-    /// One of the five navigation actions.
-    Navigate(ActionType),
     /// The interaction of that number, from 1.
     Interact(u8),
     /// The next page of interactions.
-    Page,
+    NextInteractions,
     /// That many steps back.
     Back(u32),
     /// That many steps forward along the recording; at its end as the policy chooses.
     Forward(u32),
-    /// To that step.
-    Seek(u32),
-    /// To the end of the branch.
-    Last,
-    /// To the next event.
-    NextEvent,
-    /// To the event before.
-    LastEvent,
-    /// To the completion of that subtask, from 1.
-    Subtask(u32),
-    /// To the next branch.
-    NextBranch,
-    /// To the branch of that name or number.
-    Branch(String),
-    /// Another name for the branch in hand.
-    Name(String),
-    /// Side by side with the branch of that name or number.
-    Diverge(String),
-    /// Stop a run where that holds; without a condition, nowhere.
-    Break(Option<Condition>),
     /// Run until that holds.
     Until(Condition),
     /// Show a page, or the main one again.
-    Show(Page),
+    Show(ExplorerPage),
     /// In a list: down (or up).
     Select(i8),
     /// In a list: take what is selected.
@@ -91,10 +57,6 @@ pub enum Verb {
     Sort,
     /// Another view in the frame's panel.
     Overlay,
-    /// Two instructions in one state.
-    Compare(String),
-    /// Adopt the second instruction.
-    Swap,
     /// The value of every cell, painted on the map; or end that.
     ValueMap,
     /// Which link breaks, for the link that is selected alone.
@@ -105,20 +67,6 @@ pub enum Verb {
     NextHeading,
     /// Hear the mouse, or no longer.
     Mouse,
-    /// Follow a chain of instructions.
-    Chain(String),
-    /// The same chain by another policy, side by side.
-    Against(String),
-    /// Which link of the chain breaks.
-    WhichLink(Draws),
-    /// Stop work in the background.
-    Stop,
-    /// Write what was explored as a run.
-    Save(Option<PathBuf>),
-    /// Add the branch as a task to a task file.
-    SaveTask(PathBuf),
-    /// Write a picture or text of the branch; the file's ending says which.
-    Export(PathBuf),
     /// Copy the instruction and the last step to the clipboard.
     Copy,
     /// Another way to show pictures.
@@ -130,10 +78,10 @@ pub enum Verb {
     /// Numbers on or off.
     Labels,
     /// The list of verbs, with what is typed already.
-    Palette(&'static str),
+    Palette(String),
     /// The keys of this screen.
     Help,
-    /// Leave.
+    /// End the session.
     Quit,
     /// While typing: tell the agent.
     Apply,
@@ -157,17 +105,17 @@ pub enum Verb {
 
 /// A page in place of the panels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Page {
-    /// All panels.
+pub enum ExplorerPage {
+    /// The frame, interactions, distribution, task, log and map at once.
     Main,
-    /// Branches.
+    /// Everything that was tried, as a tree of branches.
     Branches,
-    /// What the policy thinks.
+    /// Every choice with its probability and values.
     Mind,
     /// The floor plan with an inspector.
     World,
-    /// Two instructions.
+    /// Two instructions in one state.
     Compare,
-    /// A chain of instructions.
+    /// Instructions that are followed one after the other.
     Chain,
 }

@@ -1,15 +1,8 @@
 //! Verbs as lines of text.
 
-use std::path::PathBuf;
-
-use super::{Page, Verb};
-use crate::agent::registry::PolicyKind;
-use crate::analysis::chain::Draws;
-use crate::domain::{ActionType, Heading};
-use crate::explore::breakpoints::Condition;
-
-/// Draws of a link where nobody says how many.
-pub const TIMES: u32 = 8;
+use super::Verb;
+use super::line::VerbLine;
+use super::table::typed;
 
 /// Reads a line.
 ///
@@ -18,115 +11,18 @@ pub const TIMES: u32 = 8;
 pub fn parse(line: &str) -> Result<Verb, String> {
     let line = line.trim();
     let (verb, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(verb, rest)| (verb, rest.trim()));
-    let number = |text: &str| text.parse::<u32>().map_err(|_| format!("{verb}: {text:?} is not a number"));
-    let count = || if rest.is_empty() { Ok(1) } else { number(rest) };
-    let text = || match rest {
-        "" => Err(format!("{verb}: what? say it after the verb")),
-        text => Ok(text.to_string()),
-    };
-    match verb {
-        "run" => Ok(Verb::ToggleRun),
-        "continue" | "c" => Ok(Verb::Continue),
-        "step" | "s" => Ok(Verb::Step(count()?)),
-        "do" => act(rest),
-        "instruct" | "i" => Ok(Verb::Instruct(text()?)),
-        "back" => Ok(Verb::Back(count()?)),
-        "forward" => Ok(Verb::Forward(count()?)),
-        "seek" => Ok(Verb::Seek(number(rest)?)),
-        "last" => Ok(Verb::Last),
-        "event" if rest == "before" => Ok(Verb::LastEvent),
-        "event" => Ok(Verb::NextEvent),
-        "subtask" => Ok(Verb::Subtask(number(rest)?)),
-        "branch" => Ok(Verb::Branch(text()?)),
-        "branches" => Ok(Verb::Branches),
-        "name" => Ok(Verb::Name(text()?)),
-        "diverge" => Ok(Verb::Diverge(text()?)),
-        "break" if rest.is_empty() => Ok(Verb::Break(None)),
-        "break" => Ok(Verb::Break(Some(Condition::parse(rest)?))),
-        "until" => Ok(Verb::Until(Condition::parse(rest)?)),
-        "policy" => PolicyKind::ALL
-            .into_iter()
-            .find(|kind| kind.name() == rest)
-            .map(Verb::Policy)
-            .ok_or_else(|| format!("policy: {rest:?} is none of agent, expert, random")),
-        "checkpoint" => Ok(Verb::Checkpoint(text()?)),
-        "sample" => rest.parse().map(Verb::Sample).map_err(|_| format!("sample: {rest:?} is not a seed")),
-        "greedy" => Ok(Verb::Greedy),
-        "compare" | "ab" => Ok(Verb::Compare(text()?)),
-        "swap" => Ok(Verb::Swap),
-        "chain" => Ok(Verb::Chain(rest.to_string())),
-        "against" => Ok(Verb::Against(text()?)),
-        "links" => {
-            Ok(Verb::WhichLink(Draws { times: if rest.is_empty() { TIMES } else { number(rest)? }, only: None }))
-        }
-        "link" => {
-            let (link, times) = rest.split_once(' ').unwrap_or((rest, ""));
-            let only = number(link)?.checked_sub(1).ok_or("link: links are numbered from 1")?;
-            let times = if times.is_empty() { TIMES } else { number(times.trim())? };
-            Ok(Verb::WhichLink(Draws { times, only: Some(only as usize) }))
-        }
-        "heading" if rest == "best" => Ok(Verb::Facing(None)),
-        "heading" => match Heading::ALL.into_iter().find(|heading| heading.name() == rest) {
-            Some(heading) => Ok(Verb::Facing(Some(heading))),
-            None => Err(format!("heading: {rest:?} is none of best, north, east, south, west")),
-        },
-        "mouse" => Ok(Verb::Mouse),
-        "faster" => Ok(Verb::Faster),
-        "slower" => Ok(Verb::Slower),
-        "manual" => Ok(Verb::ToggleManual),
-        "page" => page(rest),
-        "graphics" => Ok(Verb::Graphics),
-        "overlay" => Ok(Verb::Overlay),
-        "numbers" => Ok(Verb::Labels),
-        "sort" => Ok(Verb::Sort),
-        "values" => Ok(Verb::ValueMap),
-        "stop" => Ok(Verb::Stop),
-        "save" => Ok(Verb::Save((!rest.is_empty()).then(|| PathBuf::from(rest)))),
-        "task" => Ok(Verb::SaveTask(text()?.into())),
-        "export" => Ok(Verb::Export(text()?.into())),
-        "reset" => Ok(Verb::Reset),
-        "next" => Ok(Verb::Next),
-        "seed" => rest.parse().map(Verb::Seed).map_err(|_| format!("seed: {rest:?} is not a number")),
-        "look" => Ok(Verb::Look),
-        "candidates" => Ok(Verb::Candidates),
-        "think" => Ok(Verb::Think),
-        "bandwidth" => Ok(Verb::Bandwidth(number(rest)?)),
-        "frame" => Ok(Verb::FullFrame),
-        "copy" => Ok(Verb::Copy),
-        "help" | "?" => Ok(Verb::Help),
-        "quit" | "q" | "exit" => Ok(Verb::Quit),
-        _ => Err(format!("unknown verb {verb:?}; `help` lists the verbs")),
-    }
-}
-
-fn page(name: &str) -> Result<Verb, String> {
-    const PAGES: [(&str, Page); 6] = [
-        ("panels", Page::Main),
-        ("branches", Page::Branches),
-        ("mind", Page::Mind),
-        ("world", Page::World),
-        ("compare", Page::Compare),
-        ("chain", Page::Chain),
-    ];
-    let found = PAGES.iter().find(|(known, _)| *known == name);
-    found.map(|(_, page)| Verb::Show(*page)).ok_or_else(|| {
-        let names: Vec<&str> = PAGES.iter().map(|(name, _)| *name).collect();
-        format!("page: {name:?} is none of {}", names.join(", "))
-    })
-}
-
-fn act(rest: &str) -> Result<Verb, String> {
-    match ActionType::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(rest)) {
-        Some(kind) if kind.is_interaction() => Err(format!("do: {kind} needs a number from `candidates`")),
-        Some(kind) => Ok(Verb::Navigate(kind)),
-        None => rest.parse().map(Verb::Interact).map_err(|_| format!("do: {rest:?} is neither a number nor an action")),
-    }
+    let entry = typed().find(|entry| entry.name == verb || entry.aliases.contains(&verb));
+    let entry = entry.ok_or_else(|| format!("unknown verb {verb:?}; `help` lists the verbs"))?;
+    (entry.read)(&VerbLine { verb, rest })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explore::verb::SAID;
+    use crate::analysis::chain::Draws;
+    use crate::domain::{Action, ActionType};
+    use crate::explore::breakpoints::Condition;
+    use crate::explore::session::SessionCommand;
 
     /// Something that may follow a verb.
     fn example(arguments: &str) -> &'static str {
@@ -144,25 +40,31 @@ mod tests {
 
     #[test]
     fn lines_are_read_as_verbs_and_mistakes_are_named() {
+        let ask = |command| Ok(Verb::Ask(command));
         assert_eq!(parse("step"), Ok(Verb::Step(1)));
         assert_eq!(parse(" step 12 "), Ok(Verb::Step(12)));
-        assert_eq!(parse("do moveahead"), Ok(Verb::Navigate(ActionType::MoveAhead)));
+        assert_eq!(parse("s"), Ok(Verb::Step(1)));
+        assert_eq!(parse("do moveahead"), ask(SessionCommand::Act(Action::navigate(ActionType::MoveAhead))));
         assert_eq!(parse("do 3"), Ok(Verb::Interact(3)));
-        assert_eq!(parse("instruct  put the mug away"), Ok(Verb::Instruct("put the mug away".into())));
-        assert_eq!(parse("break entropy 1.5"), Ok(Verb::Break(Some(Condition::Entropy(1.5)))));
-        assert_eq!(parse("break"), Ok(Verb::Break(None)));
-        assert_eq!(parse("save"), Ok(Verb::Save(None)));
+        assert_eq!(parse("instruct  put the mug away"), ask(SessionCommand::Instruct("put the mug away".into())));
+        assert_eq!(parse("break entropy 1.5"), ask(SessionCommand::Break(Some(Condition::Entropy(1.5)))));
+        assert_eq!(parse("break"), ask(SessionCommand::Break(None)));
+        assert_eq!(parse("save"), ask(SessionCommand::Save(None)));
+        assert_eq!(parse("link 2 4"), ask(SessionCommand::WhichLink(Draws { times: 4, only: Some(1) })));
         assert!(parse("do pickup").unwrap_err().contains("candidates"));
         assert!(parse("step many").unwrap_err().contains("many"));
         assert!(parse("dance").unwrap_err().contains("dance"));
         assert!(parse("name").unwrap_err().contains("what?"));
+        assert!(parse("select 1").is_err(), "keys alone do that");
     }
 
     #[test]
     fn every_listed_verb_can_be_read() {
-        for said in SAID {
-            let argument = example(said.arguments);
-            assert!(parse(&format!("{} {argument}", said.name)).is_ok(), "{}", said.name);
+        for entry in typed() {
+            let argument = example(entry.arguments);
+            for name in std::iter::once(&entry.name).chain(entry.aliases) {
+                assert!(parse(&format!("{name} {argument}")).is_ok(), "{name}");
+            }
         }
     }
 }

@@ -2,27 +2,28 @@
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
-use super::{Job, Picture};
+use super::job::Job;
+use super::picture::Picture;
 
 /// A place for one job: a newer one replaces it.
 #[derive(Default)]
-struct Slot {
+struct WaitingJob {
     job: Option<Job>,
     closed: bool,
 }
 
 /// Hands frames to the encoding thread; the thread ends when this is dropped.
-pub struct Encoder {
-    slot: Arc<(Mutex<Slot>, Condvar)>,
+pub struct PictureEncoder {
+    slot: Arc<(Mutex<WaitingJob>, Condvar)>,
 }
 
-impl Encoder {
+impl PictureEncoder {
     /// Starts the thread; finished pictures go to `deliver`, which says whether anybody still wants them.
     ///
     /// # Errors
     /// When the system has no thread left.
-    pub fn start(deliver: impl Fn(Picture) -> bool + Send + 'static) -> std::io::Result<Encoder> {
-        let slot = Arc::new((Mutex::new(Slot::default()), Condvar::new()));
+    pub fn start(deliver: impl Fn(Picture) -> bool + Send + 'static) -> std::io::Result<PictureEncoder> {
+        let slot = Arc::new((Mutex::new(WaitingJob::default()), Condvar::new()));
         let shared = slot.clone();
         std::thread::Builder::new().name("encoder".into()).spawn(move || {
             while let Some(job) = take(&shared) {
@@ -31,7 +32,7 @@ impl Encoder {
                 }
             }
         })?;
-        Ok(Encoder { slot })
+        Ok(PictureEncoder { slot })
     }
 
     /// Leaves a frame to be encoded, in place of one that still waits.
@@ -42,7 +43,7 @@ impl Encoder {
     }
 }
 
-impl Drop for Encoder {
+impl Drop for PictureEncoder {
     fn drop(&mut self) {
         let (slot, filled) = &*self.slot;
         slot.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
@@ -51,7 +52,7 @@ impl Drop for Encoder {
 }
 
 /// Waits for a job; `None` when no more will come.
-fn take(shared: &(Mutex<Slot>, Condvar)) -> Option<Job> {
+fn take(shared: &(Mutex<WaitingJob>, Condvar)) -> Option<Job> {
     let (slot, filled) = shared;
     let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
     loop {

@@ -5,7 +5,8 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::{Job, labels};
+use super::job::Job;
+use super::labels::over_pixels;
 
 /// The number under which kitty keeps the frame; each new frame replaces the one before.
 pub const KITTY_ID: u8 = 83;
@@ -57,7 +58,7 @@ pub fn iterm2(job: &Job) -> String {
 }
 
 fn png(job: &Job) -> Vec<u8> {
-    let pixels = labels::over_pixels(job);
+    let pixels = over_pixels(&job.labels, &job.frame);
     let mut data = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut data, CompressionType::Default, FilterType::Adaptive);
     let (width, height) = (job.frame.width as u32, job.frame.height as u32);

@@ -3,14 +3,15 @@
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_9X15_BOLD};
 use embedded_graphics::prelude::{Point, Primitive, Size};
 use embedded_graphics::primitives::{PrimitiveStyle, PrimitiveStyleBuilder, Rectangle, StrokeAlignment};
+use ratatui::layout::Size as Cells;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::Job;
+use crate::house::view::Frame;
 use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 
 /// A numbered thing in the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Label {
+pub struct ThingLabel {
     /// Its edges in the frame: left, top, right, bottom, in pixels.
     pub bounds: [u16; 4],
     /// The numbers of the interactions with it, and its name where there is room: `1`, or `1,4 mug`.
@@ -23,15 +24,15 @@ const PLAIN: RgbColour = [255, 255, 255];
 const CHOSEN: RgbColour = [255, 214, 0];
 const INK: RgbColour = [0, 0, 0];
 
-fn colour(label: &Label) -> RgbColour {
+fn colour(label: &ThingLabel) -> RgbColour {
     if label.chosen { CHOSEN } else { PLAIN }
 }
 
 /// Writes the labels over character cells, each in the middle of its thing.
-pub fn over_cells(job: &Job, cells: &mut [(char, Style)]) {
-    let (columns, rows) = (usize::from(job.cells.width), usize::from(job.cells.height));
-    let (width, height) = (job.frame.width.max(1), job.frame.height.max(1));
-    for label in &job.labels {
+pub fn over_cells(labels: &[ThingLabel], frame: &Frame, size: Cells, cells: &mut [(char, Style)]) {
+    let (columns, rows) = (usize::from(size.width), usize::from(size.height));
+    let (width, height) = (frame.width.max(1), frame.height.max(1));
+    for label in labels {
         let [left, top, right, bottom] = label.bounds.map(usize::from);
         let row = ((top + bottom) / 2 * rows / height).min(rows.saturating_sub(1));
         let text = format!(" {} ", label.text);
@@ -49,9 +50,9 @@ pub fn over_cells(job: &Job, cells: &mut [(char, Style)]) {
 }
 
 /// Draws the labels into a copy of the frame's pixels: an outline for each thing, and its numbers on a plate.
-pub fn over_pixels(job: &Job) -> Vec<u8> {
-    let mut pixmap = Pixmap { rgb: job.frame.rgb.clone(), width: job.frame.width, height: job.frame.height };
-    for label in &job.labels {
+pub fn over_pixels(labels: &[ThingLabel], frame: &Frame) -> Vec<u8> {
+    let mut pixmap = Pixmap { rgb: frame.rgb.clone(), width: frame.width, height: frame.height };
+    for label in labels {
         let [left, top, right, bottom] = label.bounds.map(i32::from);
         let outline = Rectangle::with_corners(Point::new(left, top), Point::new(right, bottom));
         let style = PrimitiveStyleBuilder::new()
@@ -61,14 +62,14 @@ pub fn over_pixels(job: &Job) -> Vec<u8> {
             .build();
         pixmap.draw(&outline.into_styled(style));
     }
-    for label in &job.labels {
+    for label in labels {
         plate(&mut pixmap, label);
     }
     pixmap.rgb
 }
 
 /// Writes a label's text on a plate in the middle of its thing.
-fn plate(pixmap: &mut Pixmap, label: &Label) {
+fn plate(pixmap: &mut Pixmap, label: &ThingLabel) {
     let (font, margin) = if label.text.len() <= 3 { (&FONT_9X15_BOLD, 2) } else { (&FONT_6X10, 1) };
     let letter = font.character_size;
     let width = label.text.chars().count() as i32 * letter.width as i32 + 2 * margin;

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::Job;
 use crate::house::view::Frame;
 
 /// What the frame's panel shows.
@@ -44,18 +43,18 @@ impl Overlay {
 /// Distances that the depth view tells apart end here, in metres.
 const FARTHEST: f32 = 5.0;
 
-/// The frame that a job shows under its overlay.
-pub fn shown(job: &Job) -> Arc<Frame> {
-    match job.overlay {
-        Overlay::Colour => job.frame.clone(),
-        Overlay::Depth => painted(&job.frame, |frame, at| {
+/// What an overlay shows of a frame and those before it.
+pub fn shown(overlay: Overlay, frame: &Arc<Frame>, before: &[Arc<Frame>]) -> Arc<Frame> {
+    match overlay {
+        Overlay::Colour => frame.clone(),
+        Overlay::Depth => painted(frame, |frame, at| {
             let near = 1.0 - (frame.depth[at] / FARTHEST).clamp(0.0, 1.0);
             // Light and warm is near, dark and blue far: both can be told without colours.
             let level = |low: f32, high: f32| (low + (high - low) * near) as u8;
             [level(16.0, 255.0), level(24.0, 236.0), level(64.0, 190.0)]
         }),
-        Overlay::Things => painted(&job.frame, |frame, at| tint(frame.ids[at])),
-        Overlay::Frames => Arc::new(mosaic(&job.frame, &job.recent)),
+        Overlay::Things => painted(frame, |frame, at| tint(frame.ids[at])),
+        Overlay::Frames => Arc::new(mosaic(frame, before)),
     }
 }
 

@@ -3,7 +3,8 @@
 
 use std::fmt::Write;
 
-use super::{Job, labels};
+use super::job::Job;
+use super::labels::over_pixels;
 
 /// Levels of red, green and blue in the cube.
 const LEVELS: usize = 6;
@@ -20,7 +21,7 @@ const BAND: usize = 6;
 pub fn draw(job: &Job) -> String {
     let (across, down) = (usize::from(job.cell_pixels.0.max(1)), usize::from(job.cell_pixels.1.max(1)));
     let (width, height) = (usize::from(job.cells.width) * across, usize::from(job.cells.height) * down);
-    encode(&labels::over_pixels(job), job.frame.width, job.frame.height, width, height)
+    encode(&over_pixels(&job.labels, &job.frame), job.frame.width, job.frame.height, width, height)
 }
 
 /// Encodes pixels (three bytes each) of one size at another.

@@ -1,62 +1,48 @@
 //! Lines that are typed over the screen: instructions and verbs.
 
-use super::Effect;
-use super::on_action::perform;
+use super::effect::Effect;
 use crate::explore::verb;
+use crate::explore::verb::Verb;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
 
-/// Opens a line or list over the screen; what keys meant before comes back when it closes.
-pub(super) fn open_line(app: &mut App, mode: Mode) {
-    if matches!(app.mode, Mode::Watch | Mode::Manual) {
-        app.under = app.mode;
-    }
-    app.mode = mode;
-}
-
 /// A picture that floats over the cells has to be drawn anew when something covers or uncovers it.
 pub(super) fn uncover(app: &App) -> Vec<Effect> {
-    if app.graphics.protocol.floats() { vec![Effect::Repaint] } else { vec![] }
+    if app.terminal.graphics.protocol.floats() { vec![Effect::Repaint] } else { vec![] }
 }
 
-/// Does what was typed in the palette, or fills in the verb that is selected there.
-pub(super) fn obey_line(app: &mut App) -> Vec<Effect> {
-    let line = app.palette.text().trim().to_string();
-    match verb::parse(&line) {
-        Ok(verb) => {
-            app.mode = app.under;
-            let mut effects = uncover(app);
-            effects.extend(perform(app, verb));
-            effects
-        }
-        Err(complaint) => {
-            match verb::matching(&line).get(app.selected) {
-                Some(said) if !line.contains(' ') && said.name != line => {
-                    app.palette.open(said.name);
-                    if said.arguments.is_empty() {
-                        return obey_line(app);
-                    }
-                    app.palette.open(&format!("{} ", said.name));
-                }
-                _ => app.note(Tone::Bad, complaint),
+/// The verb that was typed in the palette; without a whole one, the one that is selected there is filled in first.
+pub(super) fn read_palette(app: &mut App) -> Option<Verb> {
+    let line = app.input.palette.text().trim().to_string();
+    let complaint = match verb::parse(&line) {
+        Ok(verb) => return Some(verb),
+        Err(complaint) => complaint,
+    };
+    match verb::matching(&line).get(app.input.selected_verb) {
+        Some(entry) if !line.contains(' ') && entry.name != line => {
+            app.input.palette.open(entry.name);
+            if entry.arguments.is_empty() {
+                return read_palette(app);
             }
-            vec![]
+            app.input.palette.open(&format!("{} ", entry.name));
         }
+        _ => app.note(Tone::Bad, complaint),
     }
+    None
 }
 
 /// Fills in what the typed text begins.
 pub(super) fn complete(app: &mut App) {
-    match app.mode {
+    match app.input.mode {
         Mode::Palette => {
-            if let Some(said) = verb::matching(app.palette.text()).get(app.selected) {
-                app.palette.open(&format!("{} ", said.name));
+            if let Some(entry) = verb::matching(app.input.palette.text()).get(app.input.selected_verb) {
+                app.input.palette.open(&format!("{} ", entry.name));
             }
         }
         _ => {
             if let Some(whole) = app.completions().first() {
-                app.editor.open(whole);
+                app.input.editor.open(whole);
             }
         }
     }

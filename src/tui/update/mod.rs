@@ -1,24 +1,25 @@
 //! The one function that changes the explorer's state: a message in, effects out. No IO.
 
+mod effect;
+mod lines;
 mod on_action;
 mod on_event;
-mod lines;
 mod pages;
 mod pointer;
-mod travel;
 
-pub use on_action::perform;
+pub use effect::{Effect, ExitReason};
+pub use on_action::on_action;
 
 use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
 use ratatui::layout::Size;
 
+use crate::explore::session::SessionEvent;
 use crate::explore::verb::Verb;
-use crate::explore::worker::{Command, Report};
 use crate::tui::app::App;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
-use on_event::hear;
+use on_event::on_event;
 
 /// Something that happened.
 #[derive(Clone)]
@@ -31,41 +32,11 @@ pub enum Msg {
     Paste(String),
     /// The terminal has another size.
     Resize(Size),
-    /// The worker has something to say.
-    Report(Report),
+    /// The session tells something.
+    Session(SessionEvent),
     /// A frame was encoded.
     Picture(Picture),
     /// A signal asks the program to end.
-    Signal(i32),
-    /// The worker stopped.
-    WorkerGone,
-}
-
-/// Something to be done about it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
-    /// Ask the worker.
-    Send(Command),
-    /// Encode the frame again.
-    Encode,
-    /// Draw the whole screen again.
-    Repaint,
-    /// Put text on the terminal's clipboard.
-    Copy(String),
-    /// Keep an instruction for later sessions.
-    Remember(String),
-    /// Hear the mouse, or no longer.
-    Mouse(bool),
-    /// End.
-    Quit(Farewell),
-}
-
-/// How the explorer ends.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Farewell {
-    /// The person wanted to.
-    Asked,
-    /// A signal of that number came.
     Signal(i32),
     /// The worker stopped.
     WorkerGone,
@@ -75,15 +46,15 @@ pub enum Farewell {
 pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
-        Msg::Mouse(event) => pointer::heed(app, event),
-        Msg::Key(key) => match welcomed(app, key).or_else(|| keys::verb(app.mode, app.page, key)) {
-            Some(verb) => perform(app, verb),
+        Msg::Mouse(event) => pointer::on_pointer(app, event),
+        Msg::Key(key) => match key_after_notice(app, key).or_else(|| keys::verb(app.input.mode, app.page, key)) {
+            Some(verb) => on_action(app, verb),
             None => {
-                match app.mode {
-                    Mode::Typing => app.editor.key(key),
+                match app.input.mode {
+                    Mode::Typing => app.input.editor.key(key),
                     Mode::Palette => {
-                        app.palette.key(key);
-                        app.selected = 0;
+                        app.input.palette.key(key);
+                        app.input.selected_verb = 0;
                     }
                     Mode::Watch | Mode::Manual | Mode::Help => {}
                 }
@@ -91,51 +62,47 @@ pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
             }
         },
         Msg::Paste(text) => {
-            if app.mode == Mode::Palette {
-                app.palette.paste(&text);
+            if app.input.mode == Mode::Palette {
+                app.input.palette.paste(&text);
                 return vec![];
             }
             let mut effects = vec![];
-            if app.mode != Mode::Typing {
-                effects = perform(app, Verb::Edit);
-                app.editor.open("");
+            if app.input.mode != Mode::Typing {
+                effects = on_action(app, Verb::Edit);
+                app.input.editor.open("");
             }
-            app.editor.paste(&text);
+            app.input.editor.paste(&text);
             effects
         }
         Msg::Resize(size) => {
-            app.size = size;
-            app.picture = None;
-            app.page_of_interactions = 0;
+            app.terminal.size = size;
+            app.frame.picture = None;
+            app.main.interactions = 0;
             vec![Effect::Encode, Effect::Repaint]
         }
-        Msg::Report(report) => hear(app, report),
+        Msg::Session(event) => on_event(app, event),
         Msg::Picture(picture) => {
             let fits = app.picture_area().is_some_and(|area| area.as_size() == picture.cells);
-            if fits && picture.protocol == app.graphics.protocol {
-                app.picture = Some(picture);
+            if fits && picture.protocol == app.terminal.graphics.protocol {
+                app.frame.picture = Some(picture);
             }
             vec![]
         }
-        Msg::Signal(number) => vec![Effect::Quit(Farewell::Signal(number))],
-        Msg::WorkerGone => vec![Effect::Quit(Farewell::WorkerGone)],
+        Msg::Signal(number) => vec![Effect::Quit(ExitReason::Signal(number))],
+        Msg::WorkerGone => vec![Effect::Quit(ExitReason::WorkerGone)],
     }
 }
 
 /// Whoever presses a key knows what keys are for, and has read what was noted.
-fn welcomed(app: &mut App, key: KeyEvent) -> Option<Verb> {
-    app.newcomer = false;
+fn key_after_notice(app: &mut App, key: KeyEvent) -> Option<Verb> {
+    app.input.newcomer = false;
     app.notice = None;
-    own(app, key)
+    key_by_settings(app, key)
 }
 
 /// What a key means by the person's own settings, while keys are no text.
-fn own(app: &App, key: KeyEvent) -> Option<Verb> {
-    matches!(app.mode, Mode::Watch | Mode::Manual).then(|| app.config.verb(key)).flatten()
-}
-
-fn send(command: Command) -> Vec<Effect> {
-    vec![Effect::Send(command)]
+fn key_by_settings(app: &App, key: KeyEvent) -> Option<Verb> {
+    matches!(app.input.mode, Mode::Watch | Mode::Manual).then(|| app.config.verb(key)).flatten()
 }
 
 #[cfg(test)]
@@ -144,8 +111,8 @@ mod tests {
 
     use super::*;
     use crate::domain::{Action, ActionType};
-    use crate::explore::session::Event;
-    use crate::explore::worker::Going;
+    use crate::explore::exploration::StepTaken;
+    use crate::explore::session::{RunMode, SessionCommand};
     use crate::house::{Outcome, Reason};
     use crate::tui::graphics::Protocol;
     use crate::tui::log::Tone;
@@ -169,30 +136,36 @@ mod tests {
     #[test]
     fn space_runs_and_pauses() {
         let mut app = app();
-        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Go(Some(Going::Policy)))]);
-        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
-        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(Command::Go(None))]);
+        assert_eq!(
+            press(&mut app, KeyCode::Char(' ')),
+            [Effect::Send(SessionCommand::Run { mode: RunMode::Policy, until: None })]
+        );
+        update(&mut app, Msg::Session(SessionEvent::Running(Some(RunMode::Policy))));
+        assert_eq!(press(&mut app, KeyCode::Char(' ')), [Effect::Send(SessionCommand::Pause)]);
     }
 
     #[test]
     fn an_instruction_is_typed_while_the_agent_runs_and_applies_on_enter() {
         let mut app = app();
-        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        update(&mut app, Msg::Session(SessionEvent::Running(Some(RunMode::Policy))));
         press(&mut app, KeyCode::Char('i'));
         type_text(&mut app, "quit nothing, 1 mug");
-        assert!(app.going.is_some(), "typing does not stop the agent");
-        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Instruct("quit nothing, 1 mug".into()))]);
-        assert_eq!(app.mode, Mode::Watch);
+        assert!(app.session.run_mode.is_some(), "typing does not stop the agent");
+        assert_eq!(
+            press(&mut app, KeyCode::Enter),
+            [Effect::Send(SessionCommand::Instruct("quit nothing, 1 mug".into()))]
+        );
+        assert_eq!(app.input.mode, Mode::Watch);
     }
 
     #[test]
     fn escape_leaves_the_instruction_as_it_was() {
         let mut app = app();
-        perform(&mut app, Verb::ToggleManual);
+        on_action(&mut app, Verb::ToggleManual);
         press(&mut app, KeyCode::Char('/'));
         type_text(&mut app, "no");
         assert_eq!(press(&mut app, KeyCode::Esc), []);
-        assert_eq!(app.mode, Mode::Manual, "typing goes back to where it came from");
+        assert_eq!(app.input.mode, Mode::Manual, "typing goes back to where it came from");
         press(&mut app, KeyCode::Char('i'));
         assert_eq!(press(&mut app, KeyCode::Enter), [], "nothing typed changes nothing");
     }
@@ -201,13 +174,13 @@ mod tests {
     fn the_worker_says_what_an_instruction_replaced() {
         let mut app = app();
         let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
-        update(&mut app, Msg::Report(Report::Instructed { old, new, note: "the task no longer applies" }));
-        assert_eq!(app.replaced.as_deref(), Some("put the mug in the sink"));
+        update(&mut app, Msg::Session(SessionEvent::Instructed { old, new, note: "the task no longer applies" }));
+        assert_eq!(app.session.replaced.as_deref(), Some("put the mug in the sink"));
         assert!(app.log.entries().next_back().unwrap().text.contains("open the fridge (the task no longer applies)"));
         press(&mut app, KeyCode::Char('i'));
         press(&mut app, KeyCode::Up);
         press(&mut app, KeyCode::Up);
-        assert_eq!(app.editor.text(), "put the mug in the sink", "the history begins with the task's words");
+        assert_eq!(app.input.editor.text(), "put the mug in the sink", "the history begins with the task's words");
     }
 
     #[test]
@@ -215,7 +188,7 @@ mod tests {
         let mut app = app();
         let fridge = testing::instance(&app, "Fridge");
         let open = Action::interact(ActionType::Open, fridge);
-        assert_eq!(press(&mut app, KeyCode::Char('3')), [Effect::Send(Command::Act(open))]);
+        assert_eq!(press(&mut app, KeyCode::Char('3')), [Effect::Send(SessionCommand::Act(open))]);
         assert_eq!(press(&mut app, KeyCode::Char('4')), []);
         assert!(app.log.entries().next_back().unwrap().text.contains("no interaction has the number 4"));
     }
@@ -223,25 +196,28 @@ mod tests {
     #[test]
     fn taking_over_stops_the_policy_and_arrows_move() {
         let mut app = app();
-        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
-        assert_eq!(press(&mut app, KeyCode::Char('m')), [Effect::Send(Command::Go(None))]);
+        update(&mut app, Msg::Session(SessionEvent::Running(Some(RunMode::Policy))));
+        assert_eq!(press(&mut app, KeyCode::Char('m')), [Effect::Send(SessionCommand::Pause)]);
         let ahead = Action::navigate(ActionType::MoveAhead);
-        assert_eq!(press(&mut app, KeyCode::Up), [Effect::Send(Command::Act(ahead))]);
-        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(Command::Step)], "the policy's choice");
+        assert_eq!(press(&mut app, KeyCode::Up), [Effect::Send(SessionCommand::Act(ahead))]);
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(SessionCommand::Step)], "the policy's choice");
     }
 
     #[test]
     fn outcomes_are_told_in_words() {
         let mut app = app();
-        let event = Event {
+        let step = StepTaken {
             step: 1,
             action: "MoveAhead".into(),
             outcome: Outcome::Impossible(Reason::Blocked),
             by_hand: true,
             completed: None,
             forked: None,
+            distribution: None,
+            progress: None,
+            end: None,
         };
-        update(&mut app, Msg::Report(Report::Stepped(event)));
+        update(&mut app, Msg::Session(SessionEvent::Stepped(Box::new(step))));
         let entry = app.log.entries().next_back().unwrap();
         assert_eq!((entry.text.as_str(), entry.outcome.as_str()), ("MoveAhead (you)", "something is in the way"));
         assert_eq!(entry.tone, Tone::Impossible);
@@ -253,11 +229,11 @@ mod tests {
         let stale = Picture::encode(&app.job().unwrap());
         update(&mut app, Msg::Resize(Size { width: 80, height: 24 }));
         update(&mut app, Msg::Picture(stale));
-        assert!(app.picture.is_none());
+        assert!(app.frame.picture.is_none());
         let stale = Picture::encode(&app.job().unwrap());
-        assert!(perform(&mut app, Verb::Graphics).contains(&Effect::Repaint));
+        assert!(on_action(&mut app, Verb::Graphics).contains(&Effect::Repaint));
         update(&mut app, Msg::Picture(stale));
-        assert!(app.picture.is_none());
+        assert!(app.frame.picture.is_none());
     }
 
     #[test]
@@ -266,7 +242,7 @@ mod tests {
         let labels = app.job().unwrap().labels;
         assert_eq!(labels.iter().map(|label| label.text.as_str()).collect::<Vec<_>>(), ["2", "3", "1"]);
         assert!(labels[2].chosen, "what the policy is about to act on comes last, over the others");
-        update(&mut app, Msg::Report(Report::Going(Some(Going::Policy))));
+        update(&mut app, Msg::Session(SessionEvent::Running(Some(RunMode::Policy))));
         assert!(app.job().unwrap().labels.is_empty());
     }
 
@@ -275,7 +251,7 @@ mod tests {
         for (width, height) in [(1, 1), (10, 3), (79, 24), (80, 24), (97, 31), (200, 60), (300, 40), (80, 90)] {
             for protocol in Protocol::ALL {
                 let mut app = testing::app(width, height, protocol, Ability::FULL);
-                perform(&mut app, Verb::Help);
+                on_action(&mut app, Verb::Help);
                 testing::screen(&mut app);
             }
         }

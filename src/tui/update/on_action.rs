@@ -1,252 +1,223 @@
 //! What a person asked for, done.
 
-use super::lines::{complete, obey_line, open_line, uncover};
+use super::effect::{Effect, ExitReason, send};
+use super::lines::{complete, read_palette, uncover};
 use super::pages::{select, show, turn_to};
-use super::travel::{go_on, travel};
-use super::{Effect, Farewell, send};
-use crate::agent::registry::PolicyKind;
 use crate::analysis::chain::Draws;
-use crate::domain::{Action, Heading};
+use crate::domain::Heading;
+use crate::explore::session::{RunMode, SessionCommand, StepRate};
 use crate::explore::verb;
-use crate::explore::verb::{Page, TIMES, Verb};
-use crate::explore::worker::{Command, Going, Pace};
+use crate::explore::verb::{DRAWS, ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
 
 /// Does what a person asked for.
-pub fn perform(app: &mut App, verb: Verb) -> Vec<Effect> {
+pub fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
     match verb {
-        Verb::ToggleRun | Verb::Continue => go_on(app, verb == Verb::Continue),
-        Verb::Step(count @ 2..) => send(Command::Go(Some(Going::Steps(count)))),
-        Verb::Step(_) => send(Command::Step),
-        Verb::Faster => pace(app, app.pace.faster()),
-        Verb::Slower => pace(app, app.pace.slower()),
-        Verb::Reset => send(Command::Reset),
-        Verb::Next => send(Command::Next),
-        Verb::Seed(seed) => send(Command::Seed(seed)),
-        Verb::Policy(kind) => choose(app, kind),
-        Verb::NextPolicy => choose(app, app.policy.next()),
-        Verb::Checkpoint(wanted) => send(Command::Checkpoint(wanted)),
-        Verb::Sample(seed) => send(Command::Reseed(seed, true)),
-        Verb::Greedy => send(Command::Reseed(app.now.as_ref().map_or(0, |now| now.seed), false)),
-        Verb::Navigate(kind) => send(Command::Act(Action::navigate(kind))),
-        Verb::Interact(number) => {
-            let candidate = app.page_of_candidates().get(usize::from(number).wrapping_sub(1)).copied();
-            match candidate {
-                Some(candidate) => send(Command::Act(candidate.action())),
-                None => {
-                    app.note(Tone::Note, format!("no interaction has the number {number} now"));
-                    vec![]
-                }
-            }
-        }
-        Verb::Page => {
-            app.page_of_interactions = (app.page_of_interactions + 1) % app.pages().max(1);
+        Verb::Ask(command) => ask(app, command),
+        Verb::ToggleRun | Verb::Continue => run(app, verb == Verb::Continue),
+        Verb::Until(condition) => send(SessionCommand::Run { mode: RunMode::Policy, until: Some(condition) }),
+        Verb::Step(count @ 2..) => send(SessionCommand::Run { mode: RunMode::Steps(count), until: None }),
+        Verb::Step(_) => send(SessionCommand::Step),
+        // Relative: more keys may come than states are shown. At the branch's end a step forward is the policy's.
+        Verb::Back(steps) => send(SessionCommand::Along { by: -(steps as i32), steps: true }),
+        Verb::Forward(steps) => send(SessionCommand::Along { by: steps as i32, steps: true }),
+        Verb::Faster => set_rate(app, app.session.rate.faster()),
+        Verb::Slower => set_rate(app, app.session.rate.slower()),
+        Verb::NextPolicy => ask(app, SessionCommand::Choose(app.session.policy.next())),
+        Verb::Interact(number) => interact(app, number),
+        Verb::NextInteractions => {
+            app.main.interactions = (app.main.interactions + 1) % app.pages().max(1);
             vec![Effect::Encode]
         }
         Verb::ToggleManual => {
-            let mut effects = turn_to(app, Page::Main);
-            app.mode = if app.mode == Mode::Manual { Mode::Watch } else { Mode::Manual };
-            effects.extend(app.going.map(|_| Effect::Send(Command::Go(None))));
+            let mut effects = turn_to(app, ExplorerPage::Main);
+            app.input.mode = if app.input.mode == Mode::Manual { Mode::Watch } else { Mode::Manual };
+            effects.extend(app.session.run_mode.map(|_| Effect::Send(SessionCommand::Pause)));
             effects
         }
-        Verb::Instruct(text) => send(Command::Instruct(text)),
-        Verb::Back(_)
-        | Verb::Forward(_)
-        | Verb::Seek(_)
-        | Verb::Last
-        | Verb::NextEvent
-        | Verb::LastEvent
-        | Verb::Subtask(_) => travel(app, &verb),
-        Verb::NextBranch => {
-            let Some(time) = app.now.as_ref().map(|now| now.time.clone()) else { return vec![] };
-            send(Command::Switch(((time.branch + 1) % time.branches.len().max(1) + 1).to_string()))
-        }
-        Verb::Branch(wanted) => send(Command::Switch(wanted)),
-        Verb::Name(name) => send(Command::Rename(name)),
-        Verb::Diverge(wanted) => {
-            let mut effects = turn_to(app, Page::Branches);
-            effects.push(Effect::Send(Command::Diverge(wanted)));
-            effects
-        }
-        Verb::Break(condition) => {
-            match condition {
-                None => app.breaks.clear(),
-                Some(condition) if app.breaks.contains(&condition) => app.breaks.retain(|known| *known != condition),
-                Some(condition) => app.breaks.push(condition),
-            }
-            let all: Vec<String> = app.breaks.iter().map(ToString::to_string).collect();
-            let text =
-                if all.is_empty() { "runs stop nowhere".into() } else { format!("runs stop at: {}", all.join("; ")) };
-            app.note(Tone::Note, text);
-            send(Command::Break(app.breaks.clone()))
-        }
-        Verb::Until(condition) => send(Command::Until(condition)),
         Verb::Show(page) => show(app, page),
+        Verb::Branches => show(app, ExplorerPage::Branches),
+        Verb::Think => show(app, ExplorerPage::Mind),
+        Verb::Look | Verb::Candidates => show(app, ExplorerPage::World),
         Verb::Select(by) => select(app, by),
-        Verb::Take => match app.page {
-            Page::Branches => send(Command::Switch((app.selected + 1).to_string())),
-            _ => vec![],
-        },
-        Verb::Graphics => {
-            app.graphics.protocol = app.graphics.protocol.next();
-            app.graphics.reason = "chosen by key g".into();
-            app.picture = None;
-            vec![Effect::Encode, Effect::Repaint]
-        }
-        Verb::Overlay => {
-            app.overlay = app.overlay.next();
-            vec![Effect::Send(Command::LookBack(app.overlay == Overlay::Frames)), Effect::Encode]
-        }
+        Verb::Take => send(SessionCommand::Switch((app.branches.selected + 1).to_string())),
         Verb::Sort => {
-            app.sort = app.sort.next();
+            app.mind.sort = app.mind.sort.next();
             vec![]
         }
-        Verb::Labels => {
-            app.labels = !app.labels;
-            vec![Effect::Encode]
+        Verb::ReplayLink => {
+            let draws = Draws { times: DRAWS, only: Some(app.chain.selected) };
+            ask(app, SessionCommand::WhichLink(draws))
         }
+        Verb::ValueMap => {
+            app.value_map.toggle();
+            send(if app.value_map.is_painted { SessionCommand::ValueMap } else { SessionCommand::StopValueMap })
+        }
+        Verb::Facing(heading) => paint_heading(app, heading),
+        // The first press only paints.
+        Verb::NextHeading if !app.value_map.is_painted => paint_heading(app, app.value_map.heading),
+        Verb::NextHeading => paint_heading(app, app.value_map.next_heading()),
         Verb::Edit => {
-            open_line(app, Mode::Typing);
-            app.editor.open("");
+            app.input.open(Mode::Typing);
+            app.input.editor.open("");
             uncover(app)
         }
         Verb::Palette(text) => {
-            open_line(app, Mode::Palette);
-            app.selected = 0;
-            app.palette.open(text);
+            app.input.open(Mode::Palette);
+            app.input.selected_verb = 0;
+            app.input.palette.open(&text);
             uncover(app)
         }
         Verb::Help => {
-            open_line(app, Mode::Help);
+            app.input.open(Mode::Help);
             uncover(app)
         }
         Verb::Cancel => {
-            app.mode = app.under;
+            app.input.close();
             uncover(app)
         }
-        Verb::Apply if app.mode == Mode::Palette => obey_line(app),
-        Verb::Apply => {
-            app.mode = app.under;
-            let text = app.editor.text().trim().to_string();
-            if text.is_empty() {
-                return vec![];
-            }
-            send(Command::Instruct(text))
-        }
-        Verb::Earlier | Verb::Later if app.mode == Mode::Palette => {
-            let by = if verb == Verb::Later { 1 } else { -1 };
-            let most = verb::matching(app.palette.text()).len().saturating_sub(1);
-            app.selected = app.selected.saturating_add_signed(by).min(most);
-            vec![]
-        }
+        Verb::Apply => apply(app),
         Verb::Earlier => {
-            app.editor.travel(-1);
+            travel(app, -1);
             vec![]
         }
         Verb::Later => {
-            app.editor.travel(1);
+            travel(app, 1);
             vec![]
         }
         Verb::Complete => {
             complete(app);
             vec![]
         }
-        Verb::Branches => show(app, Page::Branches),
-        Verb::Think => show(app, Page::Mind),
-        Verb::Look | Verb::Candidates => show(app, Page::World),
-        Verb::Quit => vec![Effect::Quit(Farewell::Asked)],
-        Verb::Save(path) => send(Command::Save(path)),
-        Verb::SaveTask(path) => send(Command::SaveTask(path)),
-        Verb::Export(path) => send(Command::Export(path)),
-        Verb::Compare(text) => {
-            let mut effects = turn_to(app, Page::Compare);
-            effects.push(Effect::Send(Command::Compare(text)));
-            effects
-        }
-        Verb::Swap => match app.contrast.take() {
-            Some(contrast) => {
-                let [own, other] = contrast.sides.map(|side| side.instruction);
-                vec![Effect::Send(Command::Instruct(other)), Effect::Send(Command::Compare(own))]
-            }
-            None => {
-                app.note(Tone::Note, "there is nothing to swap: compare TEXT first");
-                vec![]
-            }
-        },
-        Verb::ValueMap => {
-            app.paints_values = !app.paints_values;
-            app.landscape = None;
-            send(if app.paints_values { Command::Survey } else { Command::StopSurvey })
-        }
-        Verb::Facing(heading) => {
-            app.heading = heading;
-            if app.paints_values { vec![] } else { perform(app, Verb::ValueMap) }
-        }
-        Verb::NextHeading => {
-            let next = match app.heading {
-                None => Some(Heading::North),
-                Some(Heading::West) => None,
-                Some(heading) => Some(heading.right()),
-            };
-            // The first press only paints.
-            perform(app, Verb::Facing(if app.paints_values { next } else { app.heading }))
-        }
-        Verb::Mouse => {
-            app.mouse = !app.mouse;
-            let text = if app.mouse { "the mouse is heard" } else { "the mouse is the terminal's again" };
-            app.note(Tone::Note, text);
-            vec![Effect::Mouse(app.mouse)]
-        }
-        Verb::ReplayLink => perform(app, Verb::WhichLink(Draws { times: TIMES, only: Some(app.selected) })),
-        Verb::Chain(text) => {
-            let mut effects = turn_to(app, Page::Chain);
-            effects.push(Effect::Send(Command::Chain(text)));
-            effects
-        }
-        Verb::WhichLink(draws) => {
-            let mut effects = turn_to(app, Page::Chain);
-            effects.push(Effect::Send(Command::WhichLink(draws)));
-            effects
-        }
-        Verb::Against(wanted) => {
-            let mut effects = turn_to(app, Page::Chain);
-            effects.push(Effect::Send(Command::Against(wanted)));
-            effects
-        }
-        Verb::Stop => send(Command::Stop),
-        Verb::Bandwidth(kilobytes) => {
-            app.bandwidth = (kilobytes > 0).then(|| 1000 * u64::from(kilobytes));
-            app.coarseness = 0;
-            vec![Effect::Encode]
-        }
-        Verb::FullFrame => {
-            app.coarseness = 0;
-            vec![Effect::Encode]
-        }
-        Verb::Copy => {
-            let Some(now) = &app.now else { return vec![] };
-            let last = app
-                .log
-                .done_at(now.step)
-                .map_or(String::new(), |entry| format!(": {} · {}", entry.text, entry.outcome));
-            let text = format!("{} | {} step {}{last}", now.instruction, now.scene.name, now.step);
-            app.note(Tone::Note, "copied");
-            vec![Effect::Copy(text)]
+        Verb::Quit => vec![Effect::Quit(ExitReason::Asked)],
+        Verb::Copy => copy(app),
+        Verb::Graphics | Verb::Overlay | Verb::Labels | Verb::Bandwidth(_) | Verb::FullFrame | Verb::Mouse => {
+            change_display(app, &verb)
         }
     }
 }
 
-fn pace(app: &mut App, pace: Pace) -> Vec<Effect> {
-    app.pace = pace;
-    send(Command::Pace(pace))
+/// Asks the session, on the page that shows what comes of it.
+fn ask(app: &mut App, command: SessionCommand) -> Vec<Effect> {
+    let mut effects = match &command {
+        SessionCommand::Diverge(_) => turn_to(app, ExplorerPage::Branches),
+        SessionCommand::Compare(_) => turn_to(app, ExplorerPage::Compare),
+        SessionCommand::Chain(_) | SessionCommand::WhichLink(_) | SessionCommand::Against(_) => {
+            turn_to(app, ExplorerPage::Chain)
+        }
+        SessionCommand::Choose(kind) => {
+            app.session.choose(*kind);
+            vec![]
+        }
+        _ => vec![],
+    };
+    effects.push(Effect::Send(command));
+    effects
 }
 
-fn choose(app: &mut App, kind: PolicyKind) -> Vec<Effect> {
-    app.policy = kind;
-    app.thought = None;
-    app.trouble = None;
-    send(Command::Choose(kind))
+/// Lets it go on by itself, or pauses it.
+fn run(app: &mut App, by_policy: bool) -> Vec<Effect> {
+    if app.session.run_mode.is_some() && !by_policy {
+        return send(SessionCommand::Pause);
+    }
+    if app.input.mode == Mode::Manual {
+        app.input.mode = Mode::Watch;
+    }
+    let in_the_past = app.session.now.as_ref().is_some_and(|now| (now.time.at as usize) < now.time.steps.len());
+    let mode = if in_the_past && !by_policy { RunMode::Replay } else { RunMode::Policy };
+    send(SessionCommand::Run { mode, until: None })
+}
+
+fn set_rate(app: &mut App, rate: StepRate) -> Vec<Effect> {
+    app.session.rate = rate;
+    send(SessionCommand::StepRate(rate))
+}
+
+/// The interaction of that number on the page that is shown.
+fn interact(app: &mut App, number: u8) -> Vec<Effect> {
+    let candidate = app.page_of_candidates().get(usize::from(number).wrapping_sub(1)).copied();
+    match candidate {
+        Some(candidate) => send(SessionCommand::Act(candidate.action())),
+        None => {
+            app.note(Tone::Note, format!("no interaction has the number {number} now"));
+            vec![]
+        }
+    }
+}
+
+fn paint_heading(app: &mut App, heading: Option<Heading>) -> Vec<Effect> {
+    app.value_map.heading = heading;
+    if app.value_map.is_painted {
+        return vec![];
+    }
+    app.value_map.toggle();
+    send(SessionCommand::ValueMap)
+}
+
+/// Does what was typed.
+fn apply(app: &mut App) -> Vec<Effect> {
+    if app.input.mode == Mode::Palette {
+        let Some(verb) = read_palette(app) else { return vec![] };
+        app.input.close();
+        let mut effects = uncover(app);
+        effects.extend(on_action(app, verb));
+        return effects;
+    }
+    app.input.close();
+    match app.input.editor.text().trim() {
+        "" => vec![],
+        text => send(SessionCommand::Instruct(text.to_string())),
+    }
+}
+
+/// Up or down: among the verbs of the palette, or the instructions that were given before.
+fn travel(app: &mut App, by: isize) {
+    if app.input.mode == Mode::Palette {
+        let most = verb::matching(app.input.palette.text()).len().saturating_sub(1);
+        app.input.selected_verb = app.input.selected_verb.saturating_add_signed(by).min(most);
+    } else {
+        app.input.editor.travel(by);
+    }
+}
+
+fn copy(app: &mut App) -> Vec<Effect> {
+    let Some(now) = &app.session.now else { return vec![] };
+    let last = app.log.done_at(now.step).map_or(String::new(), |entry| format!(": {} · {}", entry.text, entry.outcome));
+    let text = format!("{} | {} step {}{last}", now.instruction, now.scene.name, now.step);
+    app.note(Tone::Note, "copied");
+    vec![Effect::Copy(text)]
+}
+
+/// What is about the screen alone.
+fn change_display(app: &mut App, verb: &Verb) -> Vec<Effect> {
+    match verb {
+        Verb::Graphics => {
+            let graphics = &mut app.terminal.graphics;
+            graphics.protocol = graphics.protocol.next();
+            graphics.reason = "chosen by key g".into();
+            app.frame.picture = None;
+            return vec![Effect::Encode, Effect::Repaint];
+        }
+        Verb::Overlay => {
+            app.main.overlay = app.main.overlay.next();
+            let looks_back = app.main.overlay == Overlay::Frames;
+            return vec![Effect::Send(SessionCommand::LookBack(looks_back)), Effect::Encode];
+        }
+        Verb::Mouse => {
+            app.terminal.mouse = !app.terminal.mouse;
+            let text = if app.terminal.mouse { "the mouse is heard" } else { "the mouse is the terminal's again" };
+            app.note(Tone::Note, text);
+            return vec![Effect::Mouse(app.terminal.mouse)];
+        }
+        Verb::Labels => app.main.numbers = !app.main.numbers,
+        Verb::Bandwidth(kilobytes) => {
+            app.traffic.limit = (*kilobytes > 0).then(|| 1000 * u64::from(*kilobytes));
+            app.traffic.coarseness = 0;
+        }
+        _ => app.traffic.coarseness = 0,
+    }
+    vec![Effect::Encode]
 }

@@ -7,22 +7,23 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{fit, panel, picture, put};
+use super::panel::{fit, panel, put};
+use super::picture::picture;
 use crate::explore::timeline::{Divergence, Timeline};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
-/// The page.
-pub struct Branches<'a>(pub &'a App);
+/// The page: the tree of branches, and two of them side by side.
+pub struct BranchesView<'a>(pub &'a App);
 
-impl Widget for Branches<'_> {
+impl Widget for BranchesView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let (Some(now), Some(layout)) = (&app.now, app.layout()) else { return };
-        let parts = layout.branches(app.rows(), app.graphics.cell_pixels);
+        let (Some(now), Some(layout)) = (&app.session.now, app.layout()) else { return };
+        let parts = layout.branches(app.rows(), app.terminal.graphics.cell_pixels);
         debug_assert_eq!(layout.page, area);
         self.list(&now.time, parts.list, buf);
-        match &app.divergence {
+        match &app.branches.divergence {
             Some(divergence) if divergence.names[0] != divergence.names[1] => {
                 let right = format!("the same until step {}", divergence.shared);
                 panel(buf, parts.below, "Side by side", &right);
@@ -43,12 +44,12 @@ impl Widget for Branches<'_> {
     }
 }
 
-impl Branches<'_> {
+impl BranchesView<'_> {
     fn list(&self, time: &Timeline, area: Rect, buf: &mut Buffer) {
         let right = format!("{} in all, * is in hand", time.branches.len());
         let inner = panel(buf, area, "Branches", &right);
         let rows = usize::from(inner.height);
-        let first = (self.0.selected + 1).saturating_sub(rows);
+        let first = (self.0.branches.selected + 1).saturating_sub(rows);
         for (row, (at, branch)) in time.branches.iter().enumerate().skip(first).take(rows).enumerate() {
             let depth = depth(time, at);
             let tree = if depth == 0 { String::new() } else { format!("{}└ ", "  ".repeat(depth - 1)) };
@@ -64,17 +65,17 @@ impl Branches<'_> {
                 branch.completed,
                 branch.why
             );
-            let style = if at == self.0.selected { THEME.chosen } else { Style::new() };
-            let prefix = if at == self.0.selected { ">" } else { " " };
+            let style = if at == self.0.branches.selected { THEME.chosen } else { Style::new() };
+            let prefix = if at == self.0.branches.selected { ">" } else { " " };
             put(buf, inner, row as u16, format!("{prefix}{text}"), style);
         }
     }
 }
 
-impl Branches<'_> {
+impl BranchesView<'_> {
     /// What the agent saw on both, with the steps over the pictures.
     fn sights(&self, divergence: &Divergence, area: Rect, buf: &mut Buffer) {
-        let Some((_, steps)) = &divergence.sights else { return };
+        let Some((_, steps)) = &divergence.frames else { return };
         let half = area.width / 2;
         for (side, (name, step)) in (0u16..).zip(divergence.names.iter().zip(steps)) {
             let head = Rect { x: area.x + side * (half + 1), y: area.y - 1, width: half.saturating_sub(1), height: 1 };

@@ -6,21 +6,21 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-use super::{bar, fit, panel, put, share, wrap};
+use super::panel::{bar, fit, panel, put, share, wrap};
 use crate::analysis::instruction_ab::{Contrast, Row};
 use crate::domain::Class;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
-/// The page.
-pub struct Compare<'a>(pub &'a App);
+/// The page: two instructions and their distributions.
+pub struct CompareView<'a>(pub &'a App);
 
 /// Rows above the table: both instructions, values, and the scores.
 const HEAD: u16 = 8;
 
-impl Widget for Compare<'_> {
+impl Widget for CompareView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let Some(contrast) = &self.0.contrast else {
+        let Some(contrast) = &self.0.compare.contrast else {
             let inner = panel(buf, area, "Two instructions", "");
             let text = "Press enter and type another instruction: this page then shows what the policy would do under each, \
                         in this very state, and how much the words matter here.";
@@ -30,13 +30,13 @@ impl Widget for Compare<'_> {
             return;
         };
         head(contrast, &when(self.0), Rect { height: HEAD, ..area }, buf);
-        table(contrast, self.0.selected, Rect { y: area.y + HEAD, height: area.height - HEAD, ..area }, buf);
+        table(contrast, self.0.compare.selected, Rect { y: area.y + HEAD, height: area.height - HEAD, ..area }, buf);
     }
 }
 
 /// In which state they were compared.
 fn when(app: &App) -> String {
-    match (&app.now, app.contrast_at) {
+    match (&app.session.now, app.compare.state) {
         (Some(now), Some((branch, step))) if (now.time.branch, now.step) != (branch, step) => {
             let name = now.time.branches.get(branch).map_or("", |branch| branch.name.as_str());
             format!("as of step {step} on {name}")
@@ -54,8 +54,9 @@ fn head(contrast: &Contrast, when: &str, area: Rect, buf: &mut Buffer) {
             Span::styled(fit(&side.instruction, width - 3), THEME.instruction),
         ]);
         line.render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
-        let mind = side.decision.distribution.as_ref();
-        let entropy = mind.map_or(String::new(), |mind| format!(" · entropy {:.2}", mind.entropy));
+        let distribution = side.decision.distribution.as_ref();
+        let entropy =
+            distribution.map_or(String::new(), |distribution| format!(" · entropy {:.2}", distribution.entropy));
         let value = match &side.values {
             Some(values) => format!("V {:.2}{}", values.state, difference(contrast, row > 0)),
             None => "this checkpoint has no critic".into(),

@@ -6,18 +6,19 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{panel, picture};
+use super::panel::panel;
+use super::picture::picture;
 use crate::tui::app::App;
-use crate::tui::graphics::{Protocol, classes};
+use crate::tui::graphics::{Protocol, letters};
 use crate::tui::theme::THEME;
 
 /// The panel with the picture.
-pub struct Sees<'a>(pub &'a App);
+pub struct FramePanel<'a>(pub &'a App);
 
-impl Widget for Sees<'_> {
+impl Widget for FramePanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let right = match &app.now {
+        let right = match &app.session.now {
             Some(now) => {
                 let pose = now.world.agent;
                 let heading = pose.heading.name();
@@ -29,10 +30,10 @@ impl Widget for Sees<'_> {
             }
             None => String::new(),
         };
-        panel(buf, area, app.overlay.title(), &right);
+        panel(buf, area, app.main.overlay.title(), &right);
         let Some(picture_area) = app.picture_area() else { return };
         picture(app, picture_area, buf);
-        if app.graphics.protocol == Protocol::Ascii {
+        if app.terminal.graphics.protocol == Protocol::Ascii {
             let top = picture_area.bottom();
             legend(app, Rect { y: top, height: area.bottom().saturating_sub(top), ..area }, buf);
         }
@@ -40,10 +41,10 @@ impl Widget for Sees<'_> {
 }
 
 fn legend(app: &App, area: Rect, buf: &mut Buffer) {
-    let Some(now) = &app.now else { return };
+    let Some(now) = &app.session.now else { return };
     let mut lines: Vec<Line> = vec![Line::default()];
     let mut used = 0;
-    for (letter, class) in classes::legend(&now.frame.ids, &app.names, &app.letters) {
+    for (letter, class) in letters::legend(&now.frame.ids, &app.frame.names, &app.frame.letters) {
         let word = class.spoken();
         let width = word.width() + 4;
         if used + width > usize::from(area.width) {
@@ -55,7 +56,7 @@ fn legend(app: &App, area: Rect, buf: &mut Buffer) {
         }
         used += width;
         if let Some(line) = lines.last_mut() {
-            line.push_span(Span::styled(letter.to_string(), THEME.key.fg(classes::tint(class))));
+            line.push_span(Span::styled(letter.to_string(), THEME.key.fg(letters::tint(class))));
             line.push_span(Span::raw(format!(" {word}  ")));
         }
     }

@@ -5,22 +5,22 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Padding, Widget};
 
-use super::fit;
+use super::panel::fit;
 use crate::tui::app::App;
 use crate::tui::keys::{self, Mode};
 use crate::tui::theme::THEME;
 
 /// The overlay with the keys.
-pub struct Help<'a>(pub &'a App);
+pub struct HelpOverlay<'a>(pub &'a App);
 
 /// Columns that the names of keys take.
 const LABEL: usize = 9;
 /// Columns that a key takes with what it does.
 const WIDEST: u16 = 40;
 
-impl Widget for Help<'_> {
+impl Widget for HelpOverlay<'_> {
     fn render(self, screen: Rect, buf: &mut Buffer) {
-        let mode = if self.0.under == Mode::Help { Mode::Watch } else { self.0.under };
+        let mode = if self.0.input.under == Mode::Help { Mode::Watch } else { self.0.input.under };
         let title = match mode {
             Mode::Manual => " Keys while you act ",
             _ => " Keys while a policy acts ",
@@ -36,7 +36,7 @@ impl Widget for Help<'_> {
         let lines = (0..rows).map(|row| {
             let shown = bindings.iter().skip(row).step_by(rows.max(1)).take(columns);
             Line::from_iter(shown.flat_map(|binding| {
-                let doc = fit(binding.verb.doc(), room.saturating_sub(LABEL + 1));
+                let doc = fit(binding.help, room.saturating_sub(LABEL + 1));
                 let words = format!("{doc:<width$}", width = room.saturating_sub(LABEL));
                 [Span::styled(format!("{:<LABEL$}", binding.label), THEME.chosen), Span::raw(words)]
             }))

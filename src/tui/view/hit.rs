@@ -2,74 +2,63 @@
 
 use ratatui::layout::{Position, Rect};
 
-use super::{log, map, reach, time, world};
-use crate::domain::{Cell, Instance};
-use crate::explore::verb::Page;
+use super::log;
+use super::map;
+use super::reach;
+use super::target::Target;
+use super::timeline;
+use super::world;
+use crate::explore::verb::ExplorerPage;
 use crate::house::view::decode;
 use crate::tui::app::App;
-use crate::tui::layout::Layout;
-
-/// Something on the screen that can be picked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hit {
-    /// The interaction of that number, from 1.
-    Candidate(u8),
-    /// A step, on the timeline or in the log.
-    Step(u32),
-    /// A thing in the frame or on the map.
-    Thing(Instance),
-    /// A cell of the floor.
-    Cell(Cell),
-    /// A row of the page's list.
-    Row(usize),
-}
+use crate::tui::layout::ScreenLayout;
 
 /// What lies there.
-pub fn hit(app: &App, at: Position) -> Option<Hit> {
+pub fn target_at(app: &App, at: Position) -> Option<Target> {
     let layout = app.layout()?;
     if layout.time.contains(at) {
-        return time::step_at(app, layout.time, at.x).map(Hit::Step);
+        return timeline::step_at(app, layout.time, at.x).map(Target::Step);
     }
     match app.page {
-        Page::Main => panels(app, &layout, at),
-        Page::World => {
+        ExplorerPage::Main => panels(app, &layout, at),
+        ExplorerPage::World => {
             let [plan, list] = world::parts(layout.page);
             if plan.contains(at) { map::under(app, plan, at) } else { row(app, list, at) }
         }
-        Page::Branches => row(app, layout.branches(app.rows(), app.graphics.cell_pixels).list, at),
-        Page::Mind | Page::Compare | Page::Chain => None,
+        ExplorerPage::Branches => row(app, layout.branches(app.rows(), app.terminal.graphics.cell_pixels).list, at),
+        ExplorerPage::Mind | ExplorerPage::Compare | ExplorerPage::Chain => None,
     }
 }
 
-fn panels(app: &App, layout: &Layout, at: Position) -> Option<Hit> {
+fn panels(app: &App, layout: &ScreenLayout, at: Position) -> Option<Target> {
     if layout.reach.contains(at) {
         let many = app.page_of_candidates().len();
         let found = reach::places(inside(layout.reach)).take(many).position(|place| place.contains(at))?;
-        return Some(Hit::Candidate(found as u8 + 1));
+        return Some(Target::Candidate(found as u8 + 1));
     }
     if layout.log.contains(at) {
-        return log::step_at(app, inside(layout.log), at.y).map(Hit::Step);
+        return log::step_at(app, inside(layout.log), at.y).map(Target::Step);
     }
     if layout.map.contains(at) {
         return map::under(app, layout.map, at);
     }
     let picture = app.picture_area().filter(|area| area.contains(at))?;
-    let frame = &app.now.as_ref()?.frame;
+    let frame = &app.session.now.as_ref()?.frame;
     let scaled = |from: u16, length: u16, size: usize| (2 * usize::from(from) + 1) * size / (2 * usize::from(length));
     let (x, y) =
         (scaled(at.x - picture.x, picture.width, frame.width), scaled(at.y - picture.y, picture.height, frame.height));
-    decode(*frame.ids.get(y * frame.width + x)?).map(Hit::Thing)
+    decode(*frame.ids.get(y * frame.width + x)?).map(Target::Thing)
 }
 
 /// The rows of a list that begins right under its title and keeps what is selected in sight.
-fn row(app: &App, list: Rect, at: Position) -> Option<Hit> {
+fn row(app: &App, list: Rect, at: Position) -> Option<Target> {
     let inner = inside(list);
     if !inner.contains(at) {
         return None;
     }
-    let first = (app.selected + 1).saturating_sub(usize::from(inner.height));
+    let first = (app.selected() + 1).saturating_sub(usize::from(inner.height));
     let row = first + usize::from(at.y - inner.y);
-    (row < app.rows()).then_some(Hit::Row(row))
+    (row < app.rows()).then_some(Target::Row(row))
 }
 
 /// A panel without its title.
@@ -88,22 +77,23 @@ mod tests {
     fn what_is_drawn_can_be_picked() {
         let app = testing::app(120, 36, Protocol::HalfBlocks, Ability::FULL);
         let layout = app.layout().unwrap();
-        let at = |area: Rect, x: u16, y: u16| hit(&app, Position { x: area.x + x, y: area.y + y });
-        assert_eq!(at(layout.reach, 3, 1), Some(Hit::Candidate(1)));
-        assert_eq!(at(layout.reach, 3, 3), Some(Hit::Candidate(3)));
+        let at = |area: Rect, x: u16, y: u16| target_at(&app, Position { x: area.x + x, y: area.y + y });
+        assert_eq!(at(layout.reach, 3, 1), Some(Target::Candidate(1)));
+        assert_eq!(at(layout.reach, 3, 3), Some(Target::Candidate(3)));
         assert_eq!(at(layout.reach, 3, 0), None, "a title is nothing to pick");
-        assert_eq!(at(layout.log, 6, 1), Some(Hit::Step(0)));
+        assert_eq!(at(layout.log, 6, 1), Some(Target::Step(0)));
         let mug = testing::instance(&app, "Mug");
         let picture = app.picture_area().unwrap();
         let middle = |low: u16, high: u16, length: u16| (low + high) / 2 * length / 300;
         assert_eq!(
             at(picture, middle(80, 110, picture.width), middle(130, 165, picture.height)),
-            Some(Hit::Thing(mug))
+            Some(Target::Thing(mug))
         );
-        let found: Vec<Hit> = layout.map.positions().filter_map(|at| hit(&app, at)).collect();
+        let found: Vec<Target> = layout.map.positions().filter_map(|at| target_at(&app, at)).collect();
         assert!(
-            found.iter().any(|hit| matches!(hit, Hit::Cell(_))) && found.iter().any(|hit| matches!(hit, Hit::Thing(_)))
+            found.iter().any(|hit| matches!(hit, Target::Cell(_)))
+                && found.iter().any(|hit| matches!(hit, Target::Thing(_)))
         );
-        assert_eq!(hit(&app, Position { x: 0, y: 0 }), None);
+        assert_eq!(target_at(&app, Position { x: 0, y: 0 }), None);
     }
 }

@@ -6,15 +6,15 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-use super::{panel, wrap};
+use super::panel::{panel, wrap};
 use crate::tui::app::App;
-use crate::tui::log::{Entry, Tone};
+use crate::tui::log::{LogEntry, Tone};
 use crate::tui::theme::THEME;
 
 /// The panel with the events.
-pub struct Log<'a>(pub &'a App);
+pub struct LogPanel<'a>(pub &'a App);
 
-impl Widget for Log<'_> {
+impl Widget for LogPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let inner = panel(buf, area, "Log", "");
         for (row, (_, line)) in inner.rows().zip(lines(self.0, inner)) {
@@ -52,7 +52,7 @@ pub(super) fn tone(tone: Tone) -> Style {
     }
 }
 
-fn entry_lines(entry: &Entry, width: usize) -> Vec<Line<'static>> {
+fn entry_lines(entry: &LogEntry, width: usize) -> Vec<Line<'static>> {
     let step = entry.step.map_or(String::new(), |step| step.to_string());
     let tone = tone(entry.tone);
     let text =

@@ -6,19 +6,19 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::ground::{Ground, extent, furniture_colour};
-use super::hit::Hit;
-use super::{fit, panel};
+use super::floor_plan::{FloorPlan, extent, furniture_colour};
+use super::panel::{fit, panel};
+use super::target::Target;
 use crate::analysis::value_map::ValueMap;
 use crate::domain::{Cell, Heading, Instance, Point};
+use crate::explore::exploration::Snapshot;
 use crate::explore::inspect::things;
-use crate::explore::session::Snapshot;
-use crate::explore::verb::Page;
+use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with the floor plan.
-pub struct Map<'a>(pub &'a App);
+pub struct MapPanel<'a>(pub &'a App);
 
 /// The side of the smallest square that is drawn, in millimetres.
 const FINEST: i32 = 50;
@@ -29,40 +29,41 @@ const INK: Color = Color::Rgb(16, 16, 18);
 /// Names are cut to no fewer columns than this.
 const SHORTEST: usize = 5;
 
-impl Widget for Map<'_> {
+impl Widget for MapPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let Some(now) = &app.now else {
+        let Some(now) = &app.session.now else {
             panel(buf, area, "Map", "");
             return;
         };
         let target = app
-            .thought
+            .session
+            .decision
             .as_ref()
             .and_then(|(decision, words)| Some((decision.action.target?, words)))
             .filter(|(target, _)| now.world.class_of(&now.scene, *target).is_some());
-        let values = app.landscape.as_ref().filter(|_| app.paints_values);
+        let values = app.value_map.map.as_ref().filter(|_| app.value_map.is_painted);
         let right = match (values, target) {
             (Some((values, step)), _) => {
                 let room = usize::from(area.width).saturating_sub("Map".width() + 4);
-                legend(values, app.heading, (*step != now.step).then_some(*step), room)
+                legend(values, app.value_map.heading, (*step != now.step).then_some(*step), room)
             }
             (None, Some((_, words))) => words.clone(),
             (None, None) => String::new(),
         };
         let inner = panel(buf, area, "Map", &right);
         let inspected = match app.page {
-            Page::World => things(now).get(app.selected).map(|thing| thing.instance),
+            ExplorerPage::World => things(now).get(app.world.selected).map(|thing| thing.instance),
             _ => None,
         };
-        let ground = Ground::of(now, values.map(|(values, _)| &**values), app.heading);
-        let Some(plan) = Plan::fitting(&ground, inner) else { return };
-        if app.ability.shades() {
-            plan.shaded(&ground, buf)
+        let plan = FloorPlan::of(now, values.map(|(values, _)| &**values), app.value_map.heading);
+        let Some(scale) = MapScale::fitting(&plan, inner) else { return };
+        if app.terminal.ability.shades() {
+            scale.shaded(&plan, buf)
         } else {
-            plan.lettered(app, &ground, buf)
+            scale.lettered(app, &plan, buf)
         }
-        plan.marks(app, now, inspected.or(target.map(|(target, _)| target)), buf);
+        scale.marks(app, now, inspected.or(target.map(|(target, _)| target)), buf);
     }
 }
 
@@ -70,8 +71,8 @@ impl Widget for Map<'_> {
 fn legend(values: &ValueMap, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
     let facing = heading.map_or("best heading", Heading::name);
     let (low, high) = values.range(heading).unwrap_or((0.0, 0.0));
-    let far = values.heights.len() < values.of;
-    let far = if far { format!(", {}/{}", values.heights.len(), values.of) } else { String::new() };
+    let far = values.cells.len() < values.of;
+    let far = if far { format!(", {}/{}", values.cells.len(), values.of) } else { String::new() };
     let step = other_step.map_or(String::new(), |step| format!(", as of step {step}"));
     let mark = other_step.map_or(String::new(), |step| format!(" @{step}"));
     let (words, letter, short) =
@@ -90,27 +91,27 @@ fn legend(values: &ValueMap, heading: Option<Heading>, other_step: Option<u32>, 
 }
 
 /// What lies under a place of the panel: a thing that is in view, furniture, or a cell of the floor.
-pub(super) fn under(app: &App, area: Rect, at: Position) -> Option<Hit> {
-    let now = app.now.as_ref()?;
+pub(super) fn under(app: &App, area: Rect, at: Position) -> Option<Target> {
+    let now = app.session.now.as_ref()?;
     let inner = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
-    let ground = Ground::of(now, None, None);
-    let plan = Plan::fitting(&ground, inner).filter(|_| inner.contains(at))?;
-    let place = |instance: Instance| now.world.position(&now.scene, instance).and_then(|p| plan.position(p.x, p.z));
+    let plan = FloorPlan::of(now, None, None);
+    let scale = MapScale::fitting(&plan, inner).filter(|_| inner.contains(at))?;
+    let place = |instance: Instance| now.world.position(&now.scene, instance).and_then(|p| scale.position(p.x, p.z));
     let seen = now.view.sightings.iter().map(|seen| seen.instance).filter(|seen| matches!(seen, Instance::Object(_)));
     if let Some(object) = seen.into_iter().find(|&object| place(object) == Some((at.x, at.y))) {
-        return Some(Hit::Thing(object));
+        return Some(Target::Thing(object));
     }
-    let (x, z) = plan.point(at.x - inner.x, 2 * (at.y - inner.y));
-    let z = z - plan.side / 2;
-    if let Some(fixture) = ground.fixture(x, z) {
-        return Some(Hit::Thing(Instance::Fixture(fixture)));
+    let (x, z) = scale.point(at.x - inner.x, 2 * (at.y - inner.y));
+    let z = z - scale.side / 2;
+    if let Some(fixture) = plan.fixture(x, z) {
+        return Some(Target::Thing(Instance::Fixture(fixture)));
     }
     let cell = Cell::nearest(Point::new(x, 0, z));
-    now.scene.has_cell(cell).then_some(Hit::Cell(cell))
+    now.scene.has_cell(cell).then_some(Target::Cell(cell))
 }
 
 /// How millimetres become characters. A character is two squares high, one above the other.
-struct Plan {
+struct MapScale {
     area: Rect,
     /// Millimetres of a square's side.
     side: i32,
@@ -119,9 +120,9 @@ struct Plan {
     north: i32,
 }
 
-impl Plan {
-    fn fitting(ground: &Ground, area: Rect) -> Option<Plan> {
-        let bounds = ground.bounds?;
+impl MapScale {
+    fn fitting(plan: &FloorPlan, area: Rect) -> Option<MapScale> {
+        let bounds = plan.bounds?;
         let (width, depth) = (bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1]);
         let (columns, squares) = (i32::from(area.width), 2 * i32::from(area.height));
         if columns == 0 || squares == 0 {
@@ -132,7 +133,7 @@ impl Plan {
         let spare = |have: i32, want: i32| (have * side - want).max(0) / 2;
         let west = bounds.min[0] - spare(columns, width);
         let north = bounds.max[1] + spare(squares, depth);
-        Some(Plan { area, side, west, north })
+        Some(MapScale { area, side, west, north })
     }
 
     /// The middle of a square, in millimetres.
@@ -152,10 +153,10 @@ impl Plan {
         inside.then(|| (self.area.x + column as u16, self.area.y + row as u16))
     }
 
-    fn shaded(&self, ground: &Ground, buf: &mut Buffer) {
+    fn shaded(&self, plan: &FloorPlan, buf: &mut Buffer) {
         let shade = |column: u16, square: u16| {
             let (x, z) = self.point(column, square);
-            ground.colour(x, z)
+            plan.colour(x, z)
         };
         for row in 0..self.area.height {
             for column in 0..self.area.width {
@@ -169,12 +170,12 @@ impl Plan {
                 };
             }
         }
-        self.names(ground, buf);
+        self.names(plan, buf);
     }
 
     /// Names furniture where its name fits and it is not under something else, the largest first.
-    fn names(&self, ground: &Ground, buf: &mut Buffer) {
-        let mut pieces = ground.furniture.clone();
+    fn names(&self, plan: &FloorPlan, buf: &mut Buffer) {
+        let mut pieces = plan.furniture.clone();
         pieces.sort_by_key(|piece| (std::cmp::Reverse(extent(&piece.floor)), piece.class, piece.fixture));
         let mut taken: Vec<Rect> = Vec::new();
         let mut named: Vec<u16> = Vec::new();
@@ -185,9 +186,7 @@ impl Plan {
             let name = fit(piece.class.spoken(), columns);
             let whole = name == piece.class.spoken();
             let Some((column, row)) = self.position(x, z) else { continue };
-            if named.contains(&piece.fixture)
-                || (!whole && columns < SHORTEST)
-                || ground.class(x, z) != Some(piece.class)
+            if named.contains(&piece.fixture) || (!whole && columns < SHORTEST) || plan.class(x, z) != Some(piece.class)
             {
                 continue;
             }
@@ -208,18 +207,18 @@ impl Plan {
     }
 
     /// Without colours: a letter for furniture, dots to walk on.
-    fn lettered(&self, app: &App, ground: &Ground, buf: &mut Buffer) {
-        let now = ground.now;
+    fn lettered(&self, app: &App, plan: &FloorPlan, buf: &mut Buffer) {
+        let now = plan.now;
         for row in 0..self.area.height {
             for column in 0..self.area.width {
                 let (x, upper) = self.point(column, 2 * row);
                 let z = upper - self.side / 2;
                 let cell = Cell::nearest(Point::new(x, 0, z));
-                let symbol = if let Some(class) = ground.class(x, z) {
-                    app.letters.letter(class)
+                let symbol = if let Some(class) = plan.class(x, z) {
+                    app.frame.letters.letter(class)
                 } else if now.scene.walls.iter().any(|wall| wall.footprint().contains(x, z)) {
                     '#'
-                } else if let Some(share) = ground.values.get(&cell) {
+                } else if let Some(share) = plan.values.get(&cell) {
                     char::from_digit((share * 9.0).round() as u32, 10).unwrap_or('9')
                 } else if now.path.contains(&cell) {
                     'o'
@@ -236,7 +235,7 @@ impl Plan {
 
     /// The agent, what it is about to act on, and the things it sees.
     fn marks(&self, app: &App, now: &Snapshot, target: Option<Instance>, buf: &mut Buffer) {
-        let shades = app.ability.shades();
+        let shades = app.terminal.ability.shades();
         let mut mark = |x: i32, z: i32, symbol: char, style: Style| {
             if let Some((column, row)) = self.position(x, z) {
                 let cell = &mut buf[(column, row)];
@@ -247,7 +246,7 @@ impl Plan {
         for sighting in &now.view.sightings {
             let Instance::Object(index) = sighting.instance else { continue };
             if let Some(object) = now.world.object(index).filter(|_| !now.world.in_hand(index)) {
-                let symbol = if shades { '•' } else { app.letters.letter(object.class) };
+                let symbol = if shades { '•' } else { app.frame.letters.letter(object.class) };
                 mark(
                     object.at.x,
                     object.at.z,

@@ -7,10 +7,10 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{bar, fit, panel, put, share, wrap};
+use super::panel::{bar, fit, panel, put, share, wrap};
 use crate::agent::{ActionDistribution, Decision};
 use crate::domain::{ActionType, Class};
-use crate::explore::session::Snapshot;
+use crate::explore::exploration::Snapshot;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -23,19 +23,22 @@ const OBJECTS: u16 = 26;
 impl Widget for MindPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let mind = app.thought.as_ref().and_then(|(decision, _)| decision.distribution.as_ref());
-        let right = match (&app.busy, mind) {
+        let distribution = app.session.decision.as_ref().and_then(|(decision, _)| decision.distribution.as_ref());
+        let right = match (&app.session.busy, distribution) {
             (Some(busy), _) => format!("{busy} ..."),
-            (None, Some(mind)) => {
-                let value = app.values.as_ref().map_or(String::new(), |values| format!(" · V {:.2}", values.state));
-                format!("{}{value} · entropy {:.2}", app.policy.name(), mind.entropy)
+            (None, Some(distribution)) => {
+                let value =
+                    app.session.values.as_ref().map_or(String::new(), |values| format!(" · V {:.2}", values.state));
+                format!("{}{value} · entropy {:.2}", app.session.policy.name(), distribution.entropy)
             }
-            (None, None) if app.thought.is_some() => format!("{} · no probabilities", app.policy.name()),
-            (None, None) => app.policy.name().to_string(),
+            (None, None) if app.session.decision.is_some() => {
+                format!("{} · no probabilities", app.session.policy.name())
+            }
+            (None, None) => app.session.policy.name().to_string(),
         };
         let inner = panel(buf, area, "Mind", &right);
-        match (&app.thought, &app.now, &app.trouble) {
-            (Some((decision, _)), Some(now), _) => Table { decision, mind, now }.render(inner, buf),
+        match (&app.session.decision, &app.session.now, &app.session.trouble) {
+            (Some((decision, _)), Some(now), _) => DistributionTable { decision, distribution, now }.render(inner, buf),
             (_, _, Some(trouble)) => {
                 let lines = wrap(trouble, usize::from(inner.width), "");
                 let below = lines.len() as u16 + 1;
@@ -50,13 +53,13 @@ impl Widget for MindPanel<'_> {
 }
 
 /// The 12 actions, and the object classes where there is a distribution over them.
-struct Table<'a> {
+struct DistributionTable<'a> {
     decision: &'a Decision,
-    mind: Option<&'a ActionDistribution>,
+    distribution: Option<&'a ActionDistribution>,
     now: &'a Snapshot,
 }
 
-impl Widget for Table<'_> {
+impl Widget for DistributionTable<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let tall = area.height >= 12;
         let wide = tall && area.width >= 2 + 32 + OBJECTS;
@@ -70,18 +73,18 @@ impl Widget for Table<'_> {
             let place = Rect { x: actions.x + column * (width + 2), y: actions.y + row, width, height: 1 };
             self.action(place, buf, kind);
         }
-        let Some(mind) = self.mind else { return };
+        let Some(distribution) = self.distribution else { return };
         if wide {
             let objects = Rect { x: actions.right() + 2, width: OBJECTS, ..area };
-            object_list(objects, buf, self.target_class(), mind);
+            object_list(objects, buf, self.target_class(), distribution);
         } else {
             let objects = Rect { y: actions.bottom(), height: area.height.saturating_sub(rows), ..area };
-            object_line(objects, buf, self.target_class(), mind);
+            object_line(objects, buf, self.target_class(), distribution);
         }
     }
 }
 
-impl Table<'_> {
+impl DistributionTable<'_> {
     fn target_class(&self) -> Option<Class> {
         self.now.world.class_of(&self.now.scene, self.decision.action.target?)
     }
@@ -92,7 +95,8 @@ impl Table<'_> {
         let name = format!("{} {:<11} ", if chosen { ">" } else { " " }, kind.name());
         let room = usize::from(area.width).saturating_sub(name.width());
         let possible = !kind.is_interaction() || self.now.candidates.iter().any(|candidate| candidate.kind == kind);
-        let line = match (self.mind.map(|mind| mind.actions[kind.index()]), possible || chosen) {
+        let line = match (self.distribution.map(|distribution| distribution.actions[kind.index()]), possible || chosen)
+        {
             (Some(Some(p)), _) => Line::from(vec![
                 Span::styled(name, style),
                 Span::styled(bar(p, room.saturating_sub(4)), if chosen { THEME.chosen } else { THEME.bar }),
@@ -132,9 +136,9 @@ fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
 }
 
 /// One class a row, with bars.
-fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &ActionDistribution) {
-    put(buf, area, 0, if mind.objects.is_empty() { "" } else { "object" }, THEME.quiet);
-    for (row, &(class, p, candidate)) in (1..area.height).zip(&mind.objects) {
+fn object_list(area: Rect, buf: &mut Buffer, target: Option<Class>, distribution: &ActionDistribution) {
+    put(buf, area, 0, if distribution.objects.is_empty() { "" } else { "object" }, THEME.quiet);
+    for (row, &(class, p, candidate)) in (1..area.height).zip(&distribution.objects) {
         let style = object_style(target == Some(class), candidate);
         let name = fit(class.spoken(), 13);
         let width = usize::from(area.width).saturating_sub(13 + 1 + 4);
@@ -156,10 +160,10 @@ fn object_style(chosen: bool, candidate: bool) -> Style {
 }
 
 /// As many classes as fit in a few lines.
-fn object_line(area: Rect, buf: &mut Buffer, target: Option<Class>, mind: &ActionDistribution) {
+fn object_line(area: Rect, buf: &mut Buffer, target: Option<Class>, distribution: &ActionDistribution) {
     let mut lines = vec![Line::default()];
     let mut used = 0;
-    for &(class, p, candidate) in &mind.objects {
+    for &(class, p, candidate) in &distribution.objects {
         let text = format!("{} {}  ", class.spoken(), share(p));
         if used + text.width() > usize::from(area.width) {
             if lines.len() >= usize::from(area.height) {

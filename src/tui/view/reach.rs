@@ -6,18 +6,18 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::{fit, panel, put};
+use super::panel::{fit, panel, put};
 use crate::house::view::Candidate;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with hand and interactions.
-pub struct Reach<'a>(pub &'a App);
+pub struct ReachPanel<'a>(pub &'a App);
 
-impl Widget for Reach<'_> {
+impl Widget for ReachPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let Some(now) = &app.now else {
+        let Some(now) = &app.session.now else {
             panel(buf, area, "In reach", "");
             return;
         };
@@ -27,7 +27,7 @@ impl Widget for Reach<'_> {
             format!("hand: {slice}{}", object.class)
         });
         let pages = app.pages();
-        let more = if pages > 1 { format!("tab {}/{pages}", app.page_of_interactions + 1) } else { String::new() };
+        let more = if pages > 1 { format!("tab {}/{pages}", app.main.interactions + 1) } else { String::new() };
         let both = format!("{more} · {hand}");
         // On a narrow screen the last row says it in place of a distance.
         let above = pages > 1 && both.width() + 12 <= usize::from(area.width);
@@ -43,7 +43,7 @@ impl Widget for Reach<'_> {
             );
             return;
         }
-        let chosen = app.thought.as_ref().map(|(decision, _)| decision.action);
+        let chosen = app.session.decision.as_ref().map(|(decision, _)| decision.action);
         let named = |candidate: &Candidate| format!("{} {}", candidate.kind, candidate.class.name());
         let longest = page.iter().map(|candidate| named(candidate).width()).max().unwrap_or(0);
         for ((at, candidate), place) in (0u16..).zip(page).zip(places(inner)) {

@@ -6,22 +6,22 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::fit;
 use super::log::tone;
-use crate::explore::verb::Page;
-use crate::explore::worker::Going;
+use super::panel::fit;
+use crate::explore::session::RunMode;
+use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 
 /// The first row.
-pub struct Header<'a>(pub &'a App);
+pub struct HeaderRow<'a>(pub &'a App);
 
-impl Widget for Header<'_> {
+impl Widget for HeaderRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         let mut words = vec![];
-        if let Some(now) = &app.now {
+        if let Some(now) = &app.session.now {
             let room = now.scene.room.spoken();
             words.push(now.scene.name.clone());
             if !now.scene.name.starts_with(room) {
@@ -34,18 +34,20 @@ impl Widget for Header<'_> {
             });
             words.push(format!("seed {}", now.seed));
         }
-        words.push(if app.by_hand() {
-            format!("you act ({} advises)", app.acts())
+        words.push(if app.input.by_hand() {
+            format!("you act ({} advises)", app.session.acts())
         } else {
-            format!("{} acts", app.acts())
+            format!("{} acts", app.session.acts())
         });
-        let (state, style) = match (&app.busy, app.going) {
+        let (state, style) = match (&app.session.busy, app.session.run_mode) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
-            (None, Some(Going::Policy)) => (format!("running {}", app.pace.name()), THEME.good),
-            (None, Some(Going::Steps(left))) => (format!("{left} steps to go"), THEME.good),
-            (None, Some(Going::Replay)) => (format!("replaying {}", app.pace.name()), THEME.good),
-            (None, None) if app.working.is_some() => (app.working.clone().unwrap_or_default(), THEME.note),
-            (None, None) => (format!("paused ({})", app.pace.name()), THEME.quiet),
+            (None, Some(RunMode::Policy)) => (format!("running {}", app.session.rate.name()), THEME.good),
+            (None, Some(RunMode::Steps(left))) => (format!("{left} steps to go"), THEME.good),
+            (None, Some(RunMode::Replay)) => (format!("replaying {}", app.session.rate.name()), THEME.good),
+            (None, None) if app.session.working.is_some() => {
+                (app.session.working.clone().unwrap_or_default(), THEME.note)
+            }
+            (None, None) => (format!("paused ({})", app.session.rate.name()), THEME.quiet),
         };
         let width = usize::from(area.width);
         let state = fit(&state, width.saturating_sub(NAME.len() + 2));
@@ -71,10 +73,14 @@ const WELCOME: &str = "New here? space: it acts, waits · i: tell it something �
 /// How pictures are shown and what they cost, as much of it as there is room for.
 fn pictures(app: &App, room: usize) -> String {
     let kilobytes = |bytes: u64| format!("{:.1} kB", bytes as f64 / 1000.0);
-    let step = app.bytes.map_or(String::new(), |bytes| format!(" · {}/step", kilobytes(bytes)));
-    let second = app.bytes_a_second.filter(|_| app.going.is_some()).map(|bytes| format!(" · {}/s", kilobytes(bytes)));
+    let step = app.traffic.of_step.map_or(String::new(), |bytes| format!(" · {}/step", kilobytes(bytes)));
+    let second = app
+        .traffic
+        .of_second
+        .filter(|_| app.session.run_mode.is_some())
+        .map(|bytes| format!(" · {}/s", kilobytes(bytes)));
     let second = second.unwrap_or_default();
-    let (name, reason) = (app.graphics.protocol.name(), &app.graphics.reason);
+    let (name, reason) = (app.terminal.graphics.protocol.name(), &app.terminal.graphics.reason);
     let forms = [
         format!("{name}: {reason}{step}{second}"),
         format!("{name}{step}{second}"),
@@ -85,21 +91,23 @@ fn pictures(app: &App, room: usize) -> String {
 }
 
 /// The last row.
-pub struct Status<'a>(pub &'a App);
+pub struct StatusRow<'a>(pub &'a App);
 
-impl Widget for Status<'_> {
+impl Widget for StatusRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        if app.newcomer && (app.mode, app.page) == (Mode::Watch, Page::Main) {
+        if app.input.newcomer && (app.input.mode, app.page) == (Mode::Watch, ExplorerPage::Main) {
             Line::styled(fit(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
             return;
         }
-        if let Some(notice) = app.notice.as_ref().filter(|_| app.mode == Mode::Watch && app.page != Page::Main) {
+        if let Some(notice) =
+            app.notice.as_ref().filter(|_| app.input.mode == Mode::Watch && app.page != ExplorerPage::Main)
+        {
             Line::styled(fit(&notice.text, usize::from(area.width)), tone(notice.tone)).render(area, buf);
             return;
         }
-        let hints: &[(&str, &str)] = match (app.mode, app.page) {
-            (Mode::Watch, Page::Main) => &[
+        let hints: &[(&str, &str)] = match (app.input.mode, app.page) {
+            (Mode::Watch, ExplorerPage::Main) => &[
                 ("space", "run"),
                 ("n", "step"),
                 ("h l", "back, forward"),
@@ -107,15 +115,17 @@ impl Widget for Status<'_> {
                 ("m", "take over"),
                 ("?", "keys"),
             ],
-            (Mode::Watch, Page::Branches) => {
+            (Mode::Watch, ExplorerPage::Branches) => {
                 &[("j k", "select"), ("enter", "go there"), ("R", "name"), ("T", "save as task"), ("esc", "panels")]
             }
-            (Mode::Watch, Page::Mind) => &[("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")],
-            (Mode::Watch, Page::World) => {
+            (Mode::Watch, ExplorerPage::Mind) => {
+                &[("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")]
+            }
+            (Mode::Watch, ExplorerPage::World) => {
                 &[("j k", "select"), ("V", "value map"), ("v", "heading"), ("esc", "panels"), ("?", "keys")]
             }
-            (Mode::Watch, Page::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
-            (Mode::Watch, Page::Chain) => &[
+            (Mode::Watch, ExplorerPage::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
+            (Mode::Watch, ExplorerPage::Chain) => &[
                 ("enter", "new chain"),
                 ("w", "which link breaks"),
                 ("x", "this one"),
@@ -140,7 +150,7 @@ impl Widget for Status<'_> {
         let mut spans = Vec::new();
         let mut used = 0;
         for (key, word) in hints {
-            let word = if *key == "space" && app.going.is_some() { "pause" } else { word };
+            let word = if *key == "space" && app.session.run_mode.is_some() { "pause" } else { word };
             used += key.width() + word.width() + 3;
             spans.extend([Span::styled(*key, THEME.key), Span::styled(format!(" {word}  "), THEME.quiet)]);
         }

@@ -6,12 +6,12 @@ use ratatui::style::Style;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Clear, Padding, Widget};
 
-use super::fit;
+use super::panel::fit;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The list, at the foot of an area.
-pub struct Suggestions<'a>(pub &'a App);
+pub struct SuggestionsOverlay<'a>(pub &'a App);
 
 /// Instructions that are listed at a time.
 const ROWS: u16 = 8;
@@ -23,10 +23,11 @@ pub(super) fn place(app: &App, page: Rect) -> Option<Rect> {
     (!app.completions().is_empty()).then_some(area)
 }
 
-impl Widget for Suggestions<'_> {
+impl Widget for SuggestionsOverlay<'_> {
     fn render(self, page: Rect, buf: &mut Buffer) {
         let found = self.0.completions();
-        let title = if self.0.editor.text().is_empty() { " Told before, or sensible here " } else { " Tab completes " };
+        let title =
+            if self.0.input.editor.text().is_empty() { " Told before, or sensible here " } else { " Tab completes " };
         let Some(area) = place(self.0, page) else { return };
         Clear.render(area, buf);
         let block = Block::bordered().title(Line::styled(title, THEME.title)).padding(Padding::horizontal(1));

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
-use super::{panel, put, wrap};
+use super::panel::{panel, put, wrap};
 use crate::episode::rollout::End;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -15,7 +15,7 @@ pub struct TaskPanel<'a>(pub &'a App);
 
 impl Widget for TaskPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let Some(now) = &self.0.now else {
+        let Some(now) = &self.0.session.now else {
             panel(buf, area, "Task", "");
             return;
         };

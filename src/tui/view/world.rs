@@ -6,26 +6,27 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-use super::{fit, map, panel, put};
+use super::map;
+use super::panel::{fit, panel, put};
 use crate::explore::inspect::{Thing, things};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
-/// The page.
-pub struct World<'a>(pub &'a App);
+/// The page: the floor plan, and every thing with what can be done to it.
+pub struct WorldView<'a>(pub &'a App);
 
 /// Rows that the details of the selected thing take.
 const DETAILS: u16 = 7;
 
-impl Widget for World<'_> {
+impl Widget for WorldView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let Some(now) = &app.now else { return };
+        let Some(now) = &app.session.now else { return };
         let [plan, list] = parts(area);
-        map::Map(app).render(plan, buf);
+        map::MapPanel(app).render(plan, buf);
         let things = things(now);
         self.list(&things, list, buf);
-        if let Some(thing) = things.get(app.selected) {
+        if let Some(thing) = things.get(app.world.selected) {
             details(thing, Rect { y: list.bottom(), height: DETAILS, ..list }, buf);
         }
     }
@@ -38,17 +39,17 @@ pub(super) fn parts(page: Rect) -> [Rect; 2] {
     [Rect { width, ..page }, Rect { x: page.x + left, width: page.width - left, height: page.height - DETAILS, ..page }]
 }
 
-impl World<'_> {
+impl WorldView<'_> {
     fn list(&self, things: &[Thing], area: Rect, buf: &mut Buffer) {
         let could = things.iter().filter(|thing| !thing.possible.is_empty()).count();
         let seen = things.iter().filter(|thing| thing.seen).count();
         let right = format!("{could} usable, {seen} seen, {} in all", things.len());
         let inner = panel(buf, area, "Things", &right);
         let rows = usize::from(inner.height);
-        let first = (self.0.selected + 1).saturating_sub(rows);
+        let first = (self.0.world.selected + 1).saturating_sub(rows);
         let room = usize::from(inner.width).saturating_sub(26);
         for (row, (at, thing)) in inner.rows().zip(things.iter().enumerate().skip(first)) {
-            let selected = at == self.0.selected;
+            let selected = at == self.0.world.selected;
             let style = match (selected, thing.possible.is_empty(), thing.seen) {
                 (true, ..) => THEME.chosen,
                 (false, false, _) => THEME.key,

@@ -5,25 +5,25 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
-use super::{panel, put, wrap};
 use crate::analysis::chain::Handover;
-use crate::explore::chained::Chained;
+use crate::explore::chain_report::ChainReport;
+use crate::explore::exploration::Snapshot;
 use crate::explore::inspect::{changes, stands};
-use crate::explore::session::Snapshot;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
+use crate::tui::view::panel::{panel, put, wrap};
 
 /// The panel, with a column a policy.
 pub(super) struct LinkPanel<'a> {
     pub(super) app: &'a App,
-    pub(super) sides: &'a [&'a Chained],
+    pub(super) sides: &'a [&'a ChainReport],
 }
 
 impl Widget for LinkPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let at = self.app.selected.min(self.sides[0].links.len().saturating_sub(1));
+        let at = self.app.chain.selected.min(self.sides[0].links.len().saturating_sub(1));
         let inner = panel(buf, area, &format!("Link {}", at + 1), "entry and exit, told link by link");
-        let (Some(now), Some(link)) = (&self.app.now, self.sides[0].links.get(at)) else { return };
+        let (Some(now), Some(link)) = (&self.app.session.now, self.sides[0].links.get(at)) else { return };
         put(buf, inner, 0, link.as_str(), THEME.instruction);
         let many = self.sides.len() as u16;
         let width = (inner.width - 2 * (many - 1)) / many;
@@ -40,7 +40,7 @@ impl Widget for LinkPanel<'_> {
     }
 }
 
-fn lines(side: &Chained, at: usize, head: Option<&str>, now: &Snapshot, area: Rect, buf: &mut Buffer) {
+fn lines(side: &ChainReport, at: usize, head: Option<&str>, now: &Snapshot, area: Rect, buf: &mut Buffer) {
     let mut row = 0;
     let mut line = |label: &str, text: &str, style: Style| {
         for (at, part) in wrap(text, usize::from(area.width).saturating_sub(LABEL), "").into_iter().enumerate() {

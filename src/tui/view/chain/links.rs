@@ -6,17 +6,17 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-use super::{panel, put};
 use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
-use crate::explore::chained::Chained;
+use crate::explore::chain_report::ChainReport;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use crate::tui::view::fit;
+use crate::tui::view::panel::fit;
+use crate::tui::view::panel::{panel, put};
 
 /// The table. The first side is the one whose links are replayed.
 pub(super) struct Links<'a> {
     pub(super) app: &'a App,
-    pub(super) sides: &'a [&'a Chained],
+    pub(super) sides: &'a [&'a ChainReport],
 }
 
 /// Columns of an outcome, of a rate, and of a value.
@@ -38,9 +38,9 @@ impl Widget for Links<'_> {
         let top = self.sides.len() as u16;
         let weakest = own.trials.as_ref().and_then(LinkSuccess::weakest);
         let rows = usize::from(inner.height.saturating_sub(top + 1));
-        let first = (self.app.selected + 1).saturating_sub(rows);
+        let first = (self.app.chain.selected + 1).saturating_sub(rows);
         for (row, (at, link)) in (top..).zip(own.links.iter().enumerate().skip(first).take(rows)) {
-            let (weak, selected) = (weakest == Some(at), self.app.selected == at);
+            let (weak, selected) = (weakest == Some(at), self.app.chain.selected == at);
             let mut spans = vec![
                 Span::styled(
                     format!("{}{:<2}", if selected { ">" } else { " " }, at + 1),
@@ -85,7 +85,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn fitting(width: usize, sides: &[&Chained]) -> Columns {
+    fn fitting(width: usize, sides: &[&ChainReport]) -> Columns {
         let mut link = width.saturating_sub(3 + 2 * OUTCOME * sides.len());
         let mut take = |columns: usize| {
             let fits = link >= LINK + columns;
@@ -99,7 +99,7 @@ impl Columns {
     }
 
     /// The names of the columns, and where there are two policies theirs above.
-    fn head(&self, sides: &[&Chained]) -> Vec<String> {
+    fn head(&self, sides: &[&ChainReport]) -> Vec<String> {
         let width = self.link;
         let mut names = format!("   {:<width$}", "");
         let mut head = format!("   {:<width$}", "link");

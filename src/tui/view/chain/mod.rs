@@ -1,22 +1,20 @@
 //! The page of a chain: how each link came out, how warm each was over time, and what the selected one began and ended with.
 //! Where two policies followed the same chain, they stand side by side.
 
-mod heat;
+mod link_values;
 mod link;
 mod links;
-
-pub use heat::warmth;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
-use super::{panel, put, wrap};
-use crate::explore::chained::Chained;
+use crate::explore::chain_report::ChainReport;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use heat::Strips;
+use crate::tui::view::panel::{panel, put, wrap};
 use link::LinkPanel;
+use link_values::LinkValueStrips;
 use links::Links;
 
 /// Rows that the selected link takes at least, where it is shown.
@@ -24,14 +22,14 @@ const LINK: u16 = 6;
 /// Links that a strip shows at least, where there are so many.
 const SHOWN: u16 = 4;
 
-/// The page.
-pub struct ChainPage<'a>(pub &'a App);
+/// The page: links, their values over time, and the selected link.
+pub struct ChainView<'a>(pub &'a App);
 
-impl Widget for ChainPage<'_> {
+impl Widget for ChainView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
-        let Some(chain) = &app.chain else {
-            let inner = panel(buf, area, "Chain", app.working.as_deref().unwrap_or(""));
+        let Some(chain) = &app.chain.own else {
+            let inner = panel(buf, area, "Chain", app.session.working.as_deref().unwrap_or(""));
             let text = "A chain is a list of instructions that are followed one after the other from this state. Press enter \
                         and type one (take the knife; slice the tomato), or nothing for the steps of the task. w then shows \
                         which link breaks, and A how another agent fares with it.";
@@ -40,10 +38,10 @@ impl Widget for ChainPage<'_> {
             }
             return;
         };
-        let sides: Vec<&Chained> = std::iter::once(chain).chain(&app.rival).collect();
+        let sides: Vec<&ChainReport> = std::iter::once(chain).chain(&app.chain.rival).collect();
         let [table, strips, link] = parts(area, chain.links.len() as u16, sides.len() as u16);
         Links { app, sides: &sides }.render(table, buf);
-        Strips { sides: &sides, selected: app.selected }.render(strips, buf);
+        LinkValueStrips { sides: &sides, selected: app.chain.selected }.render(strips, buf);
         if link.height > 0 {
             LinkPanel { app, sides: &sides }.render(link, buf);
         }

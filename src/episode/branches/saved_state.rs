@@ -1,0 +1,69 @@
+//! A saved state: one with everything that decides what follows from it, and how a policy comes to one from elsewhere.
+
+use std::sync::Arc;
+
+use crate::agent::{Policy, PolicyState};
+use crate::domain::World;
+use crate::episode::record::Author;
+use crate::episode::rollout::Rollout;
+use crate::house::grading::Grader;
+
+/// A state with everything that decides what follows from it.
+#[derive(Clone, Debug)]
+pub struct SavedState {
+    /// The house.
+    pub world: Arc<World>,
+    /// How far the task is.
+    pub grader: Option<Grader>,
+    /// After how many steps the episode ends.
+    pub horizon: Option<u32>,
+    /// What the agent is told.
+    pub instruction: String,
+    /// Who decides.
+    pub author: Author,
+    /// What the policy carries.
+    pub carried: PolicyState,
+}
+
+impl SavedState {
+    /// The present state of a rollout.
+    pub fn of(rollout: &Rollout, author: &Author, carried: PolicyState) -> SavedState {
+        SavedState {
+            world: Arc::new(rollout.env.house.world().clone()),
+            grader: rollout.env.grader.clone(),
+            horizon: rollout.horizon,
+            instruction: rollout.instruction.clone(),
+            author: author.clone(),
+            carried,
+        }
+    }
+
+    /// Brings a rollout to this state, `steps` into the episode.
+    pub fn restore(&self, rollout: &mut Rollout, steps: u32) {
+        rollout.instruction.clone_from(&self.instruction);
+        rollout.horizon = self.horizon;
+        rollout.env.house.restore((*self.world).clone());
+        rollout.env.grader.clone_from(&self.grader);
+        rollout.set_steps(steps);
+    }
+}
+
+/// Frames that a trained agent looks back on, the present one included.
+pub const FRAMES: usize = 5;
+
+/// Lets a policy begin in the middle of an episode as if it had been there all along: it looks at the states before this one
+/// (`before`, the newest first), `now` steps into the episode.
+pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout, before: &[SavedState], now: u32) {
+    policy.reset(0, author.seed);
+    policy.set_sampling(author.sampling);
+    if before.is_empty() {
+        return;
+    }
+    let present = SavedState::of(rollout, author, PolicyState::Nothing);
+    for (back, moment) in before.iter().enumerate().take(FRAMES - 1).rev() {
+        moment.restore(rollout, now.saturating_sub(back as u32 + 1));
+        // What it would have done is of no interest here; an expert may not even know.
+        let _ = rollout.decide(policy);
+    }
+    present.restore(rollout, now);
+}

@@ -1,0 +1,30 @@
+//! A step that was taken, with the distribution behind it.
+
+use std::sync::Arc;
+
+use crate::agent::{Decision, Values};
+use crate::episode::record::{Author, TraceStep};
+
+/// A step that was taken.
+#[derive(Clone, Debug)]
+pub struct TakenStep {
+    /// What was decided, and the distribution behind it.
+    pub decision: Decision,
+    /// What was recorded of it; `told` and `by` are left out, they follow from the neighbours.
+    pub step: TraceStep,
+    /// What the agent was told.
+    pub instruction: Arc<str>,
+    /// Who chose.
+    pub author: Author,
+    /// What the critics made of the state before it.
+    pub values: Option<Values>,
+}
+
+impl TakenStep {
+    /// Whether another step is the same choice: then it led to the same state.
+    pub(crate) fn is_same(&self, other: &TakenStep) -> bool {
+        self.decision.action == other.decision.action
+            && self.instruction == other.instruction
+            && self.author == other.author
+    }
+}

@@ -1,0 +1,98 @@
+//! Who decides: which policy, which checkpoint, which chance.
+
+use super::Exploration;
+use crate::agent::Policy;
+use crate::agent::registry::{Loaded, PolicyIdentity, PolicyKind};
+use crate::episode::record::Author;
+
+impl Exploration {
+    /// Loads the chosen policy; slow the first time for the agent. It decides from here on, having seen the last frames.
+    ///
+    /// # Errors
+    /// When it cannot be loaded; the one before stays.
+    pub fn choose(&mut self, kind: PolicyKind) -> anyhow::Result<()> {
+        let Loaded { policy, checkpoint } = self.policies.make(kind)?;
+        self.acting.author.policy = policy.name().to_string();
+        self.acting.author.checkpoint = checkpoint;
+        self.acting.policy = Some(policy);
+        self.acting.kind = kind;
+        self.look_back();
+        self.make_start();
+        Ok(())
+    }
+
+    /// Lets another checkpoint be the agent, by name or number, and loads it.
+    ///
+    /// # Errors
+    /// When there is none such, or it cannot be loaded; the one before stays.
+    pub fn checkpoint(&mut self, wanted: &str) -> anyhow::Result<()> {
+        let before = self.policies.chosen();
+        self.policies.choose(wanted)?;
+        let chosen = self.choose(PolicyKind::Agent);
+        if chosen.is_err() {
+            self.policies.choose(&(before + 1).to_string())?;
+        }
+        chosen
+    }
+
+    /// The names of the checkpoints that may act.
+    pub fn checkpoints(&self) -> &[String] {
+        &self.checkpoints
+    }
+
+    /// Another policy of the present kind, for work beside the episode.
+    ///
+    /// # Errors
+    /// When it cannot be loaded.
+    pub fn another_policy(&self) -> anyhow::Result<Box<dyn Policy>> {
+        Ok(self.policies.make(self.acting.kind)?.policy)
+    }
+
+    /// A policy to be set beside the one that acts: the expert, chance, or a checkpoint by name or number.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be loaded.
+    pub fn rival(&self, wanted: &str) -> anyhow::Result<Loaded> {
+        self.policies.named(wanted)
+    }
+
+    /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
+    pub fn reseed(&mut self, seed: u64, samples: bool) {
+        self.acting.author.seed = seed;
+        self.acting.author.sampling = samples;
+        self.look_back();
+        self.make_start();
+    }
+
+    /// Lets that author's policy begin here: its chance, and whether it draws.
+    pub fn begin_as(&mut self, author: Author) {
+        self.acting.author = author;
+        self.look_back();
+        self.make_start();
+    }
+
+    /// What tells the policy that decides from others.
+    pub fn who(&self) -> PolicyIdentity {
+        PolicyIdentity { name: self.acting.author.policy.clone(), checkpoint: self.acting.author.checkpoint.clone() }
+    }
+
+    /// Who decides, and by which chance.
+    pub fn author(&self) -> &Author {
+        &self.acting.author
+    }
+
+    /// The seed of the episode, by which it began.
+    pub fn episode_seed(&self) -> u64 {
+        self.episode.seed
+    }
+
+    /// Which policy decides.
+    pub fn policy(&self) -> PolicyKind {
+        self.acting.kind
+    }
+
+    /// Whether a policy is loaded.
+    pub fn has_policy(&self) -> bool {
+        self.acting.policy.is_some()
+    }
+}

@@ -1,0 +1,154 @@
+//! The present state as a screen shows it.
+
+use std::sync::Arc;
+
+use super::Exploration;
+use crate::agent::Reading;
+use crate::agent::registry::PolicyKind;
+use crate::domain::{Cell, Scene, World};
+use crate::episode::branches::FRAMES;
+use crate::episode::rollout::End;
+use crate::explore::timeline::Timeline;
+use crate::house::House;
+use crate::house::grading::describe;
+use crate::house::view::{Candidate, Frame, View};
+
+/// Everything that a screen shows of the present state.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Counts the episodes of this session, from 1.
+    pub episode: u32,
+    /// The floor plan.
+    pub scene: Arc<Scene>,
+    /// The seed of the house, or of the episode's chance.
+    pub seed: u64,
+    /// Everything that can change in the house.
+    pub world: World,
+    /// What the agent sees.
+    pub frame: Arc<Frame>,
+    /// Which instances it sees.
+    pub view: View,
+    /// What could be done now, by action and distance.
+    pub candidates: Vec<Candidate>,
+    /// What the agent is told.
+    pub instruction: String,
+    /// How many steps were taken.
+    pub step: u32,
+    /// After how many it ends.
+    pub horizon: Option<u32>,
+    /// How many the expert takes for the task.
+    pub expert_steps: Option<u32>,
+    /// The task, where one applies.
+    pub progress: Option<TaskProgress>,
+    /// Why the episode is over, if it is.
+    pub end: Option<End>,
+    /// Where the agent has been.
+    pub path: Vec<Cell>,
+    /// Which policy decides.
+    pub policy: PolicyKind,
+    /// The policy's own name; a checkpoint's.
+    pub acts: String,
+    /// What was tried.
+    pub time: Arc<Timeline>,
+    /// The frames before this one that the agent sees too, newest first; only where they are asked for.
+    pub recent: Vec<Arc<Frame>>,
+    /// What the sentence encoder makes of the instruction.
+    pub reading: Option<Reading>,
+    /// Instructions that make sense in this house.
+    pub examples: Arc<Vec<String>>,
+    /// The checkpoints that may act.
+    pub checkpoints: Arc<Vec<String>>,
+}
+
+/// How far a task has come.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskProgress {
+    /// What each subtask asks, in words.
+    pub subtasks: Vec<String>,
+    /// The step at which each completed subtask was.
+    pub completed_at: Vec<u32>,
+    /// What the current one waits for, in words.
+    pub waits_for: String,
+}
+
+impl Exploration {
+    /// The present state for a screen; draws the frame when it changed.
+    pub fn snapshot(&mut self) -> Snapshot {
+        let candidates = self.rollout.env.house.candidates();
+        let frame = match &self.frames.present {
+            Some(frame) => frame.clone(),
+            None => self.frames.present.insert(Arc::new(self.rollout.env.house.frame().clone())).clone(),
+        };
+        let view = self.rollout.env.house.view().clone();
+        let progress = self.progress();
+        let recent = self.recent();
+        let house = &self.rollout.env.house;
+        let mut path: Vec<Cell> = self.tree.past().map(|moment| moment.world.agent.cell).collect();
+        path.dedup();
+        Snapshot {
+            episode: self.episode.number,
+            scene: house.scene().clone(),
+            seed: self.episode.seed,
+            world: house.world().clone(),
+            frame,
+            view,
+            candidates,
+            instruction: self.rollout.instruction.clone(),
+            step: self.rollout.steps(),
+            horizon: self.rollout.horizon,
+            expert_steps: self
+                .episode
+                .task
+                .as_ref()
+                .filter(|_| self.rollout.env.grader.is_some())
+                .map(|task| task.expert_steps),
+            progress,
+            end: self.rollout.end(),
+            path,
+            policy: self.acting.kind,
+            acts: self.acting.author.policy.clone(),
+            time: Arc::new(Timeline::of(&self.tree)),
+            recent,
+            reading: self.acting.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
+            examples: self.episode.examples.clone(),
+            checkpoints: self.checkpoints.clone(),
+        }
+    }
+
+    /// How far the task has come, where one applies.
+    pub fn progress(&self) -> Option<TaskProgress> {
+        let (grader, house) = (self.rollout.env.grader.as_ref()?, &self.rollout.env.house);
+        let steps = (1..=self.tree.at()).zip(self.tree.steps());
+        Some(TaskProgress {
+            subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
+            completed_at: steps.filter(|(_, taken)| taken.step.subtask.is_some()).map(|(step, _)| step).collect(),
+            waits_for: grader.waits_for(house.scene(), house.world()),
+        })
+    }
+
+    /// The frames before the present one that a trained agent sees too, newest first.
+    fn recent(&mut self) -> Vec<Arc<Frame>> {
+        if !self.frames.looks_back {
+            return Vec::new();
+        }
+        let scene = self.rollout.env.house.scene().clone();
+        let mut worlds: Vec<Arc<World>> =
+            self.tree.past().rev().skip(1).take(FRAMES - 1).map(|m| m.world.clone()).collect();
+        // Before the first frame there was the first one.
+        let first = self.tree.past().next().map(|moment| moment.world.clone());
+        worlds.extend(std::iter::repeat_n(first, FRAMES).flatten());
+        worlds.truncate(FRAMES - 1);
+        let Some(start) = worlds.first() else { return Vec::new() };
+        let mut house = House::new(scene, (**start).clone());
+        let mut draw = |world: Arc<World>| {
+            house.restore((*world).clone());
+            Arc::new(house.frame().clone())
+        };
+        worlds.into_iter().map(&mut draw).collect()
+    }
+
+    /// Whether snapshots hold the frames before the present one.
+    pub fn set_looking_back(&mut self, looks_back: bool) {
+        self.frames.looks_back = looks_back;
+    }
+}

@@ -1,0 +1,53 @@
+//! What keys mean at the moment, and what was typed.
+
+use crate::tui::editor::Editor;
+use crate::tui::keys::Mode;
+
+/// What keys mean at the moment, and what was typed.
+pub struct InputState {
+    /// What keys mean.
+    pub mode: Mode,
+    /// What keys meant before typing or help.
+    pub under: Mode,
+    /// The instruction line while somebody types.
+    pub editor: Editor,
+    /// The line of a verb while somebody types.
+    pub palette: Editor,
+    /// The verb of the palette's list that is selected.
+    pub selected_verb: usize,
+    /// Nobody has explored here before: the last row says how to begin.
+    pub newcomer: bool,
+}
+
+impl InputState {
+    /// A policy acts at first, or a person.
+    pub fn new(manual: bool) -> InputState {
+        let mode = if manual { Mode::Manual } else { Mode::Watch };
+        InputState {
+            mode,
+            under: mode,
+            editor: Editor::default(),
+            palette: Editor::default(),
+            selected_verb: 0,
+            newcomer: false,
+        }
+    }
+
+    /// Whether a person acts.
+    pub fn by_hand(&self) -> bool {
+        self.mode == Mode::Manual || (self.mode != Mode::Watch && self.under == Mode::Manual)
+    }
+
+    /// Opens a line or list over the screen; what keys meant before comes back when it closes.
+    pub fn open(&mut self, mode: Mode) {
+        if matches!(self.mode, Mode::Watch | Mode::Manual) {
+            self.under = self.mode;
+        }
+        self.mode = mode;
+    }
+
+    /// Closes what was opened.
+    pub fn close(&mut self) {
+        self.mode = self.under;
+    }
+}

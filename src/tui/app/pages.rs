@@ -1,0 +1,125 @@
+//! What each page remembers of itself.
+
+use std::sync::Arc;
+
+use crate::analysis::instruction_ab::Contrast;
+use crate::analysis::value_map::ValueMap;
+use crate::domain::Heading;
+use crate::explore::chain_report::ChainReport;
+use crate::explore::choices::Sort;
+use crate::explore::timeline::Divergence;
+use crate::tui::graphics::overlay::Overlay;
+
+/// The main page: all panels.
+pub struct MainPageState {
+    /// What the frame's panel shows.
+    pub overlay: Overlay,
+    /// Numbers are drawn into the picture.
+    pub numbers: bool,
+    /// Which page of the interactions is shown, from 0.
+    pub interactions: usize,
+}
+
+/// The page of branches.
+#[derive(Default)]
+pub struct BranchesPageState {
+    /// The branch that is selected.
+    pub selected: usize,
+    /// How it and the one in hand part, where that was asked for.
+    pub divergence: Option<Divergence>,
+}
+
+/// The page of the policy's choices.
+pub struct MindPageState {
+    /// The first choice that is wanted in sight.
+    pub selected: usize,
+    /// How they are sorted.
+    pub sort: Sort,
+}
+
+/// The page of the house.
+#[derive(Default)]
+pub struct WorldPageState {
+    /// The thing that is selected.
+    pub selected: usize,
+}
+
+/// The page of two instructions.
+#[derive(Default)]
+pub struct ComparePageState {
+    /// The first choice that is wanted in sight.
+    pub selected: usize,
+    /// Two instructions in one state.
+    pub contrast: Option<Contrast>,
+    /// In which state that was: the branch and the step.
+    pub state: Option<(usize, u32)>,
+}
+
+/// The page of a chain.
+#[derive(Default)]
+pub struct ChainPageState {
+    /// The link that is selected.
+    pub selected: usize,
+    /// The chain that is followed.
+    pub own: Option<ChainReport>,
+    /// The same chain followed by another policy.
+    pub rival: Option<ChainReport>,
+}
+
+/// The values of the cells, on the maps of two pages.
+#[derive(Default)]
+pub struct ValueMapState {
+    /// They are painted.
+    pub is_painted: bool,
+    /// The values, and the step of the house that they are for.
+    pub map: Option<(Arc<ValueMap>, u32)>,
+    /// The heading whose values are painted; the best without one.
+    pub heading: Option<Heading>,
+}
+
+impl Default for MainPageState {
+    fn default() -> MainPageState {
+        MainPageState { overlay: Overlay::Colour, numbers: true, interactions: 0 }
+    }
+}
+
+impl Default for MindPageState {
+    fn default() -> MindPageState {
+        MindPageState { selected: 0, sort: Sort::Probability }
+    }
+}
+
+impl ChainPageState {
+    /// Takes in a chain: in the place of what the same policy made of it, or beside what another one did.
+    pub fn take_in(&mut self, report: ChainReport) {
+        match &self.own {
+            Some(known) if known.is_same_chain(&report) && known.who != report.who => self.rival = Some(report),
+            _ => {
+                self.rival = self.rival.take().filter(|rival| rival.is_same_chain(&report));
+                self.own = Some(report);
+            }
+        }
+    }
+}
+
+impl ValueMapState {
+    /// Paints values, or ends that; what was painted is of another time.
+    pub fn toggle(&mut self) {
+        self.is_painted = !self.is_painted;
+        self.map = None;
+    }
+
+    /// The map, where it is painted.
+    pub fn painted(&self) -> Option<&(Arc<ValueMap>, u32)> {
+        self.map.as_ref().filter(|_| self.is_painted)
+    }
+
+    /// The heading after this one: the best, then north and around.
+    pub fn next_heading(&self) -> Option<Heading> {
+        match self.heading {
+            None => Some(Heading::North),
+            Some(Heading::West) => None,
+            Some(heading) => Some(heading.right()),
+        }
+    }
+}

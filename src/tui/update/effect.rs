@@ -1,0 +1,37 @@
+//! What the screen has to do beside changing its state.
+
+use crate::explore::session::SessionCommand;
+
+/// Something to be done about a message.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// Ask the session.
+    Send(SessionCommand),
+    /// Encode the frame again.
+    Encode,
+    /// Draw the whole screen again.
+    Repaint,
+    /// Put text on the terminal's clipboard.
+    Copy(String),
+    /// Keep an instruction for later sessions.
+    Remember(String),
+    /// Hear the mouse, or no longer.
+    Mouse(bool),
+    /// End the program, for that reason.
+    Quit(ExitReason),
+}
+
+/// How the explorer ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ExitReason {
+    /// The person wanted to.
+    Asked,
+    /// A signal of that number came.
+    Signal(i32),
+    /// The worker stopped.
+    WorkerGone,
+}
+
+pub(super) fn send(command: SessionCommand) -> Vec<Effect> {
+    vec![Effect::Send(command)]
+}

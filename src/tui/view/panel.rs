@@ -1,0 +1,85 @@
+//! What all panels are made of: a title over a rule, text that fits, bars.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+use crate::tui::theme::THEME;
+
+/// Draws a panel's title over a rule, with something quiet at its right; returns the rest of the panel.
+pub(super) fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
+    let width = usize::from(area.width);
+    let right = fit(right, width.saturating_sub(title.width() + 4));
+    let rule = width.saturating_sub(title.width() + 1 + if right.is_empty() { 0 } else { right.width() + 1 });
+    let mut spans =
+        vec![Span::styled(title.to_string(), THEME.title), Span::raw(" "), Span::styled("─".repeat(rule), THEME.quiet)];
+    if !right.is_empty() {
+        spans.extend([Span::raw(" "), Span::raw(right)]);
+    }
+    Line::from(spans).render(Rect { height: 1.min(area.height), ..area }, buf);
+    Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area }
+}
+
+/// Text cut to `width` columns, the cut marked.
+pub(super) fn fit(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_string();
+    }
+    let mut short = String::new();
+    for c in text.chars() {
+        if short.width() + c.width().unwrap_or(0) + 1 > width {
+            break;
+        }
+        short.push(c);
+    }
+    if width > 0 {
+        short.push('…');
+    }
+    short
+}
+
+/// Lines of at most `width` columns, broken at spaces; later lines start with `indent`.
+pub(super) fn wrap(text: &str, width: usize, indent: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let fresh = lines.len() > 1;
+        let line = lines.last_mut().map_or("", |line| line.as_str());
+        let start = if fresh { indent.width() } else { 0 };
+        if line.width() > start && line.width() + 1 + word.width() > width {
+            lines.push(format!("{indent}{word}"));
+        } else if let Some(line) = lines.last_mut() {
+            if line.width() > start {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines.iter().map(|line| fit(line, width)).collect()
+}
+
+/// A bar of `share` (0 to 1) of `width` columns, in eighths of a column.
+pub(super) fn bar(share: f32, width: usize) -> String {
+    const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
+    let eighths = (share.clamp(0.0, 1.0) * 8.0 * width as f32).round() as usize;
+    let mut bar = "█".repeat(eighths / 8);
+    if !eighths.is_multiple_of(8) {
+        bar.push(EIGHTHS[eighths % 8]);
+    }
+    format!("{bar:<width$}")
+}
+
+/// A probability in three columns: `.07`, `1.0`.
+pub(super) fn share(p: f32) -> String {
+    if p >= 0.995 { "1.0".into() } else { format!("{p:.2}").trim_start_matches('0').to_string() }
+}
+
+/// A line of text at a row of an area.
+pub(super) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String>, style: Style) {
+    if row < area.height {
+        let line = Rect { y: area.y + row, height: 1, ..area };
+        Line::styled(fit(&text.into(), usize::from(area.width)), style).render(line, buf);
+    }
+}

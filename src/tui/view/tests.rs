@@ -1,0 +1,421 @@
+//! What the screens look like: pictures of them in text, kept and compared.
+
+use std::sync::Arc;
+
+use termprofile::TermProfile;
+
+use super::panel::{bar, fit, share, wrap};
+use crate::agent::registry::{PolicyIdentity, PolicyKind};
+use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
+use crate::analysis::value_map::{CellValue, Measure, ValueMap};
+use crate::domain::{Action, ActionType, World};
+use crate::explore::chain_report::ChainReport;
+use crate::explore::exploration::{Exploration, StepTaken};
+use crate::explore::session::{SessionCommand, SessionEvent};
+use crate::explore::verb::{ExplorerPage, Verb};
+use crate::tui::app::App;
+use crate::tui::graphics::Protocol;
+use crate::tui::keys::bindings;
+use crate::tui::testing::{app, decided, exploration, screen, snapshot, values};
+use crate::tui::theme::Ability;
+use crate::tui::update::{Effect, Msg, on_action, update};
+
+/// The smallest screen, and a large one.
+const SIZES: [(u16, u16); 2] = [(80, 24), (120, 36)];
+/// Every page but the main one.
+const PAGES: [ExplorerPage; 5] =
+    [ExplorerPage::Branches, ExplorerPage::Mind, ExplorerPage::World, ExplorerPage::Compare, ExplorerPage::Chain];
+
+fn check(name: &str, text: &str) {
+    insta::with_settings!({ snapshot_path => "../snapshots", prepend_module_to_snapshot => false }, {
+        insta::assert_snapshot!(name, text);
+    });
+}
+
+#[test]
+fn watching_at_80_by_24_and_120_by_36() {
+    for (name, width, height) in [("watch-80x24", 80, 24), ("watch-120x36", 120, 36)] {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        for (number, action) in [(1, "RotateLeft"), (2, "MoveAhead")] {
+            let step = StepTaken {
+                step: number,
+                action: action.into(),
+                outcome: crate::house::Outcome::Done,
+                by_hand: number == 2,
+                completed: None,
+                forked: None,
+                distribution: None,
+                progress: None,
+                end: None,
+            };
+            update(&mut app, Msg::Session(SessionEvent::Stepped(Box::new(step))));
+        }
+        check(name, &screen(&mut app));
+    }
+}
+
+#[test]
+fn typing_shows_what_the_agent_is_told_now() {
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        on_action(&mut app, Verb::Edit);
+        check(&format!("examples-{width}x{height}"), &screen(&mut app));
+        update(&mut app, Msg::Paste("pick up the p".into()));
+        check(&format!("typing-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn another_instruction_ends_the_task_and_the_expert_says_so() {
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        let mut exploration = exploration();
+        let note = exploration.instruct("open the fridge").unwrap();
+        let (old, new) = ("put the mug in the sink".to_string(), "open the fridge".to_string());
+        update(&mut app, Msg::Session(SessionEvent::Instructed { old, new, note }));
+        update(&mut app, Msg::Session(SessionEvent::State(Box::new(snapshot(&mut exploration)))));
+        update(&mut app, Msg::Session(SessionEvent::Failed("the expert needs a task".into())));
+        check(&format!("no-task-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn help_names_every_key() {
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        on_action(&mut app, Verb::Help);
+        check(&format!("help-{width}x{height}"), &screen(&mut app));
+        on_action(&mut app, Verb::Cancel);
+        on_action(&mut app, Verb::ToggleManual);
+        on_action(&mut app, Verb::Help);
+        check(&format!("help-manual-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn help_is_whole_on_every_page_of_a_small_screen() {
+    for page in PAGES {
+        for manual in [false, true] {
+            let mut app = app(80, 24, Protocol::Ascii, Ability::FULL);
+            on_action(&mut app, Verb::Show(page));
+            if manual {
+                on_action(&mut app, Verb::ToggleManual);
+            }
+            on_action(&mut app, Verb::Help);
+            let text = screen(&mut app);
+            let bindings = bindings(app.input.under, app.page).filter(|binding| !binding.label.is_empty());
+            for binding in bindings {
+                let help = binding.help;
+                assert!(
+                    !help.is_empty() && text.contains(help),
+                    "{page:?}: no {help:?} for {}:\n{text}",
+                    binding.label
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn values_are_painted_for_one_heading_or_the_best() {
+    for (width, height) in SIZES {
+        let mut app =
+            app(width, height, Protocol::HalfBlocks, Ability { colours: TermProfile::NoColor, unicode: true });
+        let cells = app.session.now.as_ref().unwrap().scene.cells.clone();
+        let values = (0u8..).zip(&cells).map(|(at, &cell)| {
+            let value = f32::from(at) / cells.len() as f32;
+            CellValue { cell, values: [value, 1.0 - value, 0.5, 0.0] }
+        });
+        let landscape = ValueMap {
+            instruction: app.session.now.as_ref().unwrap().instruction.clone(),
+            measure: Measure::Value,
+            cells: values.collect(),
+            of: cells.len(),
+        };
+        on_action(&mut app, Verb::Show(ExplorerPage::World));
+        assert_eq!(on_action(&mut app, Verb::ValueMap), [Effect::Send(SessionCommand::ValueMap)]);
+        update(&mut app, Msg::Session(SessionEvent::ValueMap(Arc::new(landscape.clone()), 0)));
+        assert!(screen(&mut app).contains("best heading: 0."), "{}", screen(&mut app));
+        on_action(&mut app, Verb::NextHeading);
+        check(&format!("values-{width}x{height}"), &screen(&mut app));
+        let values = app.value_map.map.take().map(|(values, _)| (values, 7));
+        app.value_map.map = values;
+        let text = screen(&mut app);
+        assert!(text.contains("as of step 7") || text.contains(" @7"), "{text}");
+        assert_eq!(on_action(&mut app, Verb::ValueMap), [Effect::Send(SessionCommand::StopValueMap)]);
+        update(&mut app, Msg::Session(SessionEvent::ValueMap(Arc::new(landscape), 0)));
+        assert!(app.value_map.map.is_none(), "what was cancelled and still arrives is not shown");
+    }
+}
+
+#[test]
+fn a_newcomer_is_told_how_to_begin_until_the_first_key() {
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        app.input.newcomer = true;
+        let text = screen(&mut app);
+        assert!(text.contains("New here?") && text.contains("?: keys"), "{text}");
+        on_action(&mut app, Verb::Labels);
+        update(&mut app, Msg::Key(crossterm::event::KeyCode::Char('b').into()));
+        assert!(!screen(&mut app).contains("New here?"));
+    }
+}
+
+#[test]
+fn empty_pages_say_what_they_are_for() {
+    for (page, name) in
+        [(ExplorerPage::Branches, "branches"), (ExplorerPage::Compare, "compare"), (ExplorerPage::Chain, "chain")]
+    {
+        for (width, height) in SIZES {
+            let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+            on_action(&mut app, Verb::Show(page));
+            check(&format!("empty-{name}-{width}x{height}"), &screen(&mut app));
+        }
+    }
+}
+
+#[test]
+fn what_is_refused_is_told_on_every_page_until_the_next_key() {
+    let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+    on_action(&mut app, Verb::Show(ExplorerPage::World));
+    update(&mut app, Msg::Session(SessionEvent::Refused("the expert has no values".into())));
+    assert!(screen(&mut app).contains("the expert has no values"));
+    update(&mut app, Msg::Key(crossterm::event::KeyCode::Char('j').into()));
+    assert!(!screen(&mut app).contains("the expert has no values"));
+}
+
+#[test]
+fn without_colour_and_unicode_letters_say_it_all() {
+    let ability = Ability { colours: TermProfile::NoColor, unicode: false };
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::Ascii, ability);
+        let text = screen(&mut app);
+        assert!(text.is_ascii(), "{text}");
+        check(&format!("ascii-{width}x{height}"), &text);
+    }
+}
+
+/// An app whose state is that of an exploration with a fork: main has three steps, b1 leaves it after the first.
+fn forked(width: u16, height: u16) -> (App, Exploration) {
+    let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+    let mut exploration = exploration();
+    let turn = |kind| Action::navigate(kind);
+    for kind in [ActionType::RotateLeft, ActionType::MoveAhead, ActionType::LookDown] {
+        exploration.act(turn(kind)).unwrap();
+    }
+    exploration.seek(1);
+    exploration.act(turn(ActionType::RotateRight)).unwrap();
+    exploration.act(turn(ActionType::LookUp)).unwrap();
+    update(&mut app, Msg::Session(SessionEvent::State(Box::new(snapshot(&mut exploration)))));
+    (app, exploration)
+}
+
+#[test]
+fn whoever_takes_over_sees_the_main_page_drawn_anew() {
+    let (mut app, _) = forked(80, 24);
+    on_action(&mut app, Verb::Show(ExplorerPage::Mind));
+    let effects = on_action(&mut app, Verb::ToggleManual);
+    assert_eq!((app.page, effects), (ExplorerPage::Main, vec![Effect::Encode, Effect::Repaint]));
+}
+
+#[test]
+fn the_first_row_holds_whatever_keeps_the_worker_busy() {
+    for width in [1, 7, 20, 80] {
+        let (mut app, _) = forked(width, 24);
+        for length in 0..usize::from(width) + 3 {
+            app.session.busy = Some("é".repeat(length));
+            assert_eq!(screen(&mut app).lines().next().map(str::is_empty), Some(false), "{length} of {width}");
+        }
+    }
+}
+
+#[test]
+fn branches_are_listed_and_shown_side_by_side() {
+    for (name, width, height) in [("branches-80x24", 80, 24), ("branches-200x60", 200, 60)] {
+        let (mut app, exploration) = forked(width, height);
+        on_action(&mut app, Verb::Show(ExplorerPage::Branches));
+        update(&mut app, Msg::Session(SessionEvent::Diverged(exploration.parted(0))));
+        check(name, &screen(&mut app));
+        let job = app.job().unwrap();
+        assert!(job.frame.width > 2 * job.frame.height && job.labels.is_empty(), "both frames in one picture");
+    }
+}
+
+#[test]
+fn the_mind_has_a_table_of_choices_and_curves() {
+    for (name, width, height) in [("mind-80x24", 80, 24), ("mind-120x36", 120, 36)] {
+        let (mut app, mut exploration) = forked(width, height);
+        let decided = decided(&snapshot(&mut exploration));
+        update(&mut app, Msg::Session(decided));
+        on_action(&mut app, Verb::Show(ExplorerPage::Mind));
+        check(name, &screen(&mut app));
+    }
+}
+
+#[test]
+fn the_world_page_says_why_a_thing_is_no_candidate() {
+    for (name, width, height) in [("world-80x24", 80, 24), ("world-120x36", 120, 36)] {
+        let (mut app, _) = forked(width, height);
+        on_action(&mut app, Verb::Show(ExplorerPage::World));
+        on_action(&mut app, Verb::Select(1));
+        check(name, &screen(&mut app));
+    }
+}
+
+#[test]
+fn two_instructions_are_compared_and_swapped() {
+    for (name, width, height) in [("compare-80x24", 80, 24), ("compare-120x36", 120, 36)] {
+        let (mut app, mut exploration) = forked(width, height);
+        exploration.choose(PolicyKind::Random).unwrap();
+        let contrast = exploration.contrast("open the fridge").unwrap();
+        update(&mut app, Msg::Session(SessionEvent::Compared(Box::new(contrast))));
+        check(name, &screen(&mut app));
+        let at = exploration.tree().at();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        update(&mut app, Msg::Session(SessionEvent::State(Box::new(snapshot(&mut exploration)))));
+        assert!(screen(&mut app).contains(&format!("as of step {at} on ")), "{}", screen(&mut app));
+        let effects = on_action(&mut app, Verb::Ask(SessionCommand::Swap));
+        assert_eq!(effects, [Effect::Send(SessionCommand::Swap)]);
+    }
+}
+
+/// A chain of three links by a policy: the second link is done or not, the link values are V or not.
+fn chained(name: &str, second: bool, by_value: bool) -> ChainReport {
+    let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| LinkOutcome {
+        reached,
+        done: Some(done),
+        steps,
+        entry: World::default(),
+        exit: World::default(),
+        handover: worth.filter(|_| by_value).map(|worth| Handover { worth, next: worth - 0.1, joined: 0.3 }),
+    };
+    let play = |second: bool| ChainRun {
+        outcomes: vec![
+            outcome(true, true, 9, Some(0.62)),
+            outcome(true, second, 14, Some(-0.07)),
+            outcome(second, false, 0, None),
+        ],
+        link_values: (0..23).map(|step| vec![1.0 - step as f32 / 23.0, step as f32 / 23.0, 0.1]).collect(),
+        by_value,
+        in_force: (0..23).map(|step| usize::from(step >= 9)).collect(),
+    };
+    ChainReport {
+        who: PolicyIdentity { name: name.into(), checkpoint: Some(name.into()) },
+        links: vec!["Pick up the knife.".into(), "Slice the tomato.".into(), "Put a slice in the fridge.".into()],
+        start: "a kitchen".into(),
+        graded: true,
+        by_link: Some(play(second)),
+        as_one: Some(play(true)),
+        trials: None,
+    }
+}
+
+#[test]
+fn a_chain_shows_each_link_and_which_one_breaks() {
+    let rate = |done| LinkRate { done, of: 8 };
+    let trials =
+        LinkSuccess { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), LinkRate::default()] };
+    let chained = ChainReport { trials: Some(trials), ..chained("first", false, false) };
+    for (width, height) in SIZES {
+        let (mut app, _) = forked(width, height);
+        on_action(&mut app, Verb::Show(ExplorerPage::Chain));
+        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(chained.clone()))));
+        check(&format!("chain-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn a_critic_shows_values_targets_and_advantages() {
+    for (width, height) in SIZES {
+        let (mut app, mut exploration) = forked(width, height);
+        let now = snapshot(&mut exploration);
+        let SessionEvent::Decided(decision, words, _) = decided(&now) else { panic!() };
+        update(&mut app, Msg::Session(SessionEvent::Decided(decision, words, Some(values(&now)))));
+        check(&format!("critic-watch-{width}x{height}"), &screen(&mut app));
+        on_action(&mut app, Verb::Show(ExplorerPage::Mind));
+        if let Some(now) = &mut app.session.now {
+            let mut time = (*now.time).clone();
+            for (beat, value) in time.steps.iter_mut().zip([0.2, 0.5, 0.4]) {
+                (beat.value, beat.q, beat.entropy, beat.chosen) =
+                    (Some(value), Some(value - 0.1), Some(1.0), Some(0.3));
+            }
+            now.time = Arc::new(time);
+        }
+        check(&format!("critic-mind-{width}x{height}"), &screen(&mut app));
+        on_action(&mut app, Verb::Show(ExplorerPage::Chain));
+        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(chained("sprint", true, true)))));
+        check(&format!("critic-chain-{width}x{height}"), &screen(&mut app));
+        exploration.choose(PolicyKind::Random).unwrap();
+        let mut contrast = exploration.contrast("open the fridge").unwrap();
+        contrast.sides[1].values = Some(values(&now));
+        contrast.sides[0].values = Some(values(&now));
+        update(&mut app, Msg::Session(SessionEvent::Compared(Box::new(contrast))));
+        check(&format!("critic-compare-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn two_policies_follow_the_same_chain_side_by_side() {
+    for (width, height) in [(80, 24), (120, 36), (200, 60)] {
+        let (mut app, _) = forked(width, height);
+        on_action(&mut app, Verb::Show(ExplorerPage::Chain));
+        for report in [chained("sprint", true, true), chained("first", false, false)] {
+            update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(report))));
+        }
+        check(&format!("chains-{width}x{height}"), &screen(&mut app));
+        let again = ChainReport { trials: Some(LinkSuccess::default()), ..chained("first", false, false) };
+        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(again))));
+        assert_eq!(app.chain.own.as_ref().unwrap().who.name, "sprint", "each stays on its side");
+        assert!(app.chain.rival.as_ref().unwrap().trials.is_some());
+        let elsewhere = ChainReport { start: "another kitchen".into(), ..chained("sprint", true, true) };
+        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(elsewhere))));
+        assert!(app.chain.rival.is_none(), "another start is another chain");
+    }
+}
+
+#[test]
+fn the_palette_finds_verbs() {
+    for (width, height) in SIZES {
+        let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+        on_action(&mut app, Verb::Palette("br".into()));
+        check(&format!("palette-{width}x{height}"), &screen(&mut app));
+    }
+}
+
+#[test]
+fn every_page_draws_at_every_size_and_without_colour_in_ascii() {
+    for page in PAGES {
+        for (width, height) in [(80, 24), (97, 31), (200, 60), (300, 40), (80, 90)] {
+            let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
+            on_action(&mut app, Verb::Show(page));
+            screen(&mut app);
+        }
+        let ability = Ability { colours: TermProfile::NoColor, unicode: false };
+        let mut app = app(80, 24, Protocol::Ascii, ability);
+        on_action(&mut app, Verb::Show(page));
+        let text = screen(&mut app);
+        assert!(text.is_ascii(), "{page:?}:\n{text}");
+    }
+}
+
+#[test]
+fn a_small_terminal_is_told_what_is_needed() {
+    let mut app = app(40, 10, Protocol::HalfBlocks, Ability::FULL);
+    check("too-small-40x10", &screen(&mut app));
+}
+
+#[test]
+fn bars_grow_by_eighths() {
+    assert_eq!(bar(0.0, 4), "    ");
+    assert_eq!(bar(1.0, 4), "████");
+    assert_eq!(bar(0.5, 4), "██  ");
+    assert_eq!(bar(0.28, 4), "█▏  ");
+    assert_eq!((share(0.071), share(1.0), share(0.0)), (".07".into(), "1.0".into(), ".00".into()));
+}
+
+#[test]
+fn long_text_is_broken_at_spaces_and_cut_visibly() {
+    assert_eq!(wrap("put the apple in the fridge", 12, "  "), ["put the", "  apple in", "  the fridge"]);
+    assert_eq!(fit("refrigerator", 6), "refri…");
+    assert_eq!(fit("cup", 6), "cup");
+}
