@@ -115,3 +115,32 @@ fn no_tracked_file_names_a_path_of_one_machine() {
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
+
+/// The one file that may step an environment, and those that may step House or its rules behind the seam: the environment that
+/// wraps it, and in the simulator itself the session, recorded actions, the expert and what makes or checks houses.
+const STEPPERS: [(&str, &[&str]); 3] = [
+    ("env.step(", &["src/episode/rollout.rs"]),
+    ("house.step(", &["src/env/house.rs", "src/house/"]),
+    ("rules::apply(", &["src/house/"]),
+];
+
+#[test]
+fn nothing_but_the_rollout_steps_an_environment() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut strays = Vec::new();
+    for source in sources() {
+        let path = source.path.strip_prefix(root).unwrap_or(&source.path).display().to_string();
+        let text = std::fs::read_to_string(&source.path).unwrap();
+        // Tests may step what they test.
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        if path.ends_with("/tests.rs") || path.ends_with("/testing.rs") {
+            continue;
+        }
+        for (call, owners) in STEPPERS {
+            if code.contains(call) && !owners.iter().any(|owner| path.starts_with(owner)) {
+                strays.push(format!("{path} calls {call}...)"));
+            }
+        }
+    }
+    assert!(strays.is_empty(), "{}", strays.join("\n"));
+}

@@ -6,6 +6,7 @@ use tch::{Device, Kind, Tensor};
 use super::config::CheckpointConfig;
 use super::frame_history::SharedEmbedder;
 use super::policy::{Observation, Reading};
+use crate::env;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::frozen::FrameEncoder;
@@ -74,7 +75,7 @@ fn goal_frames(observation: &mut Observation<'_>, history: usize, visual: &dyn F
     let name = observation.environment.name().to_owned();
     let house = observation.environment.house();
     let house = house.with_context(|| format!("the agent is shown its goal by House's expert, and this is {name}"))?;
-    let images: Vec<Vec<u8>> = house.goal_frames(history)?.iter().map(|frame| visual.image(frame)).collect();
+    let images: Vec<Vec<u8>> = env::goal_frames(&house, history)?.iter().map(|frame| visual.image(frame)).collect();
     let missing = history - images.len();
     let stacked: Vec<Vec<u8>> = (0..history).map(|i| images[i.saturating_sub(missing)].clone()).collect();
     Ok(visual.encode(&stacked).flatten(0, 1).unsqueeze(0))

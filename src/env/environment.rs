@@ -3,10 +3,10 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use super::house::HouseEnvironment;
 use crate::domain::{Action, Class, Instance};
-use crate::house::Outcome;
+use crate::house::grading::Grader;
 use crate::house::view::{Candidate, Frame};
+use crate::house::{House, Outcome};
 
 /// What a step came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,14 @@ pub struct Transition {
     pub outcome: Outcome,
     /// The grader credited a subtask with it; never without grading.
     pub completed_subtask: bool,
+}
+
+/// House behind the seam, for what is about House: its map, its expert, its scenes and worlds.
+pub struct HouseAccess<'a> {
+    /// The simulator.
+    pub house: &'a mut House,
+    /// Follows the subtasks, where there is a task.
+    pub grader: Option<&'a Grader>,
 }
 
 /// A state that an environment can go back to. Only the environment that made it can read it; copies share it.
@@ -92,8 +100,8 @@ pub trait Environment: Send {
         anyhow::bail!("{} cannot go back to an earlier state", self.name())
     }
 
-    /// House itself, for what is about House: its map, its expert, its scenes and worlds.
-    fn house(&mut self) -> Option<&mut HouseEnvironment> {
+    /// House itself, where the environment is one.
+    fn house(&mut self) -> Option<HouseAccess<'_>> {
         None
     }
 }
@@ -139,7 +147,7 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
         (**self).restore(snapshot)
     }
 
-    fn house(&mut self) -> Option<&mut HouseEnvironment> {
+    fn house(&mut self) -> Option<HouseAccess<'_>> {
         (**self).house()
     }
 }

@@ -1,18 +1,12 @@
 //! House as an environment: the simulator, and the grader that follows it.
 
-use std::sync::Arc;
-
 use anyhow::Context;
 
-use super::environment::{Environment, Snapshot, Transition};
+use super::environment::{Environment, HouseAccess, Snapshot, Transition};
 use crate::domain::{Action, Class, Instance, Task, World};
 use crate::house::House;
-use crate::house::expert::demonstrate;
 use crate::house::grading::{Grader, Grading};
 use crate::house::view::{Candidate, Frame};
-
-/// Longer than any demonstration.
-const LONGEST: usize = 1000;
 
 /// A house with what is asked in it.
 pub struct HouseEnvironment {
@@ -41,25 +35,6 @@ impl HouseEnvironment {
     pub fn of_task(task: &Task, house: House, grading: Grading) -> HouseEnvironment {
         let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
         HouseEnvironment::new(house, Some(grader))
-    }
-
-    /// Frames of the last `count` states, oldest first, of the expert who goes on from here until the task is done.
-    ///
-    /// # Errors
-    /// When there is no task, or the expert sees no way.
-    pub fn goal_frames(&self, count: usize) -> anyhow::Result<Vec<Frame>> {
-        let grader = self.grader.as_ref();
-        let grader = grader.context("the agent is shown its goal, which a task has; it reads no instructions")?;
-        let mut house = House::new(Arc::clone(self.house.scene()), self.house.world().clone());
-        let mut states = vec![house.world().clone()];
-        demonstrate(&mut house, &mut grader.clone(), LONGEST, &mut |house, _| states.push(house.world().clone()))
-            .context("the expert, who shows the goal")?;
-        let last = states.split_off(states.len().saturating_sub(count));
-        let draw = |world| {
-            house.restore(world);
-            house.frame().clone()
-        };
-        Ok(last.into_iter().map(draw).collect())
     }
 }
 
@@ -114,8 +89,8 @@ impl Environment for HouseEnvironment {
         Ok(())
     }
 
-    fn house(&mut self) -> Option<&mut HouseEnvironment> {
-        Some(self)
+    fn house(&mut self) -> Option<HouseAccess<'_>> {
+        Some(HouseAccess { house: &mut self.house, grader: self.grader.as_ref() })
     }
 }
 

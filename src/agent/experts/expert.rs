@@ -4,7 +4,8 @@ use anyhow::Context;
 
 use crate::agent::decision::Decision;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
-use crate::env::HouseEnvironment;
+use crate::env::HouseAccess;
+use crate::house::House;
 use crate::house::expert::{Expert, TurnTiming};
 use crate::house::grading::Grader;
 
@@ -27,13 +28,12 @@ impl ExpertPolicy {
 }
 
 /// The house that an expert knows, with the grader that it reads.
-pub(super) fn task_in<'a>(observation: &'a mut Observation<'_>) -> anyhow::Result<(&'a mut HouseEnvironment, Grader)> {
+pub(super) fn task_in<'a>(observation: &'a mut Observation<'_>) -> anyhow::Result<(&'a mut House, &'a Grader)> {
     let name = observation.environment.name().to_owned();
-    let house =
-        observation.environment.house().with_context(|| format!("the expert knows its way in House, not in {name}"))?;
-    let grader = house.grader.clone();
-    let grader = grader.context("the expert needs a task with subtasks; it does not read instructions")?;
-    Ok((house, grader))
+    let access = observation.environment.house();
+    let HouseAccess { house, grader } =
+        access.with_context(|| format!("the expert knows its way in House, not in {name}"))?;
+    Ok((house, grader.context("the expert needs a task with subtasks; it does not read instructions")?))
 }
 
 impl Policy for ExpertPolicy {
@@ -51,8 +51,8 @@ impl Policy for ExpertPolicy {
 
     fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
         each_alone(observations, |_, here| {
-            let (environment, grader) = task_in(here)?;
-            Ok(Decision::of(self.expert.next(&mut environment.house, &grader)?))
+            let (house, grader) = task_in(here)?;
+            Ok(Decision::of(self.expert.next(house, grader)?))
         })
     }
 

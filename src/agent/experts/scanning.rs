@@ -7,7 +7,6 @@ use super::expert::task_in;
 use crate::agent::decision::Decision;
 use crate::agent::policy::{Decisions, Observation, Policy, each_alone};
 use crate::domain::{Action, ActionType, Cell, Instance};
-use crate::env::HouseEnvironment;
 use crate::house::expert::{Expert, TurnTiming};
 
 /// Turns to the right while it looks for something: with the first view, a full circle.
@@ -70,8 +69,8 @@ impl Policy for ScanningExpert {
 
 impl ScanningExpert {
     fn decide(&mut self, observation: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let (HouseEnvironment { house, .. }, grader) = task_in(observation)?;
-        let action = self.expert.next(house, &grader)?;
+        let (house, grader) = task_in(observation)?;
+        let action = self.expert.next(house, grader)?;
         self.seen.extend(house.view().sightings.iter().map(|sighting| sighting.instance));
         let cell = house.world().agent.cell;
         let aim = self.expert.aim().and_then(|aim| aim.target);
