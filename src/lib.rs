@@ -23,9 +23,9 @@
 //! | [`cli`] | the command line |
 
 pub mod domain;
-pub mod language;
+mod language;
 pub mod house;
-pub mod env;
+mod env;
 pub mod data;
 pub mod nets;
 pub mod algo;
@@ -35,7 +35,7 @@ pub mod run_dir;
 pub mod report;
 pub mod eval;
 pub mod train;
-pub mod analysis;
+mod analysis;
 pub mod explore;
 pub mod tui;
 pub mod cli;

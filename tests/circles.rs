@@ -59,7 +59,7 @@ const IN_CIRCLES: &[&str] = &[
 
 /// Which files of the same floor each file imports. What a folder's `mod.rs` re-exports counts as imported from where it
 /// is defined, and re-exporting is no import.
-pub fn imports_within_floors(sources: &[Source]) -> BTreeMap<&str, BTreeSet<&str>> {
+pub(crate) fn imports_within_floors(sources: &[Source]) -> BTreeMap<&str, BTreeSet<&str>> {
     let modules: BTreeSet<&str> = sources.iter().map(|source| source.module.as_str()).collect();
     let mut exports: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for source in sources.iter().filter(|source| source.is_folder()) {
@@ -107,7 +107,7 @@ fn defining_file<'a>(
 }
 
 /// The files that import each other in a circle, circle by circle.
-pub fn circles<'a>(imports: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> Vec<BTreeSet<&'a str>> {
+pub(crate) fn circles<'a>(imports: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> Vec<BTreeSet<&'a str>> {
     let reached = |from: &'a str| {
         let mut seen = BTreeSet::new();
         let mut open = vec![from];

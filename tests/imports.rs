@@ -7,30 +7,30 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// A path in a file, such as `crate::house::House`, with the name it goes by there.
 #[derive(Debug, PartialEq)]
-pub struct Named {
-    pub line: usize,
-    pub segments: Vec<String>,
-    pub alias: String,
+pub(crate) struct Named {
+    pub(crate) line: usize,
+    pub(crate) segments: Vec<String>,
+    pub(crate) alias: String,
     /// Whether it is a `pub use`.
-    pub exported: bool,
+    pub(crate) exported: bool,
 }
 
-pub struct Source {
-    pub path: PathBuf,
+pub(crate) struct Source {
+    pub(crate) path: PathBuf,
     /// Its module below the crate, such as `house::grading`.
-    pub module: String,
-    pub named: Vec<Named>,
+    pub(crate) module: String,
+    pub(crate) named: Vec<Named>,
     /// The modules that this file declares for tests only.
     test_modules: Vec<String>,
 }
 
 impl Source {
-    pub fn floor(&self) -> &str {
+    pub(crate) fn floor(&self) -> &str {
         self.module.split("::").next().unwrap_or_default()
     }
 
     /// A path of this file as a path below the crate; nothing for one that begins elsewhere.
-    pub fn below_crate(&self, segments: &[String]) -> Option<Vec<String>> {
+    pub(crate) fn below_crate(&self, segments: &[String]) -> Option<Vec<String>> {
         let ups = segments.iter().take_while(|segment| *segment == "super").count();
         let module = || self.module.split("::").map(str::to_owned);
         let depth = self.module.split("::").count();
@@ -43,13 +43,13 @@ impl Source {
     }
 
     /// Whether it is the `mod.rs` of a folder.
-    pub fn is_folder(&self) -> bool {
+    pub(crate) fn is_folder(&self) -> bool {
         self.path.ends_with("mod.rs")
     }
 }
 
 /// The sources of the crate, in order, without those that only tests use.
-pub fn sources() -> Vec<Source> {
+pub(crate) fn sources() -> Vec<Source> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut found = Vec::new();
     let mut folders = vec![root.clone()];
@@ -78,7 +78,7 @@ pub fn sources() -> Vec<Source> {
     found
 }
 
-pub fn read(path: PathBuf, module: String, text: &str) -> Source {
+pub(crate) fn read(path: PathBuf, module: String, text: &str) -> Source {
     let tokens: TokenStream = text.parse().unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut source = Source { path, module, named: Vec::new(), test_modules: Vec::new() };
     walk(tokens, &mut source);

@@ -11,36 +11,36 @@ use tempfile::TempDir;
 use crate::needed;
 
 /// A home for the program that holds the sentence encoder.
-pub fn encoder_home() -> Option<PathBuf> {
+pub(crate) fn encoder_home() -> Option<PathBuf> {
     let encoder = needed::sentence_encoder(&default_folder())?;
     Some(encoder.ancestors().nth(2).unwrap().to_owned())
 }
 
 /// The program, in an empty folder of its own.
-pub struct Sprint {
+pub(crate) struct Sprint {
     folder: TempDir,
 }
 
 /// How a command ended.
-pub struct Ended {
-    pub code: Option<i32>,
-    pub stdout: String,
-    pub stderr: String,
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
 }
 
 impl Sprint {
     /// In a new folder.
-    pub fn new() -> Sprint {
+    pub(crate) fn new() -> Sprint {
         Sprint { folder: tempfile::tempdir().unwrap() }
     }
 
     /// A file in its folder.
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// Runs it with these words.
-    pub fn run(&self, line: &str) -> Ended {
+    pub(crate) fn run(&self, line: &str) -> Ended {
         let mut command = Command::cargo_bin("sprint").unwrap();
         let command = command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
         let output = command.args(line.split_whitespace()).output().unwrap();
@@ -49,33 +49,33 @@ impl Sprint {
     }
 
     /// The lines of a file, sorted.
-    pub fn sorted(&self, name: &str) -> Vec<String> {
+    pub(crate) fn sorted(&self, name: &str) -> Vec<String> {
         let mut lines: Vec<String> = self.read(name).lines().map(String::from).collect();
         lines.sort();
         lines
     }
 
     /// The program, ready to be started with these words.
-    pub fn command(&self, line: &str) -> std::process::Command {
+    pub(crate) fn command(&self, line: &str) -> std::process::Command {
         let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("sprint"));
         command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
         command.args(line.split_whitespace());
         command
     }
 
-    pub fn read(&self, name: &str) -> String {
+    pub(crate) fn read(&self, name: &str) -> String {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
 
     /// Samples a set of tasks in generated houses.
-    pub fn sample(&self, name: &str, length: usize, count: usize) {
+    pub(crate) fn sample(&self, name: &str, length: usize, count: usize) {
         let ended =
             self.run(&format!("tasks sample {name} --scenes generated --length {length} --count {count} --seed 7"));
         assert_eq!(ended.code, Some(0), "{}", ended.stderr);
     }
 
     /// Changes a file, and gives what `sprint eval` says of it.
-    pub fn complaint(&self, name: &str, change: impl FnOnce(&mut Value)) -> String {
+    pub(crate) fn complaint(&self, name: &str, change: impl FnOnce(&mut Value)) -> String {
         let mut value: Value = serde_json::from_str(&self.read(name)).unwrap();
         change(&mut value);
         std::fs::write(self.path("changed.json"), value.to_string()).unwrap();
@@ -83,7 +83,7 @@ impl Sprint {
     }
 
     /// What `sprint eval` says of a file that it must refuse without writing anything.
-    pub fn refused(&self, name: &str) -> String {
+    pub(crate) fn refused(&self, name: &str) -> String {
         let ended = self.run(&format!("eval --tasks {name} --policy random --out refused"));
         assert_eq!(ended.code, Some(1), "{}", ended.stderr);
         assert!(ended.stderr.contains(name), "the file is named: {}", ended.stderr);
@@ -94,7 +94,7 @@ impl Sprint {
 }
 
 /// Waits until it happened, a minute at the most.
-pub fn wait_for(happened: impl Fn() -> bool) {
+pub(crate) fn wait_for(happened: impl Fn() -> bool) {
     let began = Instant::now();
     while !happened() {
         assert!(began.elapsed() < Duration::from_secs(60), "it did not happen within a minute");

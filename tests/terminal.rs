@@ -10,10 +10,10 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system}
 use crate::program::encoder_home;
 
 /// How long anything may take on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A terminal with the explorer in it.
-pub struct Session {
+pub(crate) struct Session {
     master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
     child: Box<dyn Child + Send + Sync>,
@@ -29,12 +29,12 @@ fn size(cols: u16, rows: u16) -> PtySize {
 
 impl Session {
     /// `sprint explore` at 120 by 36, in a folder for settings and state of its own.
-    pub fn start(arguments: &[&str]) -> Session {
+    pub(crate) fn start(arguments: &[&str]) -> Session {
         Session::of("explore", arguments)
     }
 
     /// The same for another command.
-    pub fn of(command: &str, arguments: &[&str]) -> Session {
+    pub(crate) fn of(command: &str, arguments: &[&str]) -> Session {
         let state = tempfile::tempdir().unwrap();
         let mut session = Session::open(state.path(), (120, 36), command, arguments);
         session._state = Some(state);
@@ -42,7 +42,7 @@ impl Session {
     }
 
     /// With settings and state in a folder that stays.
-    pub fn open(state: &Path, (cols, rows): (u16, u16), command: &str, arguments: &[&str]) -> Session {
+    pub(crate) fn open(state: &Path, (cols, rows): (u16, u16), command: &str, arguments: &[&str]) -> Session {
         let pair = native_pty_system().openpty(size(cols, rows)).unwrap();
         let mut line = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
         line.arg(command);
@@ -78,18 +78,18 @@ impl Session {
     }
 
     /// What the screen shows.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         self.screen.lock().unwrap().screen().contents()
     }
 
     /// Whether that sequence was written to the terminal.
-    pub fn has_written(&self, sequence: &str) -> bool {
+    pub(crate) fn has_written(&self, sequence: &str) -> bool {
         let written = self.written.lock().unwrap();
         written.windows(sequence.len()).any(|bytes| bytes == sequence.as_bytes())
     }
 
     /// Waits until something holds.
-    pub fn wait(&self, what: &str, holds: impl Fn(&Session) -> bool) {
+    pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Session) -> bool) {
         let since = Instant::now();
         while !holds(self) {
             assert!(since.elapsed() < PATIENCE, "no {what} on the screen:\n{}", self.text());
@@ -98,34 +98,34 @@ impl Session {
     }
 
     /// Waits until the screen shows `text`.
-    pub fn see(&self, text: &str) {
+    pub(crate) fn see(&self, text: &str) {
         self.wait(text, |session| session.text().contains(text));
     }
 
     /// Waits until the screen no longer shows `text`.
-    pub fn miss(&self, text: &str) {
+    pub(crate) fn miss(&self, text: &str) {
         self.wait(&format!("end of {text}"), |session| !session.text().contains(text));
     }
 
     /// Sends keys.
-    pub fn press(&mut self, keys: &str) {
+    pub(crate) fn press(&mut self, keys: &str) {
         self.keys.write_all(keys.as_bytes()).unwrap();
         self.keys.flush().unwrap();
     }
 
     /// Gives the terminal another size.
-    pub fn resize(&self, cols: u16, rows: u16) {
+    pub(crate) fn resize(&self, cols: u16, rows: u16) {
         self.master.resize(size(cols, rows)).unwrap();
         self.screen.lock().unwrap().screen_mut().set_size(rows.max(2), cols.max(2));
     }
 
     /// Whether the alternate screen is shown.
-    pub fn is_taken(&self) -> bool {
+    pub(crate) fn is_taken(&self) -> bool {
         self.screen.lock().unwrap().screen().alternate_screen()
     }
 
     /// Waits for the end; returns the exit code, and prints the last words with one that is not 0.
-    pub fn end(&mut self) -> u32 {
+    pub(crate) fn end(&mut self) -> u32 {
         let since = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -140,7 +140,7 @@ impl Session {
     }
 
     /// The alternate screen is left, the cursor shown, pastes no longer marked.
-    pub fn is_restored(&self) {
+    pub(crate) fn is_restored(&self) {
         self.wait("restored terminal", |session| {
             let parser = session.screen.lock().unwrap();
             let screen = parser.screen();
@@ -149,7 +149,7 @@ impl Session {
     }
 
     /// Sends a signal.
-    pub fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let id = self.child.process_id().unwrap().to_string();
         assert!(std::process::Command::new("kill").args([name, &id]).status().unwrap().success());
     }

@@ -13,7 +13,7 @@ use super::config::CheckpointConfig;
 ///
 /// # Errors
 /// When a checkpoint cannot be read, or differs from the first in its policy's size, its visual encoder or its sentence encoder.
-pub fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(CheckpointConfig, Networks)> {
+pub(crate) fn average(folders: &[PathBuf], device: Device) -> anyhow::Result<(CheckpointConfig, Networks)> {
     let (first, others) = folders.split_first().context("no checkpoint was named")?;
     let (mut config, networks) = load(first, device)?;
     let encoder = networks.visual_encoder.frozen()?.digest().to_owned();

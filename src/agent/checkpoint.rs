@@ -18,11 +18,11 @@ use crate::nets::weights::{self, TensorSpec};
 #[derive(Debug)]
 pub struct Networks {
     /// Turns frames into feature maps.
-    pub visual_encoder: VisualEncoder,
+    pub(crate) visual_encoder: VisualEncoder,
     /// Turns maps and instruction into logits.
-    pub policy: PolicyNet,
+    pub(crate) policy: PolicyNet,
     /// The policy's weights.
-    pub policy_store: nn::VarStore,
+    pub(crate) policy_store: nn::VarStore,
     /// Q and V with their target, where the method has them.
     pub critic: Option<Critics>,
 }
@@ -31,13 +31,13 @@ pub struct Networks {
 #[derive(Debug)]
 pub struct Critics {
     /// The critic that learns.
-    pub online: Critic,
+    pub(crate) online: Critic,
     /// Its weights.
-    pub online_store: nn::VarStore,
+    pub(crate) online_store: nn::VarStore,
     /// The critic whose Q is the other's target; its V is not used.
-    pub target: Critic,
+    pub(crate) target: Critic,
     /// Its weights.
-    pub target_store: nn::VarStore,
+    pub(crate) target_store: nn::VarStore,
 }
 
 impl Networks {
@@ -75,7 +75,7 @@ impl Networks {
     ///
     /// # Errors
     /// When the critic's answer cannot be read.
-    pub fn advice(
+    pub(crate) fn advice(
         &self,
         config: &CheckpointConfig,
         observation: &Tensor,
@@ -89,7 +89,7 @@ impl Networks {
     }
 
     /// Every tensor by its name in `model.safetensors`.
-    pub fn tensors(&self) -> BTreeMap<String, Tensor> {
+    pub(crate) fn tensors(&self) -> BTreeMap<String, Tensor> {
         let mut stores = vec![("policy", &self.policy_store)];
         stores.extend(self.visual_encoder.store().map(|store| ("visual", store)));
         if let Some(critic) = &self.critic {

@@ -20,7 +20,7 @@ const WORDS: usize = 128;
 ///
 /// # Errors
 /// When the sentence encoder fails, or an agent that is shown its goal has no task to take it from.
-pub fn of(
+pub(crate) fn of(
     observation: &mut Observation<'_>,
     config: &CheckpointConfig,
     visual: &dyn FrameEncoder,
@@ -41,7 +41,7 @@ pub fn of(
 }
 
 /// How much of an instruction the agent reads; nothing where it is shown its goal, or the sentence encoder fails.
-pub fn reading(instruction: &str, config: &CheckpointConfig, sentences: &SharedEmbedder) -> Option<Reading> {
+pub(crate) fn reading(instruction: &str, config: &CheckpointConfig, sentences: &SharedEmbedder) -> Option<Reading> {
     let instruction = normalise(instruction);
     match (&config.policy.goal_channels, &config.policy.attention) {
         (Some(_), _) => None,
@@ -62,7 +62,7 @@ fn words(config: &CheckpointConfig, instruction: &str) -> Vec<i64> {
 }
 
 /// Zeros of the same shape, for an empty slot.
-pub fn blank(config: &CheckpointConfig, device: Device) -> Tensor {
+pub(crate) fn blank(config: &CheckpointConfig, device: Device) -> Tensor {
     let (policy, features) = (&config.policy, config.features());
     match (policy.goal_channels, &policy.attention) {
         (Some(_), _) => Tensor::zeros([1, policy.history * features, SIDE, SIDE], (Kind::Float, device)),

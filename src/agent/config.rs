@@ -23,16 +23,16 @@ use crate::nets::visual_encoder::VisualEncoder;
 /// The classes and actions that a policy's heads stand for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ontology {
+pub(crate) struct Ontology {
     /// The first 16 digits of the sha256 of the class names, a line each.
-    pub classes: String,
+    pub(crate) classes: String,
     /// The actions by name, in the order of the action head.
-    pub actions: Vec<String>,
+    pub(crate) actions: Vec<String>,
 }
 
 impl Ontology {
     /// This program's own.
-    pub fn current() -> Ontology {
+    pub(crate) fn current() -> Ontology {
         let names: Vec<&str> = (0..Class::VOCABULARY).filter_map(Class::from_index).map(Class::name).collect();
         let digest = format!("{:x}", Sha256::digest(names.join("\n")));
         Ontology {
@@ -45,56 +45,56 @@ impl Ontology {
 /// Which sentence encoder the policy was trained with.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SentenceSpec {
+pub(crate) struct SentenceSpec {
     /// The name of its folder.
-    pub name: String,
+    pub(crate) name: String,
     /// The digest of its weights.
-    pub digest: String,
+    pub(crate) digest: String,
 }
 
 /// A checkpoint from which another one took networks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SourceCheckpoint {
+pub(crate) struct SourceCheckpoint {
     /// Its folder's name.
-    pub name: String,
+    pub(crate) name: String,
     /// The preset it was trained with.
-    pub preset: String,
+    pub(crate) preset: String,
     /// Steps of its policy's training.
-    pub policy_steps: u64,
+    pub(crate) policy_steps: u64,
 }
 
 /// How a checkpoint was trained, and from what.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Provenance {
+pub(crate) struct Provenance {
     /// The preset's name; of a mean, those of its parts.
-    pub preset: String,
+    pub(crate) preset: String,
     /// The digest of the trajectories it was trained on.
-    pub dataset: String,
+    pub(crate) dataset: String,
     /// How many of those were not held out.
-    pub trajectories: u64,
+    pub(crate) trajectories: u64,
     /// The seed of initialisation and data order.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Steps of the visual encoder's training.
-    pub visual_encoder_steps: u64,
+    pub(crate) visual_encoder_steps: u64,
     /// Steps of the policy's training.
-    pub policy_steps: u64,
+    pub(crate) policy_steps: u64,
     /// How wide the numbers were that the networks computed with while they learned.
     #[serde(default)]
-    pub precision: Precision,
+    pub(crate) precision: Precision,
     /// The checkpoint whose visual encoder it uses, where that was not trained with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub visual_encoder_from: Option<SourceCheckpoint>,
+    pub(crate) visual_encoder_from: Option<SourceCheckpoint>,
     /// The checkpoint whose weights the policy's training started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub policy_initialised_from: Option<SourceCheckpoint>,
+    pub(crate) policy_initialised_from: Option<SourceCheckpoint>,
     /// The checkpoint whose weights the critic's training started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub critic_initialised_from: Option<SourceCheckpoint>,
+    pub(crate) critic_initialised_from: Option<SourceCheckpoint>,
     /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub averaged_checkpoints: Option<u64>,
+    pub(crate) averaged_checkpoints: Option<u64>,
 }
 
 /// A checkpoint's `config.json`.
@@ -102,41 +102,41 @@ pub struct Provenance {
 #[serde(deny_unknown_fields)]
 pub struct CheckpointConfig {
     /// Version of this format.
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The classes and actions of the heads.
-    pub ontology: Ontology,
+    pub(crate) ontology: Ontology,
     /// The size of the House encoder, where the agent sees through one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub visual_encoder: Option<VisualSpec>,
+    pub(crate) visual_encoder: Option<VisualSpec>,
     /// The digest of ResNet-18's weights, where the agent sees through that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub resnet18: Option<String>,
+    pub(crate) resnet18: Option<String>,
     /// The method it was trained by: `bc`, `iql`, `sprint`, `am`, `et`; absent in older checkpoints, which are cloned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub method: Option<String>,
+    pub(crate) method: Option<String>,
     /// The policy network's size.
     pub policy: PolicySpec,
     /// The critic's size, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub critic: Option<CriticSpec>,
+    pub(crate) critic: Option<CriticSpec>,
     /// The words that the agent knows, where it reads words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub vocabulary: Option<Vec<String>>,
+    pub(crate) vocabulary: Option<Vec<String>>,
     /// How much of the actions' frequency among the labels is taken off their logits when it decides; absent where nothing is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub logit_adjustment: Option<LogitAdjustment>,
+    pub(crate) logit_adjustment: Option<LogitAdjustment>,
     /// How much the critic's advantages count when it decides, see [`AdvantageScale`]; absent where the policy decides alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub advantage_scale: Option<f32>,
+    pub(crate) advantage_scale: Option<f32>,
     /// The sentence encoder.
-    pub sentence_encoder: SentenceSpec,
+    pub(crate) sentence_encoder: SentenceSpec,
     /// How it was trained, and from what.
-    pub provenance: Provenance,
+    pub(crate) provenance: Provenance,
 }
 
 impl CheckpointConfig {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 2;
+    pub(crate) const FORMAT: u32 = 2;
 
     /// Reads a checkpoint's configuration.
     ///
@@ -169,7 +169,7 @@ impl CheckpointConfig {
     ///
     /// # Errors
     /// Says what would make one.
-    pub fn check_there(folder: &Path) -> anyhow::Result<()> {
+    pub(crate) fn check_there(folder: &Path) -> anyhow::Result<()> {
         ensure!(
             folder.join("config.json").exists(),
             "{} holds no checkpoint (config.json is missing); `sprint pretrain` makes one, and checkpoints/ holds some",
@@ -204,7 +204,7 @@ impl CheckpointConfig {
     ///
     /// # Errors
     /// When `encoder` is another; begins with the field that differs.
-    pub fn goes_with(&self, encoder: &SentenceEncoder) -> anyhow::Result<()> {
+    pub(crate) fn goes_with(&self, encoder: &SentenceEncoder) -> anyhow::Result<()> {
         let (wanted, found) = (self.policy.embedding, encoder.width() as i64);
         anyhow::ensure!(
             wanted == found || self.policy.attention.is_some(),
@@ -220,7 +220,7 @@ impl CheckpointConfig {
     }
 
     /// Adjusts the logits of the action head [12] in place, where `logit_adjustment` is there.
-    pub fn adjust_logits(&self, logits: &mut [f32]) {
+    pub(crate) fn adjust_logits(&self, logits: &mut [f32]) {
         if let Some(logit_adjustment) = &self.logit_adjustment {
             logit_adjustment.apply(logits);
         }
@@ -230,7 +230,7 @@ impl CheckpointConfig {
     ///
     /// # Errors
     /// When the strength is not between 0 and 1, or the actions' frequencies were not kept.
-    pub fn set_logit_adjustment(&mut self, strength: f32) -> anyhow::Result<()> {
+    pub(crate) fn set_logit_adjustment(&mut self, strength: f32) -> anyhow::Result<()> {
         let logit_adjustment = self.logit_adjustment.as_mut();
         let logit_adjustment = logit_adjustment
             .context("logit_adjustment is missing: how often each action was shown was not noted, so train anew")?;
@@ -242,7 +242,7 @@ impl CheckpointConfig {
     ///
     /// # Errors
     /// When the scale is negative or not finite, or there is no critic.
-    pub fn set_advantage_scale(&mut self, weight: f32) -> anyhow::Result<()> {
+    pub(crate) fn set_advantage_scale(&mut self, weight: f32) -> anyhow::Result<()> {
         self.advantage_scale = (weight != 0.0).then_some(weight);
         self.check_advantage_scale()
     }
@@ -255,12 +255,12 @@ impl CheckpointConfig {
     }
 
     /// The values with their scale, where the critic takes part in decisions.
-    pub fn advantage_scale<'a>(&self, values: Option<&'a Values>) -> Option<AdvantageScale<'a>> {
+    pub(crate) fn advantage_scale<'a>(&self, values: Option<&'a Values>) -> Option<AdvantageScale<'a>> {
         values.zip(self.advantage_scale).map(|(values, weight)| AdvantageScale { values, weight })
     }
 
     /// Features in each of the 7 x 7 cells of a map.
-    pub fn features(&self) -> i64 {
+    pub(crate) fn features(&self) -> i64 {
         self.visual_encoder.as_ref().map_or(resnet18::FEATURES, VisualSpec::features)
     }
 
@@ -307,7 +307,7 @@ pub(super) mod tests {
     use super::*;
 
     /// A cloned agent of no use.
-    pub fn small() -> CheckpointConfig {
+    pub(crate) fn small() -> CheckpointConfig {
         CheckpointConfig {
             format_version: CheckpointConfig::FORMAT,
             ontology: Ontology::current(),

@@ -8,40 +8,40 @@ use crate::house::view::Candidate;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
     /// What to do.
-    pub action: Action,
+    pub(crate) action: Action,
     /// The distribution behind it, where the policy has one.
-    pub distribution: Option<ActionDistribution>,
+    pub(crate) distribution: Option<ActionDistribution>,
     /// What the critics say of the state, where the decision was weighed by them.
-    pub values: Option<Values>,
+    pub(crate) values: Option<Values>,
 }
 
 impl Decision {
     /// An action with nothing behind it, as a person or a script chooses.
-    pub fn of(action: Action) -> Decision {
+    pub(crate) fn of(action: Action) -> Decision {
         Decision { action, distribution: None, values: None }
     }
 }
 
 /// A policy's distribution over what it could do now.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ActionDistribution {
+pub(crate) struct ActionDistribution {
     /// Probability of each action in the order of [`ActionType::ALL`], balanced, weighed and masked; `None` where masked.
-    pub actions: [Option<f32>; ActionType::COUNT],
+    pub(crate) actions: [Option<f32>; ActionType::COUNT],
     /// Object classes by falling probability (before restriction to candidates and weighing), with whether one of that class
     /// is a candidate of the chosen or likeliest interaction.
-    pub objects: Vec<(Class, f32, bool)>,
+    pub(crate) objects: Vec<(Class, f32, bool)>,
     /// The weight of each class among those that an interaction could name; all weigh alike where none is listed.
-    pub choices: Vec<(ActionType, Class, f32)>,
+    pub(crate) choices: Vec<(ActionType, Class, f32)>,
     /// Entropy of the masked action distribution, in nats.
-    pub entropy: f32,
+    pub(crate) entropy: f32,
     /// The action that argmax would choose.
-    pub greedy: Action,
+    pub(crate) greedy: Action,
 }
 
 impl ActionDistribution {
     /// The distribution over everything that could be done now: navigation, and each interaction with each class that is a
     /// candidate of it, in the order of actions. Sums to 1.
-    pub fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
+    pub(crate) fn joint(&self, candidates: &[Candidate]) -> Vec<(ActionType, Option<Class>, f32)> {
         let share = |kind: ActionType, class: Class| {
             let mut weights = self.choices.iter().filter(|choice| (choice.0, choice.1) == (kind, class));
             weights.next().map_or(0.0, |choice| choice.2)

@@ -14,7 +14,7 @@ use crate::house::view::Candidate;
 use crate::nets::embedding_cache::Embedder;
 
 /// A sentence encoder with its cache, which several policies may share.
-pub type SharedEmbedder = Arc<Mutex<Embedder>>;
+pub(crate) type SharedEmbedder = Arc<Mutex<Embedder>>;
 
 /// The last frames, what the loop guard knows, what conditions the agent, and random numbers.
 #[derive(Debug)]
@@ -58,7 +58,7 @@ impl Clone for FrameHistory {
 
 impl FrameHistory {
     /// Forgets the past: a new episode starts.
-    pub fn reset(&mut self, seed: u64) {
+    pub(crate) fn reset(&mut self, seed: u64) {
         self.seen.clear();
         self.last_image.clear();
         self.loop_guard = LoopGuard::default();
@@ -69,12 +69,12 @@ impl FrameHistory {
     }
 
     /// The map of an image that looks as the last one did; nothing where the image is new.
-    pub fn map_of(&self, image: &[u8]) -> Option<Tensor> {
+    pub(crate) fn map_of(&self, image: &[u8]) -> Option<Tensor> {
         self.seen.back().filter(|_| self.last_image == image).map(Tensor::shallow_clone)
     }
 
     /// Looks at the image of a step, and notes what came of the last one.
-    pub fn look(&mut self, image: &[u8], step: u32) {
+    pub(crate) fn look(&mut self, image: &[u8], step: u32) {
         let changed = self.last_image != image;
         if self.seen_at != Some(step) {
             self.loop_guard.record(&self.last_image, changed);
@@ -86,7 +86,7 @@ impl FrameHistory {
 
     /// Adds the map of the frame at `step`; the last `history` maps as one observation. Before the first frames there was
     /// the first one.
-    pub fn observe(&mut self, map: Tensor, step: u32, history: usize) -> Tensor {
+    pub(crate) fn observe(&mut self, map: Tensor, step: u32, history: usize) -> Tensor {
         if self.seen_at == Some(step) {
             self.seen.pop_back();
         }
@@ -104,7 +104,7 @@ impl FrameHistory {
     ///
     /// # Errors
     /// When `condition` fails.
-    pub fn conditioning(
+    pub(crate) fn conditioning(
         &mut self,
         instruction: &str,
         condition: impl FnOnce() -> anyhow::Result<Tensor>,
@@ -122,7 +122,7 @@ impl FrameHistory {
 
     /// Decides from what the networks say, and remembers the choice. Nothing that the loop guard knows to repeat is chosen
     /// while there is something else.
-    pub fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
+    pub(crate) fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
         let (candidates, tried) = self.loop_guard.untried(&self.last_image, candidates);
         let decision = select::decide(heads, &candidates, &tried, selection);

@@ -14,7 +14,7 @@ use super::conditioning;
 use super::config::CheckpointConfig;
 use super::decision::Decision;
 use super::frame_history::FrameHistory;
-pub use super::frame_history::SharedEmbedder;
+pub(crate) use super::frame_history::SharedEmbedder;
 use super::policy::{Decisions, Observation, Policy, PolicyState, Reading};
 use super::select::Heads;
 use super::value_estimates::Values;
@@ -22,7 +22,7 @@ use crate::nets::frozen::FrameEncoder;
 use crate::nets::visual::SIDE;
 
 /// A policy from a checkpoint.
-pub struct LearnedPolicy {
+pub(crate) struct LearnedPolicy {
     name: String,
     config: CheckpointConfig,
     networks: Networks,
@@ -42,13 +42,13 @@ struct Inputs {
 
 impl LearnedPolicy {
     /// Rows of a pass: enough to read the weights once for several episodes, few enough to stay in a processor's caches.
-    pub const SLOTS: usize = 8;
+    pub(crate) const SLOTS: usize = 8;
 
     /// Loads a checkpoint; it decides greedily.
     ///
     /// # Errors
     /// When the checkpoint is malformed, or was trained with another sentence encoder.
-    pub fn load(folder: &Path, sentences: SharedEmbedder, device: Device) -> anyhow::Result<LearnedPolicy> {
+    pub(crate) fn load(folder: &Path, sentences: SharedEmbedder, device: Device) -> anyhow::Result<LearnedPolicy> {
         let config = CheckpointConfig::read(folder)?;
         {
             let embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
@@ -63,7 +63,7 @@ impl LearnedPolicy {
     ///
     /// # Errors
     /// When the visual encoder's weights cannot be read.
-    pub fn with(
+    pub(crate) fn with(
         name: String,
         config: CheckpointConfig,
         networks: Networks,
@@ -73,11 +73,6 @@ impl LearnedPolicy {
         let encoder = networks.visual_encoder.frozen()?;
         let slots = (0..LearnedPolicy::SLOTS).map(|_| FrameHistory::default()).collect();
         Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
-    }
-
-    /// The checkpoint's configuration.
-    pub fn config(&self) -> &CheckpointConfig {
-        &self.config
     }
 
     fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Inputs> {

@@ -9,17 +9,17 @@ use crate::domain::ActionType;
 /// How often each action was shown, and how much of that is taken off when an agent decides.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LogitAdjustment {
+pub(crate) struct LogitAdjustment {
     /// The share of the log shares that is taken off: 0 none, 1 all, as if every action had been shown alike.
-    pub strength: f32,
+    pub(crate) strength: f32,
     /// Each action's share of the labels, in the order of the action head; 0 where it never was.
-    pub action_frequencies: Vec<f32>,
+    pub(crate) action_frequencies: Vec<f32>,
 }
 
 impl LogitAdjustment {
     /// Takes what is frequent off the logits of the action head; those of the most frequent action stay as they are, since
     /// only differences count, and so does one that was never shown, of which nothing is known.
-    pub fn apply(&self, logits: &mut [f32]) {
+    pub(crate) fn apply(&self, logits: &mut [f32]) {
         let most = self.action_frequencies.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         for (logit, share) in logits.iter_mut().zip(&self.action_frequencies) {
             if *share > 0.0 {
@@ -32,7 +32,7 @@ impl LogitAdjustment {
     ///
     /// # Errors
     /// When the strength is no share, or there is not one share for each action.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         if !(0.0..=1.0).contains(&self.strength) {
             return Err(format!("logit_adjustment.strength is {}, which is not a share", self.strength));
         }

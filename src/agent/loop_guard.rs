@@ -16,7 +16,7 @@ type Tried = (ActionType, Option<Class>);
 ///   given: this ends pushing against a wall, walking in a circle, opening and closing a door.
 /// * What was put down is not picked up again before the agent has acted on something else.
 #[derive(Clone, Debug, Default)]
-pub struct LoopGuard {
+pub(crate) struct LoopGuard {
     /// What was tried at each view since something was last moved, by the view's digest.
     tried_at: HashMap<u64, Vec<Tried>>,
     last: Option<(ActionType, Option<Candidate>)>,
@@ -26,13 +26,13 @@ pub struct LoopGuard {
 
 impl LoopGuard {
     /// Forgets what was tried: another instruction may ask for it again.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.tried_at.clear();
         self.put_down = None;
     }
 
     /// Records what came of the last action, which was chosen at `view`: whether the picture changed.
-    pub fn record(&mut self, view: &[u8], changed: bool) {
+    pub(crate) fn record(&mut self, view: &[u8], changed: bool) {
         let Some((kind, target)) = self.last else { return };
         if changed && kind.is_interaction() {
             self.acted(kind, target.map(|target| target.instance));
@@ -53,7 +53,7 @@ impl LoopGuard {
     }
 
     /// Of the candidates at `view` those that repeat nothing, and the navigation that was tried there.
-    pub fn untried(&self, view: &[u8], candidates: &[Candidate]) -> (Vec<Candidate>, Vec<ActionType>) {
+    pub(crate) fn untried(&self, view: &[u8], candidates: &[Candidate]) -> (Vec<Candidate>, Vec<ActionType>) {
         let tried = self.tried_at.get(&digest(view)).map_or(&[][..], Vec::as_slice);
         let is_new = |candidate: &&Candidate| {
             let undoes = candidate.kind == ActionType::Pickup && self.put_down == Some(candidate.instance);
@@ -64,7 +64,7 @@ impl LoopGuard {
     }
 
     /// Remembers which action was chosen.
-    pub fn chose(&mut self, action: Action, candidates: &[Candidate]) {
+    pub(crate) fn chose(&mut self, action: Action, candidates: &[Candidate]) {
         let named = candidates.iter().find(|candidate| candidate.action() == action);
         self.last = Some((action.kind, named.copied()));
     }

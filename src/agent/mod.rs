@@ -1,25 +1,25 @@
 //! Agents: what decides the next action.
 
-pub mod average;
+pub(crate) mod average;
 pub mod checkpoint;
-pub mod conditioning;
+pub(crate) mod conditioning;
 pub mod config;
-pub mod decision;
-pub mod experts;
-pub mod frame_history;
-pub mod learned;
-pub mod logit_adjustment;
-pub mod loop_guard;
-pub mod policy;
+pub(crate) mod decision;
+pub(crate) mod experts;
+pub(crate) mod frame_history;
+pub(crate) mod learned;
+pub(crate) mod logit_adjustment;
+pub(crate) mod loop_guard;
+pub(crate) mod policy;
 pub mod policy_source;
-pub mod random;
+pub(crate) mod random;
 pub mod registry;
-pub mod select;
-pub mod value_estimates;
+pub(crate) mod select;
+pub(crate) mod value_estimates;
 
-pub use decision::{ActionDistribution, Decision};
-pub use experts::expert::ExpertPolicy;
-pub use learned::LearnedPolicy;
-pub use policy::{Decisions, Observation, Policy, PolicyState, Reading};
+pub(crate) use decision::{ActionDistribution, Decision};
+pub(crate) use experts::expert::ExpertPolicy;
+pub(crate) use learned::LearnedPolicy;
+pub(crate) use policy::{Decisions, Observation, Policy, PolicyState, Reading};
 pub use random::RandomPolicy;
-pub use value_estimates::Values;
+pub(crate) use value_estimates::Values;

@@ -12,21 +12,21 @@ use crate::house::expert::ExpertState;
 /// What a policy decides from.
 pub struct Observation<'a> {
     /// Where it acts. Its frame is drawn when it is asked for.
-    pub environment: &'a mut dyn Environment,
+    pub(crate) environment: &'a mut dyn Environment,
     /// What the agent is told.
-    pub instruction: &'a str,
+    pub(crate) instruction: &'a str,
     /// How many steps the episode has taken; deciding twice at one step looks once.
-    pub step: u32,
+    pub(crate) step: u32,
 }
 
 /// A decision for each slot, `None` where there was no observation. A slot's own failure is in its place.
-pub type Decisions = Vec<Option<anyhow::Result<Decision>>>;
+pub(crate) type Decisions = Vec<Option<anyhow::Result<Decision>>>;
 
 /// Decisions of a policy that looks at each slot by itself.
 ///
 /// # Errors
 /// Never; a slot's failure is in its place.
-pub fn each_alone(
+pub(crate) fn each_alone(
     observations: &mut [Option<Observation<'_>>],
     mut decide: impl FnMut(usize, &mut Observation<'_>) -> anyhow::Result<Decision>,
 ) -> anyhow::Result<Decisions> {
@@ -38,9 +38,9 @@ pub fn each_alone(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// Tokens that are read.
-    pub tokens: usize,
+    pub(crate) tokens: usize,
     /// Tokens at the end that are left out because the text is too long.
-    pub cut: usize,
+    pub(crate) cut: usize,
 }
 
 /// What a policy carries from one step of an episode to the next. Restored, it decides as it did then, bit for bit.
@@ -105,7 +105,7 @@ impl dyn Policy + '_ {
     ///
     /// # Errors
     /// Whatever the policy reports.
-    pub fn act_in(&mut self, slot: usize, observation: Observation<'_>) -> anyhow::Result<Decision> {
+    pub(crate) fn act_in(&mut self, slot: usize, observation: Observation<'_>) -> anyhow::Result<Decision> {
         let mut observations: Vec<Option<Observation<'_>>> = (0..self.slots()).map(|_| None).collect();
         let slots = observations.len();
         *observations.get_mut(slot).with_context(|| format!("{} has {slots} slots, not {slot}", self.name()))? =

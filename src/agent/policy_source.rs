@@ -19,15 +19,15 @@ use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
 
 /// Makes a policy; whoever acts on a thread of his own has one of his own.
-pub type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync;
+pub(crate) type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync;
 
 /// A policy that can be made, and what identifies it in a run.
 #[derive(Clone)]
 pub struct PolicySource {
     /// What it is called in reports.
-    pub name: String,
+    pub(crate) name: String,
     /// SHA-256 over its checkpoint's configuration and weights.
-    pub checkpoint_hash: Option<String>,
+    pub(crate) checkpoint_hash: Option<String>,
     /// Makes one.
     pub make: Arc<MakePolicy>,
     /// The checkpoint's folder.
@@ -36,7 +36,7 @@ pub struct PolicySource {
 
 impl PolicySource {
     /// The expert, who knows everything.
-    pub fn expert() -> PolicySource {
+    pub(crate) fn expert() -> PolicySource {
         PolicySource::plain("expert", || Box::new(ExpertPolicy::new()))
     }
 
@@ -46,7 +46,7 @@ impl PolicySource {
     }
 
     /// A policy of that name, which `make` makes.
-    pub fn of(name: &str, make: Arc<MakePolicy>) -> PolicySource {
+    pub(crate) fn of(name: &str, make: Arc<MakePolicy>) -> PolicySource {
         PolicySource { name: name.into(), checkpoint_hash: None, make, folder: None }
     }
 
@@ -59,7 +59,7 @@ impl PolicySource {
     ///
     /// # Errors
     /// When the checkpoint or its sentence encoder cannot be used.
-    pub fn checkpoint(folder: PathBuf, sampling: bool) -> anyhow::Result<PolicySource> {
+    pub(crate) fn checkpoint(folder: PathBuf, sampling: bool) -> anyhow::Result<PolicySource> {
         // More threads than one would make sums depend on how many there are, and workers get in each other's way.
         device::set_threads(1);
         let checkpoint_hash = hash(&folder)?;
@@ -83,7 +83,7 @@ impl PolicySource {
     ///
     /// # Errors
     /// When its files changed or are gone.
-    pub fn check_unchanged(&self) -> anyhow::Result<()> {
+    pub(crate) fn check_unchanged(&self) -> anyhow::Result<()> {
         let (Some(folder), Some(chosen)) = (&self.folder, &self.checkpoint_hash) else { return Ok(()) };
         check_hash(folder, chosen)
     }
@@ -116,7 +116,7 @@ fn hash(folder: &Path) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// When it is there and cannot be used.
-pub fn find(
+pub(crate) fn find(
     name: &str,
     checkpoint: Option<&str>,
     sampling: bool,
@@ -138,7 +138,7 @@ pub fn find(
 }
 
 /// The agents that an explorer may let act: the named one first, then those that are found.
-pub fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
+pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
     let mut folders: Vec<PathBuf> = named.map(Path::to_owned).into_iter().chain(checkpoints()).collect();
     let mut seen = Vec::new();
     folders.retain(|folder| {
@@ -169,7 +169,7 @@ pub fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
 const DEFAULT: &str = "sprint";
 
 /// The agent that acts when none is named: the first that is found.
-pub fn shipped() -> anyhow::Result<PathBuf> {
+pub(crate) fn shipped() -> anyhow::Result<PathBuf> {
     checkpoints().into_iter().next().context(
         "there is no trained agent in checkpoints/: name one with --checkpoint, or let --policy expert or random act",
     )
@@ -177,7 +177,7 @@ pub fn shipped() -> anyhow::Result<PathBuf> {
 
 /// The checkpoints in `checkpoints` here and, for a binary in `target/release`, in the repository that it was built in: [`DEFAULT`]
 /// first, then by name.
-pub fn checkpoints() -> Vec<PathBuf> {
+pub(crate) fn checkpoints() -> Vec<PathBuf> {
     let program = std::env::current_exe().and_then(|path| path.canonicalize()).ok();
     let near: Option<PathBuf> = program
         .iter()

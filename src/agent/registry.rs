@@ -15,10 +15,10 @@ pub enum PolicyKind {
 
 impl PolicyKind {
     /// Every kind.
-    pub const ALL: [PolicyKind; 3] = [PolicyKind::Agent, PolicyKind::Expert, PolicyKind::Random];
+    pub(crate) const ALL: [PolicyKind; 3] = [PolicyKind::Agent, PolicyKind::Expert, PolicyKind::Random];
 
     /// The name that `--policy` takes.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             PolicyKind::Agent => "agent",
             PolicyKind::Expert => "expert",
@@ -27,7 +27,7 @@ impl PolicyKind {
     }
 
     /// The next kind, around.
-    pub fn next(self) -> PolicyKind {
+    pub(crate) fn next(self) -> PolicyKind {
         let at = PolicyKind::ALL.iter().position(|&kind| kind == self).unwrap_or(0);
         PolicyKind::ALL[(at + 1) % PolicyKind::ALL.len()]
     }
@@ -35,30 +35,30 @@ impl PolicyKind {
 
 /// What tells policies apart: a name, and the hash of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct PolicyIdentity {
+pub(crate) struct PolicyIdentity {
     /// What it is called.
-    pub name: String,
+    pub(crate) name: String,
     /// SHA-256 of its checkpoint, where it has one.
-    pub checkpoint: Option<String>,
+    pub(crate) checkpoint: Option<String>,
 }
 
 /// A policy that acts, and what identifies it beside its name.
-pub struct Loaded {
+pub(crate) struct Loaded {
     /// The policy.
-    pub policy: Box<dyn Policy>,
+    pub(crate) policy: Box<dyn Policy>,
     /// SHA-256 of its checkpoint, where it has one.
-    pub checkpoint: Option<String>,
+    pub(crate) checkpoint: Option<String>,
 }
 
 /// Loads an agent, wherever its checkpoint lies.
-pub type LoadAgent = Box<dyn Fn() -> anyhow::Result<Loaded>>;
+pub(crate) type LoadAgent = Box<dyn Fn() -> anyhow::Result<Loaded>>;
 
 /// An agent that may act.
 pub struct NamedAgent {
     /// The name of its checkpoint.
-    pub name: String,
+    pub(crate) name: String,
     /// Loads it.
-    pub load: LoadAgent,
+    pub(crate) load: LoadAgent,
 }
 
 /// Makes policies.
@@ -74,12 +74,12 @@ impl Policies {
     }
 
     /// The names of the agents.
-    pub fn agents(&self) -> Vec<String> {
+    pub(crate) fn agents(&self) -> Vec<String> {
         self.agents.iter().map(|agent| agent.name.clone()).collect()
     }
 
     /// Which of them is meant by "the agent".
-    pub fn chosen(&self) -> usize {
+    pub(crate) fn chosen(&self) -> usize {
         self.chosen
     }
 
@@ -87,7 +87,7 @@ impl Policies {
     ///
     /// # Errors
     /// When there is no such agent; says which there are.
-    pub fn choose(&mut self, wanted: &str) -> anyhow::Result<()> {
+    pub(crate) fn choose(&mut self, wanted: &str) -> anyhow::Result<()> {
         self.chosen = self.find(wanted)?;
         Ok(())
     }
@@ -104,7 +104,7 @@ impl Policies {
     ///
     /// # Errors
     /// When there is none, or it cannot be loaded.
-    pub fn named(&self, wanted: &str) -> anyhow::Result<Loaded> {
+    pub(crate) fn named(&self, wanted: &str) -> anyhow::Result<Loaded> {
         match PolicyKind::ALL.into_iter().find(|kind| kind.name() == wanted) {
             Some(kind) => self.make(kind),
             None => (self.agents[self.find(wanted)?].load)(),
@@ -115,7 +115,7 @@ impl Policies {
     ///
     /// # Errors
     /// When the agent cannot be loaded.
-    pub fn make(&self, kind: PolicyKind) -> anyhow::Result<Loaded> {
+    pub(crate) fn make(&self, kind: PolicyKind) -> anyhow::Result<Loaded> {
         let plain = |policy| Ok(Loaded { policy, checkpoint: None });
         match kind {
             PolicyKind::Agent => match self.agents.get(self.chosen) {

@@ -12,7 +12,7 @@ use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
 
 /// How an entry is taken from a distribution.
-pub enum Selection<'a> {
+pub(crate) enum Selection<'a> {
     /// The likeliest.
     Greedy,
     /// By chance.
@@ -21,18 +21,19 @@ pub enum Selection<'a> {
 
 /// What the networks say of one situation.
 #[derive(Clone, Copy, Debug)]
-pub struct Heads<'a> {
+pub(crate) struct Heads<'a> {
     /// Logits of the 12 actions.
-    pub actions: &'a [f32],
+    pub(crate) actions: &'a [f32],
     /// Logits of the 82 classes.
-    pub objects: &'a [f32],
+    pub(crate) objects: &'a [f32],
     /// What the critic has to say; absent where the policy decides alone.
-    pub advantage_scale: Option<AdvantageScale<'a>>,
+    pub(crate) advantage_scale: Option<AdvantageScale<'a>>,
 }
 
 impl<'a> Heads<'a> {
     /// A policy's logits alone.
-    pub fn of(actions: &'a [f32], objects: &'a [f32]) -> Heads<'a> {
+    #[cfg(test)]
+    pub(crate) fn of(actions: &'a [f32], objects: &'a [f32]) -> Heads<'a> {
         Heads { actions, objects, advantage_scale: None }
     }
 
@@ -43,7 +44,12 @@ impl<'a> Heads<'a> {
 }
 
 /// Decides in one situation. Of the navigation actions those in `tried` are masked, unless that would leave none.
-pub fn decide(heads: &Heads<'_>, candidates: &[Candidate], tried: &[ActionType], selection: Selection<'_>) -> Decision {
+pub(crate) fn decide(
+    heads: &Heads<'_>,
+    candidates: &[Candidate],
+    tried: &[ActionType],
+    selection: Selection<'_>,
+) -> Decision {
     let all_tried = ActionType::ALL.iter().all(|kind| kind.is_interaction() || tried.contains(kind));
     let possible = |kind: ActionType| match kind.is_interaction() {
         true => candidates.iter().any(|c| c.kind == kind),

@@ -10,20 +10,20 @@ use crate::nets::critic::Critic;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {
     /// V of the state.
-    pub state: f32,
+    pub(crate) state: f32,
     /// Q of what could be done: navigation once each, interactions once for each class that is a candidate.
-    pub choices: Vec<ChoiceValue>,
+    pub(crate) choices: Vec<ChoiceValue>,
 }
 
 /// The value of one thing that could be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChoiceValue {
+pub(crate) struct ChoiceValue {
     /// The action.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// The class that it is done to, for interactions.
-    pub class: Option<Class>,
+    pub(crate) class: Option<Class>,
     /// The smaller of both critics' Q.
-    pub q: f32,
+    pub(crate) q: f32,
 }
 
 impl Values {
@@ -31,7 +31,7 @@ impl Values {
     ///
     /// # Errors
     /// When the critic's answer cannot be read.
-    pub fn of(
+    pub(crate) fn of(
         critic: &Critic,
         observation: &Tensor,
         conditioning: &Tensor,
@@ -56,12 +56,12 @@ impl Values {
     }
 
     /// Q of an action on a class.
-    pub fn q(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
+    pub(crate) fn q(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
         self.choices.iter().find(|choice| choice.kind == kind && choice.class == class).map(|choice| choice.q)
     }
 
     /// How much better than the state's value that is.
-    pub fn advantage(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
+    pub(crate) fn advantage(&self, kind: ActionType, class: Option<Class>) -> Option<f32> {
         Some(self.q(kind, class)? - self.state)
     }
 }
@@ -70,16 +70,16 @@ impl Values {
 /// as the weight that is where its policy extraction ends: the best of its loss is the demonstrated policy times exp(temperature
 /// x A) (Peng et al., 2019, equation 9), which a network of few updates is far from.
 #[derive(Clone, Copy, Debug)]
-pub struct AdvantageScale<'a> {
+pub(crate) struct AdvantageScale<'a> {
     /// The values.
-    pub values: &'a Values,
+    pub(crate) values: &'a Values,
     /// How much they count.
-    pub weight: f32,
+    pub(crate) weight: f32,
 }
 
 impl AdvantageScale<'_> {
     /// How many times as likely a choice becomes; 1 where nothing is known of it.
-    pub fn factor(&self, kind: ActionType, class: Option<Class>) -> f32 {
+    pub(crate) fn factor(&self, kind: ActionType, class: Option<Class>) -> f32 {
         self.values.advantage(kind, class).map_or(1.0, |advantage| (self.weight * advantage).exp())
     }
 }

@@ -8,15 +8,15 @@ use tch::{Kind, Tensor, nn};
 /// The optimiser's settings besides the learning rate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct AdamWConfig {
+pub(crate) struct AdamWConfig {
     /// Decay of the mean gradient.
-    pub beta1: f64,
+    pub(crate) beta1: f64,
     /// Decay of the mean squared gradient.
-    pub beta2: f64,
+    pub(crate) beta2: f64,
     /// Added to the root of the mean squared gradient.
-    pub epsilon: f64,
+    pub(crate) epsilon: f64,
     /// Decoupled weight decay; biases, norms and other vectors are spared.
-    pub weight_decay: f64,
+    pub(crate) weight_decay: f64,
 }
 
 struct Parameter {
@@ -26,7 +26,7 @@ struct Parameter {
 }
 
 /// AdamW over every trainable tensor of a store.
-pub struct AdamW {
+pub(crate) struct AdamW {
     config: AdamWConfig,
     parameters: BTreeMap<String, Parameter>,
     steps: u64,
@@ -34,7 +34,7 @@ pub struct AdamW {
 
 impl AdamW {
     /// An optimiser at its start: no step taken, moments zero.
-    pub fn new(store: &nn::VarStore, config: AdamWConfig) -> AdamW {
+    pub(crate) fn new(store: &nn::VarStore, config: AdamWConfig) -> AdamW {
         let trainable = store.variables().into_iter().filter(|(_, tensor)| tensor.requires_grad());
         let parameter = |weight: Tensor| Parameter {
             mean: weight.zeros_like().detach(),
@@ -45,12 +45,12 @@ impl AdamW {
     }
 
     /// How many steps were taken.
-    pub fn steps(&self) -> u64 {
+    pub(crate) fn steps(&self) -> u64 {
         self.steps
     }
 
     /// Takes one step against the gradients of `loss`.
-    pub fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
+    pub(crate) fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
         let weights: Vec<&Tensor> = self.parameters.values().map(|parameter| &parameter.weight).collect();
         // Not added to what the weights hold: nothing has to be zeroed, and no sum is read and written once more.
         let gradients = Tensor::run_backward(&[loss], &weights, false, false);
@@ -81,7 +81,7 @@ impl AdamW {
     }
 
     /// Both moments of every tensor, as `mean.NAME` and `square.NAME`.
-    pub fn moments(&self) -> BTreeMap<String, Tensor> {
+    pub(crate) fn moments(&self) -> BTreeMap<String, Tensor> {
         let both = |(name, parameter): (&String, &Parameter)| {
             [
                 (format!("mean.{name}"), parameter.mean.shallow_clone()),
@@ -95,7 +95,7 @@ impl AdamW {
     ///
     /// # Errors
     /// When a moment is missing or has another shape; nothing is changed then.
-    pub fn restore(&mut self, steps: u64, moments: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
+    pub(crate) fn restore(&mut self, steps: u64, moments: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
         let find = |name: String, like: &Tensor| -> anyhow::Result<Tensor> {
             let found = moments.get(&name).ok_or_else(|| anyhow::anyhow!("the moment {name} is missing"))?;
             anyhow::ensure!(

@@ -8,43 +8,43 @@ use crate::nets::visual::SIDE;
 
 /// Transitions (s, a, s′) under an instruction or goal z, n of each.
 #[derive(Debug)]
-pub struct Transitions {
+pub(crate) struct Transitions {
     /// s: [n, channels, 7, 7] or [n, frames, channels, 7, 7], floats of any width.
-    pub observation: Tensor,
+    pub(crate) observation: Tensor,
     /// s′; absent where no critic reads it.
-    pub next: Option<Tensor>,
+    pub(crate) next: Option<Tensor>,
     /// z, as the networks take it.
-    pub conditioning: Tensor,
+    pub(crate) conditioning: Tensor,
     /// Actions, by index [n].
-    pub actions: Tensor,
+    pub(crate) actions: Tensor,
     /// Object classes, by index `[n]`; 0 for navigation.
-    pub objects: Tensor,
+    pub(crate) objects: Tensor,
     /// The classes that the policy's object head learns, by index [n]; 0 for none.
-    pub object_target: Tensor,
+    pub(crate) object_target: Tensor,
     /// 1 on the transition into the span's last state, [n] floats.
-    pub terminal: Tensor,
+    pub(crate) terminal: Tensor,
     /// 1 where the action was executed and led to s′, 0 where it is a correction of what was executed, [n] floats.
-    pub executed: Tensor,
+    pub(crate) executed: Tensor,
 }
 
 /// Pairs (A, B) of transitions to chain, m of them.
 #[derive(Debug)]
-pub struct ChainedPairs {
+pub(crate) struct ChainedPairs {
     /// A's transitions under z_B.
-    pub first: Transitions,
+    pub(crate) first: Transitions,
     /// 1 where equation 4 ends A, `[m]`.
-    pub cut: Tensor,
+    pub(crate) cut: Tensor,
     /// z of "A. B." for A, and B's transitions under the same; absent where equation 5 is off.
-    pub joint: Option<(Tensor, Transitions)>,
+    pub(crate) joint: Option<(Tensor, Transitions)>,
 }
 
 /// What one update learns from.
 #[derive(Debug)]
 pub struct Batch {
     /// Demonstrated skills under their own instructions.
-    pub base: Transitions,
+    pub(crate) base: Transitions,
     /// Chained pairs.
-    pub pairs: Option<ChainedPairs>,
+    pub(crate) pairs: Option<ChainedPairs>,
 }
 
 /// The demonstrated skills themselves.
@@ -68,21 +68,21 @@ struct SegmentSource<'a> {
 /// Adjacent items that are averaged by themselves.
 pub(super) struct Segment {
     /// Which it is; empty for the base.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     start: i64,
     len: i64,
     /// Its share of the loss.
-    pub weight: f64,
+    pub(crate) weight: f64,
 }
 
 impl Segment {
     /// This segment of a tensor over all items.
-    pub fn of(&self, all: &Tensor) -> Tensor {
+    pub(crate) fn of(&self, all: &Tensor) -> Tensor {
         all.narrow(0, self.start, self.len)
     }
 
     /// How many items it has.
-    pub fn len(&self) -> i64 {
+    pub(crate) fn len(&self) -> i64 {
         self.len
     }
 
@@ -92,7 +92,7 @@ impl Segment {
     }
 
     /// A metric's name, prefixed by the segment's; the base has no prefix.
-    pub fn label(&self, name: &str) -> String {
+    pub(crate) fn label(&self, name: &str) -> String {
         if self.name == BASE { name.to_string() } else { format!("{}_{name}", self.name) }
     }
 }
@@ -157,6 +157,6 @@ impl Batch {
 }
 
 /// Observations as the networks take them: [n, channels, 7, 7].
-pub fn network_input(observation: &Tensor, precision: Precision) -> Tensor {
+pub(crate) fn network_input(observation: &Tensor, precision: Precision) -> Tensor {
     precision.cast(&observation.reshape([observation.size()[0], -1, SIDE, SIDE]))
 }

@@ -7,15 +7,15 @@ use crate::nets::policy::Logits;
 
 /// −log π of each item's demonstration, both [n].
 #[derive(Debug)]
-pub struct NegLogLikelihood {
+pub(crate) struct NegLogLikelihood {
     /// Cross-entropy of the action head.
-    pub action: Tensor,
+    pub(crate) action: Tensor,
     /// Cross-entropy of the object head; 0 where there is no class to learn.
-    pub object: Tensor,
+    pub(crate) object: Tensor,
 }
 
 /// Of the demonstrated `actions` [n] and the classes `object_target` [n] (indices, 0 for none) under `logits`.
-pub fn neg_log_likelihood(logits: &Logits, actions: &Tensor, object_target: &Tensor) -> NegLogLikelihood {
+pub(crate) fn neg_log_likelihood(logits: &Logits, actions: &Tensor, object_target: &Tensor) -> NegLogLikelihood {
     let of = |logits: &Tensor, labels: &Tensor| {
         -logits.log_softmax(-1, Kind::Float).gather(1, &labels.unsqueeze(1), false).squeeze_dim(1)
     };
@@ -26,12 +26,12 @@ pub fn neg_log_likelihood(logits: &Logits, actions: &Tensor, object_target: &Ten
 }
 
 /// 1 where there is a class to learn, [n].
-pub fn object_mask(object_target: &Tensor) -> Tensor {
+pub(crate) fn object_mask(object_target: &Tensor) -> Tensor {
     object_target.gt(0).to_kind(Kind::Float)
 }
 
 /// Shares of right answers: of the action head, and of the object head among interactions (1 without any).
-pub fn accuracy(logits: &Logits, actions: &Tensor, objects: &Tensor) -> (f64, f64) {
+pub(crate) fn accuracy(logits: &Logits, actions: &Tensor, objects: &Tensor) -> (f64, f64) {
     let right = |logits: &Tensor, labels: &Tensor| logits.argmax(-1, false).eq_tensor(labels).to_kind(Kind::Float);
     let interaction = object_mask(objects);
     let count = interaction.sum(Kind::Float).double_value(&[]);

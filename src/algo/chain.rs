@@ -13,23 +13,23 @@ pub struct Chaining {
     /// Pairs in a step; the paper's is the batch.
     pub batch_size: usize,
     /// What A's reward at the cut is bootstrapped from.
-    pub bootstrap: Bootstrap,
+    pub(crate) bootstrap: Bootstrap,
     /// What the policy learns from; the critic learns from both equations.
-    pub policy_extraction: PolicyExtraction,
+    pub(crate) policy_extraction: PolicyExtraction,
     /// Whose statistics normalise chained items while the policy learns from them.
-    pub batch_norm_statistics: BatchNormStatistics,
+    pub(crate) batch_norm_statistics: BatchNormStatistics,
     /// The weight of both equations together; that of the base loss is 1.
-    pub loss_weight: f64,
+    pub(crate) loss_weight: f64,
     /// The weight of equation 4 within chaining.
-    pub chain_weight: f64,
+    pub(crate) chain_weight: f64,
     /// The weight of equation 5 within chaining; 0 where there are no sentences to join.
-    pub aggregate_weight: f64,
+    pub(crate) aggregate_weight: f64,
 }
 
 /// Which equations the policy learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum PolicyExtraction {
+pub(crate) enum PolicyExtraction {
     /// Both, as in the paper.
     Both,
     /// Equation 5 alone. Where neither of two skills serves the other, no action is better than another for equation 4, so that
@@ -40,7 +40,7 @@ pub enum PolicyExtraction {
 /// Whose statistics the policy's batch norms use for chained items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum BatchNormStatistics {
+pub(crate) enum BatchNormStatistics {
     /// Those of the whole batch: what an agent sees later is normalised by a mixture that it never meets.
     WholeBatch,
     /// The running ones of demonstrated items, which alone keep them up. Of chained items no unit is dropped then.
@@ -59,14 +59,14 @@ pub enum PairSource {
 
 /// How likely equation 4 ends A at a transition, `left` steps (itself included) before its span's end: the cut is a step drawn
 /// uniformly between the drawn one and the span's last.
-pub fn cut_chance(left: u32) -> f64 {
+pub(crate) fn cut_chance(left: u32) -> f64 {
     1.0 / f64::from(left.max(1))
 }
 
 /// The estimate of what B can make of the state that A ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Bootstrap {
+pub(crate) enum Bootstrap {
     /// V(s′, z_B): of the state after A's last action. The paper's implementation.
     NextValue,
     /// min Q̄(s, a, z_B) of the last action itself. The paper's equations, and Actionable Models.
@@ -75,28 +75,28 @@ pub enum Bootstrap {
 
 /// A transition's reward and whether it ends the episode, both `[n]`.
 #[derive(Debug)]
-pub struct RewardDone {
+pub(crate) struct RewardDone {
     /// r, 0 to 1.
-    pub reward: Tensor,
+    pub(crate) reward: Tensor,
     /// d, 0 or 1.
-    pub terminal: Tensor,
+    pub(crate) terminal: Tensor,
 }
 
 impl RewardDone {
     /// A demonstrated skill: reward 1 on the transition into the span's last state, which ends it. Also equation 5's B.
-    pub fn of_skill(terminal: &Tensor) -> RewardDone {
+    pub(crate) fn of_skill(terminal: &Tensor) -> RewardDone {
         RewardDone { reward: terminal.shallow_clone(), terminal: terminal.shallow_clone() }
     }
 
     /// Equation 4: A under z_B, cut where `cut` is 1; the reward there is the `bootstrap`. Equation 5's A, under "A. B.": the
     /// cut is the span's own end.
-    pub fn chained(cut: &Tensor, bootstrap: &Tensor) -> RewardDone {
+    pub(crate) fn chained(cut: &Tensor, bootstrap: &Tensor) -> RewardDone {
         RewardDone { reward: cut * bootstrap, terminal: cut.shallow_clone() }
     }
 }
 
 /// A bootstrapped value as a reward: without gradient, and within 0..1, where every return lies.
-pub fn as_reward(bootstrap: &Tensor) -> Tensor {
+pub(crate) fn as_reward(bootstrap: &Tensor) -> Tensor {
     bootstrap.detach().clamp(0.0, 1.0)
 }
 

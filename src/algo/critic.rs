@@ -13,7 +13,7 @@ use crate::nets::critic::{Critic, CriticValues};
 use crate::nets::weights::{self, Tensors};
 
 /// Twin Q and V, their target and their optimiser.
-pub struct CriticLearner<'a> {
+pub(crate) struct CriticLearner<'a> {
     online: &'a Critic,
     target: &'a Critic,
     target_store: &'a nn::VarStore,
@@ -24,7 +24,7 @@ pub struct CriticLearner<'a> {
 
 impl<'a> CriticLearner<'a> {
     /// A critic at step 0; the target begins as its copy.
-    pub fn new(
+    pub(crate) fn new(
         (online, store): (&'a Critic, &'a nn::VarStore),
         (target, target_store): (&'a Critic, &'a nn::VarStore),
         optimisation: Optimisation,
@@ -83,12 +83,14 @@ impl<'a> CriticLearner<'a> {
         let reward = |segment: &Segment| {
             let terminal = segment.of(&all.terminal);
             match (segment.name, &bootstrap) {
-                (CHAIN | AGG_A, Some(bootstrap)) => RewardDone::chained(&terminal, bootstrap).reward,
-                _ => RewardDone::of_skill(&terminal).reward,
+                (CHAIN | AGG_A, Some(bootstrap)) => RewardDone::chained(&terminal, bootstrap),
+                _ => RewardDone::of_skill(&terminal),
             }
         };
-        let rewards: Vec<Tensor> = segments.iter().map(reward).collect();
-        let q_target = iql::q_target(&Tensor::cat(&rewards, 0), &all.terminal, &next_value, self.iql.discount);
+        let (rewards, terminals): (Vec<Tensor>, Vec<Tensor>) =
+            segments.iter().map(reward).map(|of| (of.reward, of.terminal)).unzip();
+        let (reward, terminal) = (Tensor::cat(&rewards, 0), Tensor::cat(&terminals, 0));
+        let q_target = iql::q_target(&reward, &terminal, &next_value, self.iql.discount);
         let weights = iql::advantage_weights(&target_q, &values.baseline, self.iql.temperature, self.iql.weight_cap);
         let executed = all.executed.shallow_clone();
         CriticBatch { values, target_q, q_target, weights, executed, expectile: self.iql.expectile }
@@ -103,20 +105,20 @@ pub(super) struct CriticBatch {
     /// r + (1 − d) γ V(s′, z).
     q_target: Tensor,
     /// exp(β (Q̄ − V)), capped: the weights of the policy's loss.
-    pub weights: Tensor,
+    pub(crate) weights: Tensor,
     executed: Tensor,
     expectile: f64,
 }
 
 impl CriticBatch {
     /// Expectile regression of V towards Q̄.
-    pub fn v_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
+    pub(crate) fn v_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
         let loss = iql::value_loss(&self.values.value, &self.target_q, self.expectile);
         self.averaged("value_loss", &loss, segments, terms)
     }
 
     /// Squared error of both Q to r + (1 − d) γ V(s′).
-    pub fn q_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
+    pub(crate) fn q_loss(&self, segments: &[Segment], terms: &mut LossTerms) -> Tensor {
         let [one, other] = [0, 1].map(|k| iql::q_loss(&self.values.q[k], &self.q_target));
         self.averaged("q_loss", &(one + other), segments, terms)
     }
@@ -135,7 +137,7 @@ impl CriticBatch {
     }
 
     /// Weights and values, by the names of their segments.
-    pub fn describe(&self, segments: &[Segment], numbers: &mut BTreeMap<String, f64>) {
+    pub(crate) fn describe(&self, segments: &[Segment], numbers: &mut BTreeMap<String, f64>) {
         let value = &self.values.baseline;
         for segment in segments {
             let found = [

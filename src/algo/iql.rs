@@ -9,15 +9,15 @@ use tch::{Kind, Tensor, nn};
 #[serde(deny_unknown_fields)]
 pub struct Iql {
     /// γ.
-    pub discount: f64,
+    pub(crate) discount: f64,
     /// τ: which expectile of Q over the demonstrated actions V is.
-    pub expectile: f64,
+    pub(crate) expectile: f64,
     /// β: how many times the advantage enters the exponent of the policy's weights.
-    pub temperature: f64,
+    pub(crate) temperature: f64,
     /// No weight is above this.
-    pub weight_cap: f64,
+    pub(crate) weight_cap: f64,
     /// The share by which the target Q follows Q after each step.
-    pub target_update_rate: f64,
+    pub(crate) target_update_rate: f64,
     /// The share of the steps in which the policy only clones the demonstrated skills: a critic that knows nothing yet weighs
     /// at random. The paper has no such phase, and 140,000 steps.
     #[serde(default)]
@@ -25,7 +25,7 @@ pub struct Iql {
     /// How many times the advantage enters the exponent by which the agent weighs its policy when it decides. The paper's
     /// agent decides by its policy alone: 0.
     #[serde(default)]
-    pub advantage_scale: f64,
+    pub(crate) advantage_scale: f64,
 }
 
 impl Iql {
@@ -33,7 +33,7 @@ impl Iql {
     ///
     /// # Errors
     /// Names the field of `iql` that is out of its bounds.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
         let Iql { discount, expectile, temperature, weight_cap, target_update_rate, cloning_fraction, advantage_scale } =
             *self;
         for (field, share) in
@@ -52,44 +52,44 @@ impl Iql {
 }
 
 /// (V − Q̄)² times τ where V is below Q̄, else times 1 − τ. No gradient reaches `q`.
-pub fn value_loss(value: &Tensor, q: &Tensor, expectile: f64) -> Tensor {
+pub(crate) fn value_loss(value: &Tensor, q: &Tensor, expectile: f64) -> Tensor {
     let above = value - q.detach();
     let weight = above.lt(0.0).to_kind(Kind::Float) * (2.0 * expectile - 1.0) + (1.0 - expectile);
     weight * above.square()
 }
 
 /// r + (1 − d) γ V(s′, z), without gradient.
-pub fn q_target(reward: &Tensor, terminal: &Tensor, next_value: &Tensor, discount: f64) -> Tensor {
+pub(crate) fn q_target(reward: &Tensor, terminal: &Tensor, next_value: &Tensor, discount: f64) -> Tensor {
     let goes_on = terminal.neg() + 1.0;
     (reward + goes_on * next_value * discount).detach()
 }
 
 /// (Q − target)². No gradient reaches `target`.
-pub fn q_loss(q: &Tensor, target: &Tensor) -> Tensor {
+pub(crate) fn q_loss(q: &Tensor, target: &Tensor) -> Tensor {
     (q - target.detach()).square()
 }
 
 /// min(exp(β (Q̄ − V)), cap), without gradient.
-pub fn advantage_weights(q: &Tensor, value: &Tensor, temperature: f64, cap: f64) -> Tensor {
+pub(crate) fn advantage_weights(q: &Tensor, value: &Tensor, temperature: f64, cap: f64) -> Tensor {
     ((q - value) * temperature).exp().clamp_max(cap).detach()
 }
 
 /// A target network that follows another one: Polyak averaging.
-pub struct PolyakTarget {
+pub(crate) struct PolyakTarget {
     pairs: Vec<(Tensor, Tensor)>,
 }
 
 impl PolyakTarget {
     /// Follows `online` with `target`, two stores of one network. Weights are averaged; statistics of batch norms, which are
     /// averages already, are copied.
-    pub fn new(online: &nn::VarStore, target: &nn::VarStore) -> PolyakTarget {
+    pub(crate) fn new(online: &nn::VarStore, target: &nn::VarStore) -> PolyakTarget {
         let mut targets = target.variables();
         let pair = |(name, tensor): (String, Tensor)| Some((tensor, targets.remove(&name)?));
         PolyakTarget { pairs: online.variables().into_iter().filter_map(pair).collect() }
     }
 
     /// Moves the target by `rate` of what separates it from the followed network.
-    pub fn update(&mut self, rate: f64) {
+    pub(crate) fn update(&mut self, rate: f64) {
         tch::no_grad(|| {
             for (online, target) in &mut self.pairs {
                 if online.requires_grad() {

@@ -14,13 +14,13 @@ use crate::nets::weights::{self, TensorSpec, Tensors};
 #[serde(deny_unknown_fields)]
 pub struct Optimisation {
     /// Steps of the whole training.
-    pub steps: u64,
+    pub(crate) steps: u64,
     /// Items in a step.
     pub batch_size: usize,
     /// The learning rate over the steps.
-    pub schedule: Schedule,
+    pub(crate) schedule: Schedule,
     /// The optimiser's other settings.
-    pub adamw: AdamWConfig,
+    pub(crate) adamw: AdamWConfig,
 }
 
 impl Optimisation {
@@ -28,7 +28,7 @@ impl Optimisation {
     ///
     /// # Errors
     /// Names the field that is out of its bounds.
-    pub fn check(&self, name: &str) -> anyhow::Result<()> {
+    pub(crate) fn check(&self, name: &str) -> anyhow::Result<()> {
         let Schedule { learning_rate, final_fraction, .. } = self.schedule;
         let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.adamw;
         let batch_size = self.batch_size;
@@ -55,7 +55,7 @@ impl Optimisation {
 }
 
 /// The weights of a store with their AdamW.
-pub struct Learner<'a> {
+pub(crate) struct Learner<'a> {
     store: &'a nn::VarStore,
     optimiser: AdamW,
     optimisation: Optimisation,
@@ -64,39 +64,39 @@ pub struct Learner<'a> {
 
 impl<'a> Learner<'a> {
     /// A learner at step 0. The seed drives dropout.
-    pub fn new(store: &'a nn::VarStore, optimisation: Optimisation, seed: u64) -> Learner<'a> {
+    pub(crate) fn new(store: &'a nn::VarStore, optimisation: Optimisation, seed: u64) -> Learner<'a> {
         Learner { store, optimiser: AdamW::new(store, optimisation.adamw.clone()), optimisation, seed }
     }
 
     /// Steps taken.
-    pub fn step(&self) -> u64 {
+    pub(crate) fn step(&self) -> u64 {
         self.optimiser.steps()
     }
 
     /// The share of all steps that is taken.
-    pub fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         self.step() as f64 / self.optimisation.steps.max(1) as f64
     }
 
     /// Whether all steps are taken.
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.step() >= self.optimisation.steps
     }
 
     /// Before a step's forward pass: whatever libtorch draws in it is a function of seed and step.
-    pub fn begin_step(&self) {
+    pub(crate) fn begin_step(&self) {
         let mixed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(self.step());
         tch::manual_seed(mixed as i64);
     }
 
     /// Takes a step against the gradients of `loss`.
-    pub fn minimise(&mut self, loss: &Tensor) {
+    pub(crate) fn minimise(&mut self, loss: &Tensor) {
         let rate = self.optimisation.schedule.at(self.step(), self.optimisation.steps);
         self.optimiser.minimise(loss, rate);
     }
 
     /// Weights and moments by name: `weight.NAME`, `mean.NAME`, `square.NAME`.
-    pub fn state(&self) -> Tensors {
+    pub(crate) fn state(&self) -> Tensors {
         let mut tensors: Tensors =
             self.store.variables().into_iter().map(|(name, tensor)| (format!("weight.{name}"), tensor)).collect();
         tensors.extend(self.optimiser.moments());
@@ -107,7 +107,7 @@ impl<'a> Learner<'a> {
     ///
     /// # Errors
     /// When a tensor is missing or of another shape.
-    pub fn restore(&mut self, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+    pub(crate) fn restore(&mut self, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         self.optimiser.restore(step, tensors)?;
         weights::copy(tensors, "weight.", self.store)
     }
@@ -116,7 +116,7 @@ impl<'a> Learner<'a> {
     ///
     /// # Errors
     /// When it does not fit the networks; each tensor that is at fault is named.
-    pub fn restore_checked(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+    pub(crate) fn restore_checked(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let forms = self.state().iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
         weights::check(path, tensors, &forms)?;
         self.restore(step, tensors)

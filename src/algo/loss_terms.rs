@@ -13,7 +13,7 @@ pub(super) struct LossTerms {
 
 impl LossTerms {
     /// Keeps the value of a scalar `tensor`, without its graph.
-    pub fn add(&mut self, name: String, tensor: &Tensor) {
+    pub(crate) fn add(&mut self, name: String, tensor: &Tensor) {
         self.names.push(name);
         self.tensors.push(tensor.detach());
     }
@@ -22,7 +22,7 @@ impl LossTerms {
     ///
     /// # Errors
     /// [`NotFinite`].
-    pub fn numbers(self, step: u64) -> Result<BTreeMap<String, f64>, NotFinite> {
+    pub(crate) fn numbers(self, step: u64) -> Result<BTreeMap<String, f64>, NotFinite> {
         let stacked = Tensor::stack(&self.tensors, 0).to_kind(Kind::Double).to_device(Device::Cpu);
         let values = (0..self.tensors.len() as i64).map(|i| stacked.double_value(&[i]));
         let found: BTreeMap<String, f64> = self.names.into_iter().zip(values).collect();
@@ -38,9 +38,9 @@ impl LossTerms {
 #[error("step {step}: {term} is {value}; no weight was changed by this step, and the last saved state is kept")]
 pub struct NotFinite {
     /// The step that failed, from 1.
-    pub step: u64,
+    pub(crate) step: u64,
     /// The loss's name.
-    pub term: String,
+    pub(crate) term: String,
     /// NaN or infinite.
-    pub value: f64,
+    pub(crate) value: f64,
 }

@@ -1,13 +1,13 @@
 //! Algorithms: how a policy learns from trajectories.
 
-pub mod adamw;
-pub mod batch;
-pub mod bc;
+pub(crate) mod adamw;
+pub(crate) mod batch;
+pub(crate) mod bc;
 pub mod chain;
-pub mod critic;
-pub mod iql;
-pub mod learner;
-pub mod loss_terms;
-pub mod policy_extraction;
-pub mod schedule;
+pub(crate) mod critic;
+pub(crate) mod iql;
+pub(crate) mod learner;
+pub(crate) mod loss_terms;
+pub(crate) mod policy_extraction;
+pub(crate) mod schedule;
 pub mod update;

@@ -12,12 +12,12 @@ use crate::nets::policy::Logits;
 pub(super) struct ForwardPass<'a> {
     segments: Vec<&'a Segment>,
     /// Whether batch norms use and keep up the batch's own statistics, and units are dropped.
-    pub train: bool,
+    pub(crate) train: bool,
 }
 
 impl<'a> ForwardPass<'a> {
     /// What the policy learns from: the demonstrated items, the first of `segments`, and of the others what `chaining` says.
-    pub fn all(segments: &'a [Segment], chaining: Option<&Chaining>) -> Vec<ForwardPass<'a>> {
+    pub(crate) fn all(segments: &'a [Segment], chaining: Option<&Chaining>) -> Vec<ForwardPass<'a>> {
         let (base, rest) = segments.split_at(1);
         let mut passes = vec![ForwardPass { segments: base.iter().collect(), train: true }];
         let Some(chaining) = chaining else { return passes };
@@ -32,7 +32,7 @@ impl<'a> ForwardPass<'a> {
     }
 
     /// The items of its segments.
-    pub fn of(&self, all: &Tensor) -> Tensor {
+    pub(crate) fn of(&self, all: &Tensor) -> Tensor {
         gather(&self.segments, all)
     }
 }

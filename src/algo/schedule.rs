@@ -5,18 +5,18 @@ use serde::{Deserialize, Serialize};
 /// Linear warm-up, then linear decay.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Schedule {
+pub(crate) struct Schedule {
     /// The highest learning rate.
-    pub learning_rate: f64,
+    pub(crate) learning_rate: f64,
     /// Steps of the warm-up from zero.
-    pub warmup_steps: u64,
+    pub(crate) warmup_steps: u64,
     /// The share of the highest rate that is left at the last step.
-    pub final_fraction: f64,
+    pub(crate) final_fraction: f64,
 }
 
 impl Schedule {
     /// The learning rate at `step` (from 0) of `steps`.
-    pub fn at(&self, step: u64, steps: u64) -> f64 {
+    pub(crate) fn at(&self, step: u64, steps: u64) -> f64 {
         if step < self.warmup_steps {
             return self.learning_rate * (step + 1) as f64 / self.warmup_steps as f64;
         }

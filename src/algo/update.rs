@@ -28,7 +28,7 @@ pub struct Update<'a> {
 
 impl<'a> Update<'a> {
     /// Behaviour cloning, or with a critic IQL, or with `chaining` as well SPRINT.
-    pub fn new(
+    pub(crate) fn new(
         (policy, store): (&'a PolicyNet, &'a nn::VarStore),
         critic: Option<CriticLearner<'a>>,
         chaining: Option<Chaining>,
@@ -40,17 +40,17 @@ impl<'a> Update<'a> {
     }
 
     /// The same, but its networks compute with `precision`.
-    pub fn with_precision(self, precision: Precision) -> Update<'a> {
+    pub(crate) fn with_precision(self, precision: Precision) -> Update<'a> {
         Update { precision, ..self }
     }
 
     /// Steps taken.
-    pub fn step(&self) -> u64 {
+    pub(crate) fn step(&self) -> u64 {
         self.actor.step()
     }
 
     /// Whether all steps are taken.
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.actor.is_done()
     }
 
@@ -107,7 +107,7 @@ impl<'a> Update<'a> {
     }
 
     /// Every tensor of the training's state, by name.
-    pub fn state(&self) -> Tensors {
+    pub(crate) fn state(&self) -> Tensors {
         let mut tensors = weights::prefixed("policy.", self.actor.state());
         tensors.extend(self.critic.iter().flat_map(CriticLearner::state));
         tensors
@@ -117,7 +117,7 @@ impl<'a> Update<'a> {
     ///
     /// # Errors
     /// When a tensor is missing, unknown, or of another form; each is named with `path`, and nothing is changed.
-    pub fn restore(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+    pub(crate) fn restore(&mut self, path: &Path, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let own = self.state();
         weights::check(
             path,

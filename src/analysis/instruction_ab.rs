@@ -9,41 +9,41 @@ use crate::language::instruction;
 
 /// One instruction in a state.
 #[derive(Clone, Debug)]
-pub struct Side {
+pub(crate) struct Side {
     /// The instruction.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// What the policy would do.
-    pub decision: Decision,
+    pub(crate) decision: Decision,
     /// What its critics say.
-    pub values: Option<Values>,
+    pub(crate) values: Option<Values>,
 }
 
 /// What two instructions come to in one state.
 #[derive(Clone, Debug)]
 pub struct Contrast {
     /// The one in force and the other.
-    pub sides: [Side; 2],
+    pub(crate) sides: [Side; 2],
     /// Every choice with its probability under each.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// The Jensen-Shannon divergence of both distributions over choices, in bits: 0 is the same, 1 is nothing in common.
-    pub divergence: f32,
+    pub(crate) divergence: f32,
     /// The mean divergence between the one in force and [`REFERENCES`]: how much language matters here at all.
-    pub sensitivity: f32,
+    pub(crate) sensitivity: f32,
 }
 
 /// A choice under both instructions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// What.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// To what.
-    pub class: Option<Class>,
+    pub(crate) class: Option<Class>,
     /// How likely it is under each.
-    pub shares: [f32; 2],
+    pub(crate) shares: [f32; 2],
 }
 
 /// The instructions against which sensitivity is measured: one for each kind of skill, and one that asks for nothing.
-pub const REFERENCES: [&str; 8] = [
+pub(crate) const REFERENCES: [&str; 8] = [
     "Pick up the mug.",
     "Put the apple in the fridge.",
     "Slice the tomato.",
@@ -58,7 +58,7 @@ pub const REFERENCES: [&str; 8] = [
 ///
 /// # Errors
 /// When the other text is no instruction, or the policy cannot go on or has no distribution.
-pub fn contrast<E: Environment>(
+pub(crate) fn contrast<E: Environment>(
     policy: &mut dyn Policy,
     rollout: &mut Rollout<E>,
     other: &str,

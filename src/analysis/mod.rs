@@ -1,5 +1,5 @@
 //! Questions about a policy: chains of instructions link by link, two instructions in one state, the value of every cell.
 
-pub mod chain;
-pub mod instruction_ab;
-pub mod value_map;
+pub(crate) mod chain;
+pub(crate) mod instruction_ab;
+pub(crate) mod value_map;

@@ -11,7 +11,7 @@ use crate::house::House;
 
 /// What is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
+pub(crate) enum Measure {
     /// V, by the checkpoint's critics.
     Value,
     /// The probability of the likeliest choice; for policies without critics.
@@ -20,7 +20,7 @@ pub enum Measure {
 
 impl Measure {
     /// In words.
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Measure::Value => "V",
             Measure::Confidence => "no critic: p of the likeliest choice",
@@ -28,7 +28,7 @@ impl Measure {
     }
 
     /// In a letter.
-    pub fn letter(self) -> char {
+    pub(crate) fn letter(self) -> char {
         match self {
             Measure::Value => 'V',
             Measure::Confidence => 'p',
@@ -38,16 +38,16 @@ impl Measure {
 
 /// One cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CellValue {
+pub(crate) struct CellValue {
     /// Where.
-    pub cell: Cell,
+    pub(crate) cell: Cell,
     /// The value looking each way, in the order of [`Heading::ALL`].
-    pub values: [f32; 4],
+    pub(crate) values: [f32; 4],
 }
 
 impl CellValue {
     /// The value looking one way; without one, the highest and the way it looks.
-    pub fn facing(&self, heading: Option<Heading>) -> (Heading, f32) {
+    pub(crate) fn facing(&self, heading: Option<Heading>) -> (Heading, f32) {
         let each = Heading::ALL.into_iter().zip(self.values).filter(|(one, _)| heading.is_none_or(|only| only == *one));
         each.reduce(|best, other| if other.1 > best.1 { other } else { best }).unwrap_or((Heading::North, 0.0))
     }
@@ -57,24 +57,24 @@ impl CellValue {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ValueMap {
     /// What the agent was told.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// What was measured.
-    pub measure: Measure,
+    pub(crate) measure: Measure,
     /// The cells that are done.
-    pub cells: Vec<CellValue>,
+    pub(crate) cells: Vec<CellValue>,
     /// How many cells there are.
-    pub of: usize,
+    pub(crate) of: usize,
 }
 
 impl ValueMap {
     /// The lowest and the highest value, looking one way or the best.
-    pub fn range(&self, heading: Option<Heading>) -> Option<(f32, f32)> {
+    pub(crate) fn range(&self, heading: Option<Heading>) -> Option<(f32, f32)> {
         let values = self.cells.iter().map(|height| height.facing(heading).1);
         values.map(|value| (value, value)).reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
     }
 
     /// The value of each cell that is done, between the lowest (0) and the highest (1).
-    pub fn shares(&self, heading: Option<Heading>) -> HashMap<Cell, f32> {
+    pub(crate) fn shares(&self, heading: Option<Heading>) -> HashMap<Cell, f32> {
         let Some((low, high)) = self.range(heading) else { return HashMap::new() };
         let share = |value: f32| if high > low { (value - low) / (high - low) } else { 0.5 };
         self.cells.iter().map(|height| (height.cell, share(height.facing(heading).1))).collect()
@@ -91,7 +91,7 @@ fn looks<'a>(environment: &'a mut HouseEnvironment, instruction: &'a str) -> Obs
 ///
 /// # Errors
 /// Whatever the policy reports.
-pub fn compute(
+pub(crate) fn compute(
     policy: &mut dyn Policy,
     scene: &Arc<Scene>,
     world: &World,

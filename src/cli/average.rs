@@ -19,7 +19,7 @@ use crate::train::preset::{Preset, ValidationSpec};
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
 /// checkpoint it makes another that decides otherwise.
 #[derive(Args)]
-pub struct Average {
+pub(crate) struct Average {
     /// Checkpoints; one that is named twice counts twice
     #[arg(required = true, num_args = 1.., value_name = "CHECKPOINT")]
     checkpoints: Vec<PathBuf>,
@@ -45,7 +45,7 @@ impl Average {
     ///
     /// # Errors
     /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         ensure_free::check(&self.out)?;
         let device = best_device();
         let (mut config, networks) = average(&self.checkpoints, device)?;

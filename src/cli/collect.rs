@@ -21,7 +21,7 @@ use crate::train::collect::{Collection, DemonstrationSettings, ExpertKind, TaskS
 
 /// Collects demonstrations.
 #[derive(Args)]
-pub struct Collect {
+pub(crate) struct Collect {
     /// The dataset folder to write
     out: PathBuf,
     /// Where to collect
@@ -61,7 +61,7 @@ impl Collect {
     ///
     /// # Errors
     /// When the folder cannot be written to.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         ensure!((0.0..=1.0).contains(&self.noise), "--noise is {}, which is not between 0 and 1", self.noise);
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
         ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");

@@ -15,7 +15,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Compares runs, episode by episode.
 #[derive(Args)]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     /// The run folders; the others are compared with the first. RUN,RUN,...: the same method's, trained with several seeds
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
@@ -38,7 +38,7 @@ impl CompareArgs {
     ///
     /// # Errors
     /// When a folder holds no run, or two have no episode in common.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let runs: Vec<RecordedRun> = self.runs.iter().map(|paths| open(paths)).collect::<anyhow::Result<_>>()?;
         let (comparison, summaries) = Comparison::of(&runs)?;
         if let Some(path) = &self.out {

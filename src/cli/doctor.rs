@@ -13,7 +13,7 @@ use crate::nets::{device, home, sentence};
 
 /// Prints what was found.
 #[derive(Args)]
-pub struct Doctor {
+pub(crate) struct Doctor {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -45,7 +45,7 @@ impl Doctor {
     ///
     /// # Errors
     /// When something is missing: names it.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let findings =
             [libtorch(), computes_on(), encoder(), graphics(), threads(), cache(), checkpoints(), log_file()];
         let mut out = streams::out();

@@ -15,7 +15,7 @@ const TOGETHER: usize = 256;
 
 /// Embeds sentences.
 #[derive(Args)]
-pub struct EmbedArgs {
+pub(crate) struct EmbedArgs {
     /// A sentence encoder's folder, as sentence-transformers publishes them [default: all-MiniLM-L6-v2, which `make setup` fetched]
     #[arg(long, value_name = "DIR")]
     encoder: Option<PathBuf>,
@@ -27,7 +27,7 @@ impl EmbedArgs {
     ///
     /// # Errors
     /// When the encoder cannot be loaded or a line is not UTF-8.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let encoder = SentenceEncoder::load(&self.encoder.unwrap_or_else(default_folder), best_device())?;
         let mut lines = BufReader::with_capacity(1 << 16, std::io::stdin());
         let mut out = std::io::stdout().lock();

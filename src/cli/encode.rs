@@ -19,7 +19,7 @@ use crate::train::frame_store::FrameStore;
 
 /// Encodes datasets.
 #[derive(Args)]
-pub struct Encode {
+pub(crate) struct Encode {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
@@ -43,7 +43,7 @@ impl Encode {
     ///
     /// # Errors
     /// When the datasets or the encoder cannot be read, or a cache not be written.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let encoder = self.encoder.load()?;
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let frame_store = FrameStore::open(&datasets)?;

@@ -26,7 +26,7 @@ use crate::run_dir::writer::RunWriter;
 
 /// Plays a task set and writes a run folder.
 #[derive(Args)]
-pub struct Eval {
+pub(crate) struct Eval {
     /// The task file
     #[arg(long, value_name = "FILE")]
     tasks: PathBuf,
@@ -81,7 +81,7 @@ impl Eval {
     ///
     /// # Errors
     /// When the tasks, the policy or the folder cannot be used. An episode's own errors are counted instead.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let set = taskset::read(&self.tasks)?;
         let scenes = Scenes::of(&self.tasks, &set.value);
         let chosen = self.policy.open(self.sample)?;
@@ -145,7 +145,7 @@ impl Eval {
 }
 
 /// Prints what was measured to standard output: a page, or a JSON object in a line.
-pub fn print(summary: &RunSummary, json: bool) -> anyhow::Result<()> {
+pub(crate) fn print(summary: &RunSummary, json: bool) -> anyhow::Result<()> {
     let mut out = streams::out();
     if json {
         writeln!(out, "{}", serde_json::to_string(summary)?)?;

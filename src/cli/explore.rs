@@ -25,7 +25,7 @@ use crate::tui::update::ExitReason;
 
 /// Where the explorer starts, and who acts.
 #[derive(Args)]
-pub struct Explore {
+pub(crate) struct Explore {
     #[command(flatten)]
     from: Origin,
     #[command(flatten)]
@@ -63,7 +63,7 @@ struct Origin {
 
 /// How the explorer is shown.
 #[derive(Args)]
-pub struct Display {
+pub(crate) struct Display {
     /// How to show pictures
     #[arg(long, value_enum, default_value = "auto")]
     graphics: GraphicsName,
@@ -83,7 +83,7 @@ impl Display {
     ///
     /// # Errors
     /// When the exploration cannot be opened, or there is no terminal.
-    pub fn show(
+    pub(crate) fn show(
         self,
         kind: PolicyKind,
         manual: bool,
@@ -119,7 +119,7 @@ impl Display {
     }
 
     /// The same, but waiting for a key before the first step.
-    pub fn paused(self) -> Display {
+    pub(crate) fn paused(self) -> Display {
         Display { paused: true, ..self }
     }
 }
@@ -161,7 +161,7 @@ impl Explore {
     ///
     /// # Errors
     /// When what it should start in cannot be opened, or there is no terminal.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let manual = matches!(self.policy, PolicyName::Manual);
         let kind = match self.policy {
             PolicyName::Agent | PolicyName::Manual => PolicyKind::Agent,

@@ -12,7 +12,7 @@ use crate::report::export;
 
 /// Which episode, and into which files.
 #[derive(Args)]
-pub struct Export {
+pub(crate) struct Export {
     /// The run folder, with the episode (its number from 1, or its task's id) and, for a .png, the step
     #[arg(value_name = "RUN[#EPISODE[:STEP]]")]
     episode: String,
@@ -29,7 +29,7 @@ impl Export {
     ///
     /// # Errors
     /// When the episode cannot be read, or a file cannot be written.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let episode = &recorded.episodes[reference.episode];
         let (_, task, setting) = recorded.setting(episode)?;

@@ -12,7 +12,7 @@ use crate::data::alfred::{self, ImportProgress};
 
 /// Makes a dataset folder.
 #[derive(Args)]
-pub struct Import {
+pub(crate) struct Import {
     #[command(subcommand)]
     from: From,
 }
@@ -40,7 +40,7 @@ impl Import {
     ///
     /// # Errors
     /// When nothing can be imported or the folder cannot be written.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let From::Alfred(alfred) = self.from;
         alfred.run()
     }

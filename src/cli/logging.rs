@@ -11,14 +11,14 @@ use tracing_subscriber::EnvFilter;
 const LARGEST: u64 = 4 << 20;
 
 /// The log file: `sprint/sprint.log` in the user's XDG state folder, else in the cache folder.
-pub fn path() -> PathBuf {
+pub(crate) fn path() -> PathBuf {
     let state = etcetera::choose_base_strategy().ok().and_then(|base| base.state_dir());
     state.map_or_else(crate::nets::home::cache_folder, |state| state.join("sprint")).join("sprint.log")
 }
 
 /// Starts logging at the level of `SPRINT_LOG` (default `info`). A log that cannot be written is done without: it must
 /// not stop the program, and there is no other place to complain to.
-pub fn start() {
+pub(crate) fn start() {
     let Ok(file) = open() else { return };
     let filter = EnvFilter::try_from_env("SPRINT_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(Mutex::new(file));
@@ -30,7 +30,7 @@ pub fn start() {
 ///
 /// # Errors
 /// When the folder or file cannot be made.
-pub fn open() -> std::io::Result<File> {
+pub(crate) fn open() -> std::io::Result<File> {
     let path = path();
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;

@@ -9,7 +9,7 @@ use crate::eval::merge;
 
 /// Joins the shares that `sprint eval --shard` wrote into one run.
 #[derive(Args)]
-pub struct MergeArgs {
+pub(crate) struct MergeArgs {
     /// The run folder; its shares lie in RUN/shards
     run: PathBuf,
     /// The shares, where they lie elsewhere
@@ -24,7 +24,7 @@ impl MergeArgs {
     ///
     /// # Errors
     /// When a share is missing or not complete, or they are not of one run.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let shares = if self.shares.is_empty() { merge::shares_in(&self.run)? } else { self.shares };
         let summary = merge::merge(&shares, &self.run)?;
         super::eval::print(&summary, self.json)?;

@@ -16,7 +16,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Which episode, and how to show it.
 #[derive(Args)]
-pub struct Open {
+pub(crate) struct Open {
     /// The run folder, with the episode (its number from 1, or its task's id) and the step: RUN, RUN#3, RUN#3:17
     #[arg(value_name = "RUN[#EPISODE[:STEP]]")]
     episode: String,
@@ -31,11 +31,11 @@ pub struct Open {
 }
 
 /// One of a run's episodes, as the command line names it.
-pub struct Reference {
+pub(crate) struct Reference {
     /// The episode's place in the run, from 0.
-    pub episode: usize,
+    pub(crate) episode: usize,
     /// The step; the start without.
-    pub step: Option<u32>,
+    pub(crate) step: Option<u32>,
 }
 
 impl Reference {
@@ -43,7 +43,7 @@ impl Reference {
     ///
     /// # Errors
     /// When there is no such episode or step.
-    pub fn find(text: &str, tasks: Option<&Path>) -> anyhow::Result<(Reference, RecordedRun)> {
+    pub(crate) fn find(text: &str, tasks: Option<&Path>) -> anyhow::Result<(Reference, RecordedRun)> {
         let (run, rest) = text.rsplit_once('#').unwrap_or((text, "1"));
         let run = PathBuf::from(run);
         let recorded = RecordedRun::open(&run, tasks)?;
@@ -76,7 +76,7 @@ impl Open {
     ///
     /// # Errors
     /// When it cannot be read, its tasks are not at hand, or the simulator does not come to what was recorded.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let (at, task, _) = recorded.setting(&recorded.episodes[reference.episode])?;
         let (task, episode) = (task.clone(), recorded.episodes[reference.episode].clone());

@@ -12,7 +12,7 @@ use crate::report::charts::training_curves;
 
 /// Draws the curves of trainings.
 #[derive(Args)]
-pub struct PlotCurves {
+pub(crate) struct PlotCurves {
     /// Checkpoint folders that trainings wrote
     #[arg(required = true, num_args = 1..)]
     runs: Vec<PathBuf>,
@@ -29,7 +29,7 @@ impl PlotCurves {
     ///
     /// # Errors
     /// When a training's progress cannot be read, or the picture not be written.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let read = |folder: &PathBuf| Ok((folder.display().to_string(), training_curves::read(folder)?));
         let trainings = self.runs.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
         let plot = training_curves::draw(&trainings, &self.only)?;

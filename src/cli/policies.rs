@@ -8,7 +8,7 @@ use crate::agent::policy_source::{self, PolicySource};
 
 /// Which policy acts.
 #[derive(Args)]
-pub struct PolicyChoice {
+pub(crate) struct PolicyChoice {
     /// The trained agent that acts [default: the shipped one]
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
@@ -19,7 +19,7 @@ pub struct PolicyChoice {
 
 /// Who acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The trained agent
     Agent,
     /// Shortest paths and interactions, knowing everything
@@ -33,7 +33,7 @@ impl PolicyChoice {
     ///
     /// # Errors
     /// When the checkpoint or its sentence encoder cannot be used.
-    pub fn open(&self, sampling: bool) -> anyhow::Result<PolicySource> {
+    pub(crate) fn open(&self, sampling: bool) -> anyhow::Result<PolicySource> {
         if self.policy != Kind::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
         }

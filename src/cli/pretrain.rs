@@ -20,7 +20,7 @@ use crate::train::pretrain::{Pretraining, Trained};
 
 /// Trains an agent.
 #[derive(Args)]
-pub struct Pretrain {
+pub(crate) struct Pretrain {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
@@ -71,7 +71,7 @@ impl Pretrain {
     ///
     /// # Errors
     /// When data or an earlier state cannot be read, or the checkpoint not be written.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
             preset.visual_encoder_training.optimisation.steps = steps;

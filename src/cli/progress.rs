@@ -10,7 +10,7 @@ use super::streams::say;
 use crate::train::metrics::{ProgressLogger, Scalars};
 
 /// The stages of a command, one after the other, each with how far it is, the time that is left, and the latest numbers.
-pub struct Progress {
+pub(crate) struct Progress {
     terminal: bool,
     stage: String,
     bar: ProgressBar,
@@ -25,13 +25,13 @@ const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
 impl Progress {
     /// Shows nothing until the first [`Progress::show`].
-    pub fn new() -> Progress {
+    pub(crate) fn new() -> Progress {
         let (terminal, now) = (std::io::stderr().is_terminal(), Instant::now());
         Progress { terminal, stage: String::new(), bar: ProgressBar::hidden(), began: now, first: 0, last_line: now }
     }
 
     /// `done` of `total` of a stage; `message` is empty where there is nothing new to say.
-    pub fn show(&mut self, stage: &str, done: u64, total: u64, message: &str) {
+    pub(crate) fn show(&mut self, stage: &str, done: u64, total: u64, message: &str) {
         if self.stage != stage {
             self.begin(stage, done);
         }
@@ -47,7 +47,7 @@ impl Progress {
     }
 
     /// Takes the bar off the screen.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }
 
@@ -90,7 +90,7 @@ impl ProgressLogger for Progress {
 }
 
 /// One stage that several threads work at.
-pub struct Counter {
+pub(crate) struct Counter {
     stage: &'static str,
     total: u64,
     progress: Mutex<(Progress, u64)>,
@@ -98,12 +98,12 @@ pub struct Counter {
 
 impl Counter {
     /// Nothing is done yet of `total`.
-    pub fn new(stage: &'static str, total: u64) -> Counter {
+    pub(crate) fn new(stage: &'static str, total: u64) -> Counter {
         Counter { stage, total, progress: Mutex::new((Progress::new(), 0)) }
     }
 
     /// So many more are done.
-    pub fn add(&self, count: u64) {
+    pub(crate) fn add(&self, count: u64) {
         if let Ok(mut guard) = self.progress.lock() {
             let (progress, done) = &mut *guard;
             *done += count;
@@ -112,7 +112,7 @@ impl Counter {
     }
 
     /// Takes the bar off the screen.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         if let Ok(guard) = self.progress.lock() {
             guard.0.end();
         }

@@ -14,7 +14,7 @@ use crate::train::relabel::relabel;
 
 /// Labels runs of skills.
 #[derive(Args)]
-pub struct Relabel {
+pub(crate) struct Relabel {
     /// The dataset folder
     data: PathBuf,
     /// Who writes the labels
@@ -35,7 +35,7 @@ impl Relabel {
     ///
     /// # Errors
     /// When the dataset cannot be read or its folder not be written to.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let summarizer: &dyn Summarizer = match self.with {
             With::Rules => &Rules,
             With::Concat => &Concatenation,

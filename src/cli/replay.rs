@@ -17,7 +17,7 @@ const LISTED: usize = 500;
 
 /// Re-runs recorded demonstrations.
 #[derive(Args)]
-pub struct ReplayArgs {
+pub(crate) struct ReplayArgs {
     /// The dataset folder
     data: PathBuf,
     /// Only this split (train, valid_seen, ...)
@@ -39,7 +39,7 @@ impl ReplayArgs {
     ///
     /// # Errors
     /// When the dataset cannot be read, or holds nothing of the split.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let dataset = Dataset::open(&self.data)?;
         let counts = &dataset.manifest().counts;
         let of = |split: &String| counts.get(split).map_or(0, |counts| counts.trajectories);

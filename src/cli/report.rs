@@ -16,7 +16,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Draws a run: its plots and its page.
 #[derive(Args)]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// A run folder: its page is written to report.html there
     folder: PathBuf,
     /// The most frames of an episode on the page
@@ -32,7 +32,7 @@ impl ReportArgs {
     ///
     /// # Errors
     /// When the folder holds none, or cannot be written to.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
         if self.folder.join(MANIFEST).exists() {
             let run = RecordedRun::open_evaluated(&self.folder)?;

@@ -10,7 +10,7 @@ use crate::eval::schemas;
 
 /// Prints a JSON Schema.
 #[derive(Args)]
-pub struct Schema {
+pub(crate) struct Schema {
     /// Whose: tasks, manifest, episode, summary, comparison or progress
     #[arg(value_name = "NAME", value_parser = schemas::NAMES)]
     name: String,
@@ -21,7 +21,7 @@ impl Schema {
     ///
     /// # Errors
     /// When standard output is closed.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let mut out = streams::out();
         if let Some(schema) = schemas::schema(&self.name) {
             writeln!(out, "{}", serde_json::to_string_pretty(&schema)?)?;

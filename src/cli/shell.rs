@@ -10,7 +10,7 @@ use crate::explore::verb;
 
 /// Prints a completion script.
 #[derive(Args)]
-pub struct Completions {
+pub(crate) struct Completions {
     /// The shell to write for
     shell: Shell,
 }
@@ -20,7 +20,7 @@ impl Completions {
     ///
     /// # Errors
     /// When standard output cannot be written.
-    pub fn run(self, mut program: Command) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self, mut program: Command) -> anyhow::Result<ExitStatus> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut program, "sprint", &mut script);
         std::io::stdout().write_all(&script)?;
@@ -32,7 +32,7 @@ impl Completions {
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn man(mut program: Command) -> anyhow::Result<ExitStatus> {
+pub(crate) fn man(mut program: Command) -> anyhow::Result<ExitStatus> {
     program.build();
     let mut page = Vec::new();
     clap_mangen::Man::new(program.clone()).render(&mut page)?;

@@ -9,7 +9,7 @@ use anyhow::Context;
 ///
 /// # Errors
 /// When the system refuses a handler.
-pub fn on_signals() -> anyhow::Result<Arc<AtomicBool>> {
+pub(crate) fn on_signals() -> anyhow::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         let second = signal_hook::flag::register_conditional_shutdown(signal, 130, stop.clone());

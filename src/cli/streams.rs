@@ -3,10 +3,10 @@
 use std::io::{ErrorKind, Result, StdoutLock, Write, stderr, stdout};
 
 /// Standard output. Once its reader has left, the rest is written for nobody, and the command goes on to its verdict.
-pub struct Out(StdoutLock<'static>);
+pub(crate) struct Out(StdoutLock<'static>);
 
 /// Standard output, for one command.
-pub fn out() -> Out {
+pub(crate) fn out() -> Out {
     Out(stdout().lock())
 }
 
@@ -28,6 +28,6 @@ impl Write for Out {
 }
 
 /// Says a line on standard error, if anybody listens.
-pub fn say(line: &str) {
+pub(crate) fn say(line: &str) {
     let _ = writeln!(stderr(), "{line}");
 }

@@ -25,7 +25,7 @@ use crate::house::grading::{Grading, describe};
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
-pub struct Tasks {
+pub(crate) struct Tasks {
     #[command(subcommand)]
     what: TasksCommand,
 }
@@ -119,7 +119,7 @@ impl Tasks {
     ///
     /// # Errors
     /// When a file cannot be used; names it.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         match self.what {
             TasksCommand::Sample(sample) => sample.run(),
             TasksCommand::Check(check) => check.run(),

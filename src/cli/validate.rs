@@ -17,7 +17,7 @@ use crate::train::validation;
 ///
 /// # Errors
 /// When it cannot be loaded, or the card not be written.
-pub fn validate(
+pub(crate) fn validate(
     folder: &Path,
     spec: &ValidationSpec,
     sentences: SharedEmbedder,
@@ -33,6 +33,6 @@ pub fn validate(
 }
 
 /// A folder's name, as cards and configurations give it.
-pub fn name(folder: &Path) -> String {
+pub(crate) fn name(folder: &Path) -> String {
     folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

@@ -10,12 +10,12 @@ use crate::eval::tasks::sample::Phrasing;
 use crate::train::collect::ExpertKind;
 
 /// The kind of a room.
-pub fn room() -> impl TypedValueParser<Value = Room> {
+pub(crate) fn room() -> impl TypedValueParser<Value = Room> {
     named(Room::ALL.map(|room| PossibleValue::new(room.option_name())))
 }
 
 /// Where the instructions of sampled tasks come from.
-pub fn phrasing() -> impl TypedValueParser<Value = Phrasing> {
+pub(crate) fn phrasing() -> impl TypedValueParser<Value = Phrasing> {
     named([
         PossibleValue::new(Phrasing::GRAMMAR).help("The program's own grammar"),
         PossibleValue::new(Phrasing::ANNOTATORS).help("What people wrote of the demonstrations"),
@@ -23,7 +23,7 @@ pub fn phrasing() -> impl TypedValueParser<Value = Phrasing> {
 }
 
 /// The expert that demonstrates.
-pub fn expert() -> impl TypedValueParser<Value = ExpertKind> {
+pub(crate) fn expert() -> impl TypedValueParser<Value = ExpertKind> {
     named([
         PossibleValue::new(ExpertKind::SCANNING).help("Turns around until the object it goes for is in view"),
         PossibleValue::new(ExpertKind::PRIVILEGED)

@@ -15,7 +15,7 @@ use crate::run_dir::reader::RecordedRun;
 
 /// Which run.
 #[derive(Args)]
-pub struct Verify {
+pub(crate) struct Verify {
     /// The run folder
     run: PathBuf,
     /// The task file that the run was made from, where the folder does not hold it
@@ -37,7 +37,7 @@ impl Verify {
     ///
     /// # Errors
     /// When the run or its tasks cannot be read.
-    pub fn run(self) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let run = RecordedRun::open(&self.run, self.tasks.as_deref())?;
         let mut find = |author: &Author| {
             policy_source::find(

@@ -10,7 +10,7 @@ use tempfile::NamedTempFile;
 ///
 /// # Errors
 /// When the folder cannot be made or written to.
-pub fn begin(path: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn begin(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder)?;
     let mut builder = tempfile::Builder::new();
@@ -27,7 +27,7 @@ pub fn begin(path: &Path) -> io::Result<NamedTempFile> {
 ///
 /// # Errors
 /// When it cannot be written out or renamed; the old file, if any, is untouched then.
-pub fn keep(file: NamedTempFile, path: &Path) -> io::Result<()> {
+pub(crate) fn keep(file: NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path)?;
     Ok(())
@@ -37,7 +37,7 @@ pub fn keep(file: NamedTempFile, path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`begin`] and [`keep`], with the path.
-pub fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let whole = || -> io::Result<()> {
         let mut file = begin(path)?;
         file.write_all(bytes)?;

@@ -19,50 +19,50 @@ const TRAJECTORIES: &str = "trajectories.jsonl.zst";
 /// How much of a split there is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Counts {
+pub(crate) struct Counts {
     /// Trajectories.
-    pub trajectories: u64,
+    pub(crate) trajectories: u64,
     /// Skills, once for each annotation of their trajectory.
-    pub annotated_primitives: u64,
+    pub(crate) annotated_primitives: u64,
     /// Those whose annotation has one sentence a skill.
-    pub aligned_primitives: u64,
+    pub(crate) aligned_primitives: u64,
     /// Runs of two or more skills, once for each annotation.
-    pub spans: u64,
+    pub(crate) spans: u64,
     /// Those with aligned annotations, without the held-out whole trajectories of EVAL_CHAIN.
-    pub spans_after_holdout: u64,
+    pub(crate) spans_after_holdout: u64,
 }
 
 /// A file that was passed over.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Skipped {
+pub(crate) struct Skipped {
     /// The file, relative to what was imported.
-    pub file: String,
+    pub(crate) file: String,
     /// What was wrong with it.
-    pub reason: String,
+    pub(crate) reason: String,
 }
 
 /// `dataset.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DatasetManifest {
+pub(crate) struct DatasetManifest {
     /// Version of this format.
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// Where it came from: `alfred`, `generated`.
-    pub source: String,
+    pub(crate) source: String,
     /// Counts by split.
-    pub counts: BTreeMap<String, Counts>,
+    pub(crate) counts: BTreeMap<String, Counts>,
     /// How many scenes there are.
-    pub scenes: u64,
+    pub(crate) scenes: u64,
     /// Trajectories of which the whole must not be trained on as one span.
-    pub held_out: Vec<String>,
+    pub(crate) held_out: Vec<String>,
     /// Files that were passed over when it was made.
-    pub skipped: Vec<Skipped>,
+    pub(crate) skipped: Vec<Skipped>,
 }
 
 impl DatasetManifest {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub(crate) const FORMAT: u32 = 1;
 }
 
 /// A dataset folder, opened.
@@ -92,7 +92,7 @@ impl Dataset {
     ///
     /// # Errors
     /// Names the splits that it holds.
-    pub fn check_split(&self, split: &str) -> anyhow::Result<()> {
+    pub(crate) fn check_split(&self, split: &str) -> anyhow::Result<()> {
         let counts = self.manifest.counts.iter().filter(|(_, counts)| counts.trajectories > 0);
         let known: Vec<&str> = counts.map(|(name, _)| name.as_str()).collect();
         anyhow::ensure!(
@@ -105,12 +105,12 @@ impl Dataset {
     }
 
     /// What `dataset.json` says.
-    pub fn manifest(&self) -> &DatasetManifest {
+    pub(crate) fn manifest(&self) -> &DatasetManifest {
         &self.manifest
     }
 
     /// Where it lies.
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
@@ -118,7 +118,7 @@ impl Dataset {
     ///
     /// # Errors
     /// When its file is absent, malformed, of another version, or without cells.
-    pub fn scene(&self, name: &str) -> anyhow::Result<Arc<Scene>> {
+    pub(crate) fn scene(&self, name: &str) -> anyhow::Result<Arc<Scene>> {
         read_scene(&self.folder.join("scenes"), name).map(Arc::new)
     }
 
@@ -126,7 +126,7 @@ impl Dataset {
     ///
     /// # Errors
     /// When the folder cannot be listed.
-    pub fn scene_names(&self) -> anyhow::Result<Vec<String>> {
+    pub(crate) fn scene_names(&self) -> anyhow::Result<Vec<String>> {
         let folder = self.folder.join("scenes");
         let mut names = Vec::new();
         for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
@@ -143,7 +143,7 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::scene`].
-    pub fn scenes(&self) -> anyhow::Result<BTreeMap<String, Arc<Scene>>> {
+    pub(crate) fn scenes(&self) -> anyhow::Result<BTreeMap<String, Arc<Scene>>> {
         self.scene_names()?.into_iter().map(|name| Ok((name.clone(), self.scene(&name)?))).collect()
     }
 
@@ -167,7 +167,7 @@ impl Dataset {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn digest(&self) -> anyhow::Result<String> {
+    pub(crate) fn digest(&self) -> anyhow::Result<String> {
         let path = self.folder.join(TRAJECTORIES);
         let mut file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
         let mut hash = Sha256::new();
@@ -179,7 +179,7 @@ impl Dataset {
     ///
     /// # Errors
     /// When its file is absent, malformed, or of another version.
-    pub fn tasks(&self, name: &str) -> anyhow::Result<TaskSet> {
+    pub(crate) fn tasks(&self, name: &str) -> anyhow::Result<TaskSet> {
         Ok(taskset::read(&self.folder.join("tasks").join(format!("{name}.json")))?.value)
     }
 }
@@ -199,7 +199,7 @@ pub fn read_scene(folder: &Path, name: &str) -> anyhow::Result<Scene> {
 }
 
 /// Writes a dataset folder. `dataset.json` comes last: a folder without it is not a dataset.
-pub struct DatasetWriter {
+pub(crate) struct DatasetWriter {
     folder: PathBuf,
     trajectories: zstd::Encoder<'static, tempfile::NamedTempFile>,
 }
@@ -209,7 +209,7 @@ impl DatasetWriter {
     ///
     /// # Errors
     /// When the folder cannot be made or written.
-    pub fn new(folder: &Path) -> anyhow::Result<DatasetWriter> {
+    pub(crate) fn new(folder: &Path) -> anyhow::Result<DatasetWriter> {
         for part in ["scenes", "tasks"] {
             let part = folder.join(part);
             std::fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
@@ -226,7 +226,7 @@ impl DatasetWriter {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn scene(&self, scene: &Scene) -> anyhow::Result<()> {
+    pub(crate) fn scene(&self, scene: &Scene) -> anyhow::Result<()> {
         json::write(&self.folder.join("scenes").join(format!("{}.json", scene.name)), scene)
     }
 
@@ -234,7 +234,7 @@ impl DatasetWriter {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn trajectory(&mut self, trajectory: &Trajectory) -> anyhow::Result<()> {
+    pub(crate) fn trajectory(&mut self, trajectory: &Trajectory) -> anyhow::Result<()> {
         serde_json::to_writer(&mut self.trajectories, trajectory)?;
         self.trajectories.write_all(b"\n")?;
         Ok(())
@@ -244,7 +244,7 @@ impl DatasetWriter {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn tasks(&self, file: &str, set: &TaskSet) -> anyhow::Result<()> {
+    pub(crate) fn tasks(&self, file: &str, set: &TaskSet) -> anyhow::Result<()> {
         json::write(&self.folder.join("tasks").join(format!("{file}.json")), set)
     }
 
@@ -252,7 +252,7 @@ impl DatasetWriter {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn finish(self, manifest: &DatasetManifest) -> anyhow::Result<()> {
+    pub(crate) fn finish(self, manifest: &DatasetManifest) -> anyhow::Result<()> {
         let path = self.folder.join(TRAJECTORIES);
         let file = self.trajectories.finish()?;
         atomic_file::keep(file, &path).with_context(|| path.display().to_string())?;
@@ -262,11 +262,11 @@ impl DatasetWriter {
 
 /// Manifests for tests.
 #[cfg(test)]
-pub mod testing {
+pub(crate) mod testing {
     use super::*;
 
     /// Of a test's dataset, without counts.
-    pub fn manifest(scenes: u64, held_out: &[&str]) -> DatasetManifest {
+    pub(crate) fn manifest(scenes: u64, held_out: &[&str]) -> DatasetManifest {
         DatasetManifest {
             format_version: DatasetManifest::FORMAT,
             source: "test".into(),

@@ -10,7 +10,7 @@ const HELD: [(&str, &str); 3] =
 ///
 /// # Errors
 /// Says what it holds.
-pub fn check(folder: &Path) -> anyhow::Result<()> {
+pub(crate) fn check(folder: &Path) -> anyhow::Result<()> {
     match HELD.iter().find(|(file, _)| folder.join(file).exists()) {
         Some((_, held)) => anyhow::bail!("{} holds {held} already: name another folder", folder.display()),
         None => Ok(()),

@@ -27,7 +27,7 @@ pub struct FeatureHeader {
 
 impl FeatureHeader {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub(crate) const FORMAT: u32 = 1;
 
     /// The file's name in a dataset's `cache` folder.
     pub fn file_name(&self) -> String {
@@ -84,7 +84,7 @@ impl Features {
     }
 
     /// Adds the maps of other files of the same encoder after these.
-    pub fn append(&mut self, other: Features) {
+    pub(crate) fn append(&mut self, other: Features) {
         let before = self.len();
         self.files.extend(other.files.into_iter().map(|maps| {
             let range = maps.range.start + before..maps.range.end + before;
@@ -97,7 +97,7 @@ impl Features {
     ///
     /// # Errors
     /// When one of them does not exist, or the disk fails.
-    pub fn gather_all(&self, maps: impl Iterator<Item = usize>, into: &mut Vec<u8>) -> anyhow::Result<()> {
+    pub(crate) fn gather_all(&self, maps: impl Iterator<Item = usize>, into: &mut Vec<u8>) -> anyhow::Result<()> {
         let mut run = 0..0;
         for map in maps {
             if map == run.end && !run.is_empty() {
@@ -130,7 +130,7 @@ impl Features {
     }
 
     /// Bytes of a map.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.width
     }
 
@@ -140,7 +140,7 @@ impl Features {
     }
 
     /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
@@ -191,7 +191,7 @@ impl FeatureWriter {
     }
 
     /// How many maps are in the file.
-    pub fn maps(&self) -> u64 {
+    pub(crate) fn maps(&self) -> u64 {
         self.maps
     }
 
@@ -199,7 +199,7 @@ impl FeatureWriter {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn keep(&mut self, maps: u64) -> anyhow::Result<()> {
+    pub(crate) fn keep(&mut self, maps: u64) -> anyhow::Result<()> {
         let end = self.offset + maps * self.header.width() as u64;
         self.file.set_len(end).and_then(|()| self.file.seek(SeekFrom::Start(end))).with_context(|| self.complaint())?;
         self.maps = maps;

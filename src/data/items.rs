@@ -167,7 +167,7 @@ impl Items {
     }
 
     /// A labelled step of a span of these items, uniformly: there is one in each.
-    pub fn step_of(&self, span: &Span, rng: &mut ChaCha8Rng) -> Item {
+    pub(crate) fn step_of(&self, span: &Span, rng: &mut ChaCha8Rng) -> Item {
         loop {
             let frame = rng.random_range(span.start..span.end);
             if self.is_labelled(frame as usize) {
@@ -182,7 +182,7 @@ impl Items {
     }
 
     /// The class that the object head learns to name at an item's frame; 0 where there is none.
-    pub fn object_target(&self, item: &Item) -> u8 {
+    pub(crate) fn object_target(&self, item: &Item) -> u8 {
         let last = match self.object_target {
             ObjectTarget::Current => item.frame + 1,
             ObjectTarget::Next => item.end,
@@ -192,7 +192,7 @@ impl Items {
     }
 
     /// Identifies what is learned, and under which texts: the first 16 digits of the sha256 of all spans and texts.
-    pub fn digest(&self) -> String {
+    pub(crate) fn digest(&self) -> String {
         let mut hash = Sha256::new();
         for span in self.training.iter().chain(&self.held_out) {
             let Span { trajectory, skills, first, start, end, text } = span;
@@ -207,7 +207,7 @@ impl Items {
     }
 
     /// Each action's share of what is drawn to learn from, in the order of the action head.
-    pub fn action_shares(&self) -> Vec<f32> {
+    pub(crate) fn action_shares(&self) -> Vec<f32> {
         let mut shares = vec![0.0; ActionType::COUNT];
         for span in &self.training {
             let labels = self.labels.get(span.start as usize..span.end as usize).unwrap_or_default();
@@ -225,7 +225,7 @@ impl Items {
 
     /// The frames that an item may be asked to reach: what is left of its trajectory. Where the whole must not be learned, its
     /// last skill is no goal within its first one.
-    pub fn goals(&self, item: &Item) -> Range<u32> {
+    pub(crate) fn goals(&self, item: &Item) -> Range<u32> {
         let next = self.firsts.partition_point(|&first| first <= item.frame);
         let end = self.firsts.get(next).copied().unwrap_or(item.end + 1);
         let withheld = self.withheld.get(&(next as u32).wrapping_sub(1)).filter(|inner| item.frame < inner.start);
@@ -266,7 +266,7 @@ fn told(
 }
 
 /// The runs of two or more skills of a trajectory, without the whole where that is held out.
-pub fn composites(trajectory: &Trajectory, held_out: &[String]) -> Vec<Range<usize>> {
+pub(crate) fn composites(trajectory: &Trajectory, held_out: &[String]) -> Vec<Range<usize>> {
     let count = trajectory.skills.len();
     let mut runs: Vec<_> = (0..count).flat_map(|from| (from + 2..=count).map(move |to| from..to)).collect();
     if held_out.contains(&trajectory.id) {
@@ -277,18 +277,18 @@ pub fn composites(trajectory: &Trajectory, held_out: &[String]) -> Vec<Range<usi
 
 impl Item {
     /// The frames of the observation, oldest first; before the trajectory's first frame there was the first one.
-    pub fn stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
+    pub(crate) fn stack(&self, history: u32) -> impl Iterator<Item = usize> + use<> {
         stack(self.first, self.frame, history)
     }
 
     /// Whether the step ends the span: reward 1, and nothing after it.
-    pub fn is_last(&self) -> bool {
+    pub(crate) fn is_last(&self) -> bool {
         self.frame + 1 == self.end
     }
 }
 
 /// `frame` and those before it, `history` in all, oldest first; none lies before `first`.
-pub fn stack(first: u32, frame: u32, history: u32) -> impl Iterator<Item = usize> + use<> {
+pub(crate) fn stack(first: u32, frame: u32, history: u32) -> impl Iterator<Item = usize> + use<> {
     (0..history).map(move |i| (frame + 1 + i).saturating_sub(history).max(first) as usize)
 }
 

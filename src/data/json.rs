@@ -18,14 +18,14 @@ pub struct Document<T> {
     /// The parsed document.
     pub value: T,
     /// SHA-256 of the bytes, in hexadecimal.
-    pub digest: String,
+    pub(crate) digest: String,
 }
 
 /// Reads a JSON file that carries `format_version`.
 ///
 /// # Errors
 /// Each names the file: when it cannot be read, is no JSON, has another version, or departs from the format (then with the field).
-pub fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<Document<T>> {
+pub(crate) fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<Document<T>> {
     let bytes = read_bytes(path)?;
     let value = parse(&bytes, version).with_context(|| format!("{}", path.display()))?;
     Ok(Document { value, digest: hex(&Sha256::digest(&bytes)) })
@@ -35,7 +35,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Result<Do
 ///
 /// # Errors
 /// When it cannot be read, or is larger.
-pub fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     let name = path.display();
     let file = std::fs::File::open(path).with_context(|| format!("cannot read {name}"))?;
     let too_large = || anyhow::anyhow!("{name}: larger than {} MiB, which no such file is", LARGEST >> 20);
@@ -52,7 +52,7 @@ pub fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
 ///
 /// # Errors
 /// When it is no JSON, has another version, or departs from the format; the message begins with the field.
-pub fn parse<T: DeserializeOwned>(bytes: &[u8], version: u32) -> anyhow::Result<T> {
+pub(crate) fn parse<T: DeserializeOwned>(bytes: &[u8], version: u32) -> anyhow::Result<T> {
     #[derive(serde::Deserialize)]
     struct Versioned {
         format_version: Option<serde_json::Value>,
@@ -92,7 +92,7 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
+pub(crate) fn write_pretty<T: Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
     write_line(path, serde_json::to_vec_pretty(value))
 }
 
@@ -103,7 +103,7 @@ fn write_line(path: &Path, text: serde_json::Result<Vec<u8>>) -> anyhow::Result<
 }
 
 /// Bytes in hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

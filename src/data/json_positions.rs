@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// The lines, from 1, of the wanted fields (as in `tasks[1].roles[0].class`); a field that is not there has the line of
 /// the nearest thing around it that is. The text must be JSON.
-pub fn lines_of<'a>(text: &str, wanted: impl IntoIterator<Item = &'a str>) -> BTreeMap<&'a str, usize> {
+pub(crate) fn lines_of<'a>(text: &str, wanted: impl IntoIterator<Item = &'a str>) -> BTreeMap<&'a str, usize> {
     let mut known = BTreeMap::new();
     let mut scan = Scan { bytes: text.as_bytes(), at: 0, line: 1, known: &mut known };
     scan.value("");

@@ -1,8 +1,8 @@
 //! Data: task files, dataset folders, the importer that makes one of ALFRED's published files, and what is derived for training.
 
-pub mod ensure_free;
-pub mod atomic_file;
-pub mod json_positions;
+pub(crate) mod ensure_free;
+pub(crate) mod atomic_file;
+pub(crate) mod json_positions;
 pub mod alfred;
 pub mod dataset;
 pub mod features;

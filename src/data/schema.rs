@@ -8,9 +8,9 @@ use serde_json::{Map, Value};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The field, as in `tasks[1].roles[0].class`; empty for the whole document.
-    pub field: String,
+    pub(crate) field: String,
     /// What is wrong, and what was expected.
-    pub problem: String,
+    pub(crate) problem: String,
 }
 
 /// Every place in which `document` departs from `schema`.

@@ -58,19 +58,19 @@ pub enum ObjectTarget {
 #[serde(deny_unknown_fields)]
 pub struct DataSelection {
     /// Spans of two or more skills.
-    pub composites: Composites,
+    pub(crate) composites: Composites,
     /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub label_source: Option<String>,
+    pub(crate) label_source: Option<String>,
     /// Whether the policy learns too what would have been right where chance or a learner did something else.
     #[serde(default)]
-    pub corrections: bool,
+    pub(crate) corrections: bool,
     /// How far back observations reach.
     #[serde(default)]
-    pub history_start: HistoryStart,
+    pub(crate) history_start: HistoryStart,
     /// What the object head learns.
     #[serde(default)]
-    pub object_target: ObjectTarget,
+    pub(crate) object_target: ObjectTarget,
 }
 
 impl DataSelection {

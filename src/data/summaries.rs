@@ -105,18 +105,14 @@ impl Summaries {
     }
 
     /// The label of a passage.
-    pub fn find(&self, passage: &Passage<'_>) -> Option<&str> {
+    pub(crate) fn find(&self, passage: &Passage<'_>) -> Option<&str> {
         self.by_input.get(&passage.digest()).map(String::as_str)
     }
 
     /// How many different passages have a label.
-    pub fn len(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
         self.by_input.len()
-    }
-
-    /// Whether none has.
-    pub fn is_empty(&self) -> bool {
-        self.by_input.is_empty()
     }
 }
 

@@ -12,9 +12,9 @@ use crate::house::validate::Misfit;
 use crate::language::instruction;
 
 /// The longest horizon that is taken, in steps.
-pub const LONGEST_HORIZON: u32 = 100_000;
+pub(crate) const LONGEST_HORIZON: u32 = 100_000;
 /// The most subtasks (and roles) that a task may have; steps and roles are counted in bytes.
-pub const MOST_SUBTASKS: usize = 100;
+pub(crate) const MOST_SUBTASKS: usize = 100;
 
 /// Reads and checks a task file.
 ///
@@ -36,7 +36,7 @@ pub fn write(path: &Path, set: &TaskSet) -> anyhow::Result<()> {
 }
 
 /// Splits `FILE#TASK` into the file and the task; the whole is the file where no `#` is.
-pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
+pub(crate) fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
     match text.rsplit_once('#') {
         Some((file, task)) => (PathBuf::from(file), Some(task)),
         None => (PathBuf::from(text), None),
@@ -47,7 +47,7 @@ pub fn split_reference(text: &str) -> (PathBuf, Option<&str>) {
 ///
 /// # Errors
 /// When there is none; says what there is.
-pub fn pick(set: &TaskSet, wanted: &str) -> anyhow::Result<usize> {
+pub(crate) fn pick(set: &TaskSet, wanted: &str) -> anyhow::Result<usize> {
     let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
     let named = || set.tasks.iter().position(|task| task.id == wanted);
     let found = numbered.filter(|&at| at < set.tasks.len()).or_else(named);
@@ -58,7 +58,7 @@ pub fn pick(set: &TaskSet, wanted: &str) -> anyhow::Result<usize> {
 ///
 /// # Errors
 /// Names the first task and field that is wrong.
-pub fn check(set: &TaskSet) -> anyhow::Result<()> {
+pub(crate) fn check(set: &TaskSet) -> anyhow::Result<()> {
     if set.tasks.is_empty() {
         return Err(anyhow!("tasks: the set is empty"));
     }
@@ -85,12 +85,12 @@ fn shortened(text: &str) -> String {
 ///
 /// # Errors
 /// Names the first field that is wrong.
-pub fn check_task(task: &Task) -> Result<(), Misfit> {
+pub(crate) fn check_task(task: &Task) -> Result<(), Misfit> {
     misfits(task).into_iter().next().map_or(Ok(()), Err)
 }
 
 /// Everything that is wrong with a task by itself.
-pub fn misfits(task: &Task) -> Vec<Misfit> {
+pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
     let mut found = Vec::new();
     if task.id.trim().is_empty() || task.id.chars().any(char::is_control) || task.id.chars().count() > 200 {
         found.push(Misfit::new("id", "empty, too long, or with control characters"));

@@ -42,7 +42,7 @@ impl ActionType {
     pub const COUNT: usize = Self::ALL.len();
 
     /// Position in the action head.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self as usize
     }
 
@@ -57,7 +57,7 @@ impl ActionType {
     }
 
     /// The name as the screens show it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             ActionType::MoveAhead => "MoveAhead",
             ActionType::RotateLeft => "RotateLeft",

@@ -11,7 +11,7 @@ pub struct Class(u8);
 /// The shape that stands for a movable object's mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub(crate) enum Shape {
     /// An axis-aligned box in the object's own frame.
     #[default]
     Box,
@@ -24,7 +24,7 @@ pub enum Shape {
 /// What a fixture does to things.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum FixtureEffect {
+pub(crate) enum FixtureEffect {
     /// Its contents are hot once it is switched on.
     Heat,
     /// Its contents are cold once it is closed.
@@ -38,11 +38,11 @@ pub enum FixtureEffect {
 #[serde(deny_unknown_fields, default)]
 pub struct ClassInfo {
     /// The name in ALFRED's data, e.g. `CellPhone`.
-    pub name: String,
+    pub(crate) name: String,
     /// The name in a sentence, e.g. `cell phone`.
-    pub spoken: String,
+    pub(crate) spoken: String,
     /// Fits into the hand.
-    pub pickupable: bool,
+    pub(crate) pickupable: bool,
     /// May hold other objects.
     pub receptacle: bool,
     /// Has a door, drawer or lid.
@@ -50,37 +50,37 @@ pub struct ClassInfo {
     /// Has a switch.
     pub toggleable: bool,
     /// What it does to things: a toggled machine or tap when it is switched on, a fridge when it is closed.
-    pub effect: Option<FixtureEffect>,
+    pub(crate) effect: Option<FixtureEffect>,
     /// Has a door that swings out when it is opened.
-    pub door: bool,
+    pub(crate) door: bool,
     /// Slides out when it is opened, and its contents with it.
-    pub slides: bool,
+    pub(crate) slides: bool,
     /// Has a lid that stands at its back edge when it is opened.
-    pub lid: bool,
+    pub(crate) lid: bool,
     /// Is open above, and its contents lie inside.
-    pub open_top: bool,
+    pub(crate) open_top: bool,
     /// Is what the nearest tap runs into.
-    pub basin: bool,
+    pub(crate) basin: bool,
     /// Takes things on top of those that already lie in it.
-    pub heaps: bool,
+    pub(crate) heaps: bool,
     /// Slices what can be sliced while it is held.
-    pub cuts: bool,
+    pub(crate) cuts: bool,
     /// How many slices it falls into; 0 when it cannot be sliced.
     pub slices: u8,
     /// The shape of a movable object.
-    pub shape: Shape,
+    pub(crate) shape: Shape,
     /// Width, height, depth of the shape in the object's own frame.
-    pub size: [i32; 3],
+    pub(crate) size: [i32; 3],
     /// The centre of the shape from the pivot, in the object's own frame.
-    pub offset: [i32; 3],
+    pub(crate) offset: [i32; 3],
     /// The pivot's height above the support when the object stands.
-    pub rest: i32,
+    pub(crate) rest: i32,
     /// How far from a movable receptacle's pivot its contents lie; 0 for fixed ones.
-    pub content_radius: i32,
+    pub(crate) content_radius: i32,
     /// The groups that a movable object belongs to (`food`, `desk`, ...).
-    pub tags: Vec<String>,
+    pub(crate) tags: Vec<String>,
     /// The groups and classes that a receptacle is used for.
-    pub holds: Vec<String>,
+    pub(crate) holds: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -102,12 +102,12 @@ fn table() -> &'static [ClassInfo] {
 
 impl Class {
     /// No object: the target of navigation actions.
-    pub const NONE: Class = Class(0);
+    pub(crate) const NONE: Class = Class(0);
     /// Entries of the policy's object head, `None` included.
-    pub const VOCABULARY: usize = 82;
+    pub(crate) const VOCABULARY: usize = 82;
 
     /// The class of that index, if there is one.
-    pub fn from_index(index: usize) -> Option<Class> {
+    pub(crate) fn from_index(index: usize) -> Option<Class> {
         (index < table().len()).then_some(Class(index as u8))
     }
 
@@ -117,17 +117,17 @@ impl Class {
     }
 
     /// All classes except `None`, in the order of their indices.
-    pub fn all() -> impl Iterator<Item = Class> {
+    pub(crate) fn all() -> impl Iterator<Item = Class> {
         (1..table().len()).map(|index| Class(index as u8))
     }
 
     /// Position in the object head; at or above [`Class::VOCABULARY`] for scenery.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         usize::from(self.0)
     }
 
     /// Whether an action may name it.
-    pub fn in_vocabulary(self) -> bool {
+    pub(crate) fn in_vocabulary(self) -> bool {
         self.index() > 0 && self.index() < Class::VOCABULARY
     }
 
@@ -142,7 +142,7 @@ impl Class {
     }
 
     /// The name in a sentence.
-    pub fn spoken(self) -> &'static str {
+    pub(crate) fn spoken(self) -> &'static str {
         &self.info().spoken
     }
 
@@ -152,7 +152,7 @@ impl Class {
     }
 
     /// "in" or "on", as one says it of a receptacle.
-    pub fn preposition(self) -> &'static str {
+    pub(crate) fn preposition(self) -> &'static str {
         let inside = matches!(
             self.name(),
             "Sink"
@@ -171,7 +171,7 @@ impl Class {
     }
 
     /// Whether `self` is a receptacle in which people keep `content`.
-    pub fn holds(self, content: Class) -> bool {
+    pub(crate) fn holds(self, content: Class) -> bool {
         let wanted = &self.info().holds;
         wanted.iter().any(|word| word == content.name() || content.info().tags.contains(word))
     }

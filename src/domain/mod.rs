@@ -1,12 +1,12 @@
 //! Ground floor: the words of the program as types. Plain data with serde; no IO, no rules.
 
-pub mod action;
-pub mod class;
-pub mod place;
+pub(crate) mod action;
+pub(crate) mod class;
+pub(crate) mod place;
 pub mod scene;
-pub mod skill;
+pub(crate) mod skill;
 pub mod task;
-pub mod trajectory;
+pub(crate) mod trajectory;
 pub mod world;
 
 pub use action::{Action, ActionType};

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 #[serde(from = "[i32; 3]", into = "[i32; 3]")]
 pub struct Point {
     /// East, in millimetres.
-    pub x: i32,
+    pub(crate) x: i32,
     /// Up, in millimetres.
-    pub y: i32,
+    pub(crate) y: i32,
     /// North, in millimetres.
-    pub z: i32,
+    pub(crate) z: i32,
 }
 
 impl From<[i32; 3]> for Point {
@@ -30,29 +30,29 @@ impl From<Point> for [i32; 3] {
 
 impl Point {
     /// The point with these coordinates in millimetres.
-    pub const fn new(x: i32, y: i32, z: i32) -> Point {
+    pub(crate) const fn new(x: i32, y: i32, z: i32) -> Point {
         Point { x, y, z }
     }
 
     /// From metres, rounded to the millimetre.
-    pub fn from_metres(x: f64, y: f64, z: f64) -> Point {
+    pub(crate) fn from_metres(x: f64, y: f64, z: f64) -> Point {
         let mm = |v: f64| (v * 1000.0).round() as i32;
         Point::new(mm(x), mm(y), mm(z))
     }
 
     /// In metres.
-    pub fn metres(self) -> glam::Vec3 {
+    pub(crate) fn metres(self) -> glam::Vec3 {
         glam::Vec3::new(self.x as f32, self.y as f32, self.z as f32) / 1000.0
     }
 
     /// Distance over the floor, in millimetres.
-    pub fn floor_distance(self, other: Point) -> f32 {
+    pub(crate) fn floor_distance(self, other: Point) -> f32 {
         let (dx, dz) = ((self.x - other.x) as f32, (self.z - other.z) as f32);
         (dx * dx + dz * dz).sqrt()
     }
 
     /// Distance in space, in millimetres.
-    pub fn distance(self, other: Point) -> f32 {
+    pub(crate) fn distance(self, other: Point) -> f32 {
         let dy = (self.y - other.y) as f32;
         let floor = self.floor_distance(other);
         (floor * floor + dy * dy).sqrt()
@@ -66,9 +66,9 @@ impl Point {
 #[serde(from = "[i16; 2]", into = "[i16; 2]")]
 pub struct Cell {
     /// East.
-    pub x: i16,
+    pub(crate) x: i16,
     /// North.
-    pub z: i16,
+    pub(crate) z: i16,
 }
 
 impl From<[i16; 2]> for Cell {
@@ -85,26 +85,26 @@ impl From<Cell> for [i16; 2] {
 
 impl Cell {
     /// The side of a cell in millimetres.
-    pub const SIDE: i32 = 250;
+    pub(crate) const SIDE: i32 = 250;
 
     /// The cell with these grid coordinates.
-    pub const fn new(x: i16, z: i16) -> Cell {
+    pub(crate) const fn new(x: i16, z: i16) -> Cell {
         Cell { x, z }
     }
 
     /// The cell nearest to a point.
-    pub fn nearest(point: Point) -> Cell {
+    pub(crate) fn nearest(point: Point) -> Cell {
         let round = |v: i32| (v as f32 / Cell::SIDE as f32).round() as i16;
         Cell::new(round(point.x), round(point.z))
     }
 
     /// Its centre at height `y` (millimetres).
-    pub fn centre(self, y: i32) -> Point {
+    pub(crate) fn centre(self, y: i32) -> Point {
         Point::new(i32::from(self.x) * Cell::SIDE, y, i32::from(self.z) * Cell::SIDE)
     }
 
     /// The neighbouring cell that lies ahead.
-    pub fn ahead(self, heading: Heading) -> Cell {
+    pub(crate) fn ahead(self, heading: Heading) -> Cell {
         let (dx, dz) = heading.step();
         Cell::new(self.x.saturating_add(dx), self.z.saturating_add(dz))
     }
@@ -129,10 +129,10 @@ pub enum Heading {
 
 impl Heading {
     /// Clockwise from north.
-    pub const ALL: [Heading; 4] = [Heading::North, Heading::East, Heading::South, Heading::West];
+    pub(crate) const ALL: [Heading; 4] = [Heading::North, Heading::East, Heading::South, Heading::West];
 
     /// In a word.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Heading::North => "north",
             Heading::East => "east",
@@ -147,12 +147,12 @@ impl Heading {
     }
 
     /// Quarter turns clockwise from north.
-    pub fn quarters(self) -> i32 {
+    pub(crate) fn quarters(self) -> i32 {
         self as i32
     }
 
     /// The change of (x, z) by one cell ahead.
-    pub fn step(self) -> (i16, i16) {
+    pub(crate) fn step(self) -> (i16, i16) {
         match self {
             Heading::North => (0, 1),
             Heading::East => (1, 0),
@@ -162,12 +162,12 @@ impl Heading {
     }
 
     /// A quarter turn clockwise.
-    pub fn right(self) -> Heading {
+    pub(crate) fn right(self) -> Heading {
         Heading::from_quarters(self.quarters() + 1)
     }
 
     /// A quarter turn anticlockwise.
-    pub fn left(self) -> Heading {
+    pub(crate) fn left(self) -> Heading {
         Heading::from_quarters(self.quarters() - 1)
     }
 }
@@ -190,23 +190,23 @@ impl Pose {
     /// The lowest horizon: looking up.
     pub const UP: i16 = -30;
     /// The highest horizon: looking down.
-    pub const DOWN: i16 = 60;
+    pub(crate) const DOWN: i16 = 60;
     /// One look, in degrees.
     pub const LOOK: i16 = 15;
 }
 
 /// An axis-aligned box in the scene's frame, in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Cuboid {
+pub(crate) struct Cuboid {
     /// The corner with the smallest coordinates.
-    pub min: Point,
+    pub(crate) min: Point,
     /// The corner with the largest coordinates.
-    pub max: Point,
+    pub(crate) max: Point,
 }
 
 impl Cuboid {
     /// The box between two corners, given in any order.
-    pub fn between(a: Point, b: Point) -> Cuboid {
+    pub(crate) fn between(a: Point, b: Point) -> Cuboid {
         Cuboid {
             min: Point::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z)),
             max: Point::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z)),
@@ -214,12 +214,12 @@ impl Cuboid {
     }
 
     /// Its middle.
-    pub fn centre(&self) -> Point {
+    pub(crate) fn centre(&self) -> Point {
         Point::new((self.min.x + self.max.x) / 2, (self.min.y + self.max.y) / 2, (self.min.z + self.max.z) / 2)
     }
 
     /// Its outline on the floor.
-    pub fn footprint(&self) -> Rect {
+    pub(crate) fn footprint(&self) -> Rect {
         Rect { min: [self.min.x, self.min.z], max: [self.max.x, self.max.z] }
     }
 }
@@ -227,26 +227,26 @@ impl Cuboid {
 /// An axis-aligned rectangle on the floor plan, (x, z) in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rect {
+pub(crate) struct Rect {
     /// The corner with the smallest coordinates.
-    pub min: [i32; 2],
+    pub(crate) min: [i32; 2],
     /// The corner with the largest coordinates.
-    pub max: [i32; 2],
+    pub(crate) max: [i32; 2],
 }
 
 impl Rect {
     /// The point of the rectangle that is nearest to `from`, at `from`'s height.
-    pub fn nearest(&self, from: Point) -> Point {
+    pub(crate) fn nearest(&self, from: Point) -> Point {
         Point::new(from.x.clamp(self.min[0], self.max[0]), from.y, from.z.clamp(self.min[1], self.max[1]))
     }
 
     /// Whether (x, z) lies in it, edges included.
-    pub fn contains(&self, x: i32, z: i32) -> bool {
+    pub(crate) fn contains(&self, x: i32, z: i32) -> bool {
         (self.min[0]..=self.max[0]).contains(&x) && (self.min[1]..=self.max[1]).contains(&z)
     }
 
     /// The same rectangle with every edge moved out by `margin`.
-    pub fn grown(&self, margin: i32) -> Rect {
+    pub(crate) fn grown(&self, margin: i32) -> Rect {
         Rect { min: [self.min[0] - margin, self.min[1] - margin], max: [self.max[0] + margin, self.max[1] + margin] }
     }
 }

@@ -21,7 +21,7 @@ impl Room {
     pub const ALL: [Room; 4] = [Room::Kitchen, Room::LivingRoom, Room::Bedroom, Room::Bathroom];
 
     /// The room of ALFRED's floor plan of that number: 1 to 30 kitchens, 201 to 230 living rooms, and so on.
-    pub fn of_floor_plan(number: u32) -> Option<Room> {
+    pub(crate) fn of_floor_plan(number: u32) -> Option<Room> {
         match number {
             1..=30 => Some(Room::Kitchen),
             201..=230 => Some(Room::LivingRoom),
@@ -32,7 +32,7 @@ impl Room {
     }
 
     /// The name in options.
-    pub fn option_name(self) -> &'static str {
+    pub(crate) fn option_name(self) -> &'static str {
         match self {
             Room::Kitchen => "kitchen",
             Room::LivingRoom => "living-room",
@@ -42,7 +42,7 @@ impl Room {
     }
 
     /// The name in a sentence.
-    pub fn spoken(self) -> &'static str {
+    pub(crate) fn spoken(self) -> &'static str {
         match self {
             Room::Kitchen => "kitchen",
             Room::LivingRoom => "living room",
@@ -64,11 +64,11 @@ impl std::str::FromStr for Room {
 /// A height at which things may stand, and where.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// World height of the support in millimetres.
-    pub height: i32,
+    pub(crate) height: i32,
     /// The rectangles that things may stand on, pivots included.
-    pub areas: Vec<Rect>,
+    pub(crate) areas: Vec<Rect>,
 }
 
 /// A piece of fixed furniture.
@@ -76,34 +76,34 @@ pub struct Surface {
 #[serde(deny_unknown_fields)]
 pub struct Fixture {
     /// A name that is unique in the scene: ALFRED's object id, or the generator's.
-    pub id: String,
+    pub(crate) id: String,
     /// A class that cannot be picked up.
     pub class: Class,
     /// The pivot, from which distances are measured.
-    pub pivot: Point,
+    pub(crate) pivot: Point,
     /// Where its front looks: out of the furniture, into the room.
-    pub facing: Heading,
+    pub(crate) facing: Heading,
     /// What it fills: one box, or several for an L-shaped counter. An openable one's first box is its shell.
-    pub body: Vec<Cuboid>,
+    pub(crate) body: Vec<Cuboid>,
     /// Where its contents stand, lowest first. Empty when it holds nothing.
-    pub surfaces: Vec<Surface>,
+    pub(crate) surfaces: Vec<Surface>,
     /// The recorded best place to stand for using it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stand: Option<Pose>,
+    pub(crate) stand: Option<Pose>,
 }
 
 /// The measured shape of one mesh of the scene. Lengths in millimetres, in the object's own frame.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     /// ALFRED's `objectName`.
     pub name: String,
     /// The body that stands for the mesh.
-    pub shape: Shape,
+    pub(crate) shape: Shape,
     /// Width, height, depth.
-    pub size: [i32; 3],
+    pub(crate) size: [i32; 3],
     /// The centre from the pivot.
-    pub offset: [i32; 3],
+    pub(crate) offset: [i32; 3],
 }
 
 /// A floor plan.
@@ -111,45 +111,45 @@ pub struct Mesh {
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Version of this format.
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// `FloorPlan7`, or `kitchen-42` for a generated one.
     pub name: String,
     /// Decides floor pattern, and which tasks are asked.
-    pub room: Room,
+    pub(crate) room: Room,
     /// The agent's y in millimetres: 900 above the floor, 675 below the camera.
-    pub agent_y: i32,
+    pub(crate) agent_y: i32,
     /// Where the agent may stand, sorted.
     pub cells: Vec<Cell>,
     /// The fixed furniture.
     pub fixtures: Vec<Fixture>,
     /// The walls' bodies, floor to ceiling.
-    pub walls: Vec<Cuboid>,
+    pub(crate) walls: Vec<Cuboid>,
     /// Shapes of meshes that were measured in this scene.
     #[serde(default)]
-    pub meshes: Vec<Mesh>,
+    pub(crate) meshes: Vec<Mesh>,
 }
 
 impl Scene {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub(crate) const FORMAT: u32 = 1;
 
     /// World height of the floor in millimetres.
-    pub fn floor(&self) -> i32 {
+    pub(crate) fn floor(&self) -> i32 {
         self.agent_y - 900
     }
 
     /// World height of the camera in millimetres.
-    pub fn camera_y(&self) -> i32 {
+    pub(crate) fn camera_y(&self) -> i32 {
         self.agent_y + 675
     }
 
     /// Whether the agent may stand there.
-    pub fn has_cell(&self, cell: Cell) -> bool {
+    pub(crate) fn has_cell(&self, cell: Cell) -> bool {
         self.cells.binary_search(&cell).is_ok()
     }
 
     /// The fixture of that number.
-    pub fn fixture(&self, index: u16) -> Option<&Fixture> {
+    pub(crate) fn fixture(&self, index: u16) -> Option<&Fixture> {
         self.fixtures.get(usize::from(index))
     }
 }

@@ -20,7 +20,8 @@ pub enum SkillKind {
 
 impl SkillKind {
     /// Every kind.
-    pub const ALL: [SkillKind; 7] = [
+    #[cfg(test)]
+    pub(crate) const ALL: [SkillKind; 7] = [
         SkillKind::Pickup,
         SkillKind::Put,
         SkillKind::Slice,
@@ -34,12 +35,12 @@ impl SkillKind {
 /// An instance as the expert's recording names it: a thing that exists at the start, or one of the slices it fell into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Original {
+pub(crate) struct Original {
     /// The thing itself, or what the slice is cut from.
-    pub instance: Instance,
+    pub(crate) instance: Instance,
     /// Which slice, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub slice: Option<u8>,
+    pub(crate) slice: Option<u8>,
 }
 
 /// A part that some instance plays in a task: "the apple", "the slice that we heat". The class grader binds a role to
@@ -49,16 +50,16 @@ pub struct Original {
 pub struct Role {
     /// The class that is asked for.
     #[schemars(schema_with = "Class::vocabulary_schema")]
-    pub class: Class,
+    pub(crate) class: Class,
     /// A slice of that class is asked for, not a whole one.
     #[serde(default)]
-    pub slice: bool,
+    pub(crate) slice: bool,
     /// The instance that already plays it when the task starts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<Instance>,
     /// The expert's instance, for the strict grader.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub expert: Option<Original>,
+    pub(crate) expert: Option<Original>,
 }
 
 /// What the released code's grader asks of a subtask beyond its roles (strict grading only).
@@ -66,11 +67,11 @@ pub struct Role {
 #[serde(deny_unknown_fields)]
 pub struct Literal {
     /// The expert's skill has a Close anywhere.
-    pub needs_close: bool,
+    pub(crate) needs_close: bool,
     /// The thing whose state the released code reads: the cleaned, heated or cooled thing, else the skill's object.
-    pub object: Original,
+    pub(crate) object: Original,
     /// The target of the expert's last action in the skill.
-    pub last_target: Option<Original>,
+    pub(crate) last_target: Option<Original>,
 }
 
 /// One step of a task: a skill with the roles it is about.
@@ -96,7 +97,7 @@ pub struct Subtask {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs)]
-pub enum GoalKind {
+pub(crate) enum GoalKind {
     LookAtObjInLight,
     PickAndPlaceSimple,
     PickAndPlaceWithMovableRecep,
@@ -111,15 +112,15 @@ pub enum GoalKind {
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     /// Which of the seven conditions.
-    pub kind: GoalKind,
+    pub(crate) kind: GoalKind,
     /// The object.
-    pub object: Class,
+    pub(crate) object: Class,
     /// Its slices are meant.
-    pub sliced: bool,
+    pub(crate) sliced: bool,
     /// Where it must end up.
-    pub receptacle: Option<Class>,
+    pub(crate) receptacle: Option<Class>,
     /// The movable receptacle that must carry it.
-    pub movable: Option<Class>,
+    pub(crate) movable: Option<Class>,
     /// The lamp that must shine.
-    pub lamp: Option<Class>,
+    pub(crate) lamp: Option<Class>,
 }

@@ -35,10 +35,10 @@ pub struct Task {
     pub start: Option<World>,
     /// What the agent is told.
     #[schemars(length(min = 1, max = 2000))]
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// One sentence for each subtask, when there are any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sentences: Vec<String>,
+    pub(crate) sentences: Vec<String>,
     /// The parts that instances play.
     #[schemars(length(max = 100))]
     pub roles: Vec<Role>,
@@ -47,7 +47,7 @@ pub struct Task {
     pub subtasks: Vec<Subtask>,
     /// How many actions the expert takes; 0 where that is not known.
     #[serde(default)]
-    pub expert_steps: u32,
+    pub(crate) expert_steps: u32,
     /// After how many actions the episode ends: twice the expert's.
     #[schemars(range(min = 1, max = 100_000))]
     pub horizon: u32,
@@ -56,10 +56,10 @@ pub struct Task {
     pub goal: Option<Goal>,
     /// The trajectory that it was cut from, and the subtask it starts at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<(String, u8)>,
+    pub(crate) source: Option<(String, u8)>,
     /// The instruction is not the authors' own text (which only their file holds).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub reworded: bool,
+    pub(crate) reworded: bool,
 }
 
 /// A file of tasks.
@@ -68,9 +68,9 @@ pub struct Task {
 pub struct TaskSet {
     /// Version of this format.
     #[schemars(extend("const" = TaskSet::FORMAT))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// What the set is called in reports.
-    pub name: String,
+    pub(crate) name: String,
     /// The folder of scene files, relative to this file; needed when a task names a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenes: Option<String>,
@@ -81,5 +81,5 @@ pub struct TaskSet {
 
 impl TaskSet {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 1;
+    pub(crate) const FORMAT: u32 = 1;
 }

@@ -12,9 +12,9 @@ use super::world::World;
 #[serde(deny_unknown_fields)]
 pub struct Annotation {
     /// The whole task in a sentence.
-    pub goal: String,
+    pub(crate) goal: String,
     /// One sentence for each skill. The annotation is aligned when there are as many as skills.
-    pub steps: Vec<String>,
+    pub(crate) steps: Vec<String>,
 }
 
 /// A recorded demonstration.
@@ -53,13 +53,13 @@ pub struct Trajectory {
 
 impl Trajectory {
     /// The most skills that one may have.
-    pub const MOST_SKILLS: usize = 255;
+    pub(crate) const MOST_SKILLS: usize = 255;
 
     /// Whether its skills divide its actions.
     ///
     /// # Errors
     /// Names the field that does not fit.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let (skills, starts, steps) = (self.skills.len(), &self.skill_starts, self.actions.len());
         if skills > Trajectory::MOST_SKILLS {
             return Err(format!("skills: {skills} are more than {}", Trajectory::MOST_SKILLS));
@@ -74,12 +74,12 @@ impl Trajectory {
     }
 
     /// What a learner should do at a step.
-    pub fn choice(&self, step: usize) -> Option<Action> {
+    pub(crate) fn choice(&self, step: usize) -> Option<Action> {
         self.choices.get(step).or_else(|| self.actions.get(step)).copied()
     }
 
     /// The actions of one skill, as a range of positions.
-    pub fn skill_range(&self, skill: usize) -> std::ops::Range<usize> {
+    pub(crate) fn skill_range(&self, skill: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.skill_starts.get(i).map_or(self.actions.len(), |&start| start as usize);
         at(skill)..at(skill + 1)
     }
@@ -110,11 +110,11 @@ mod tests {
 
 /// Trajectories for tests.
 #[cfg(test)]
-pub mod testing {
+pub(crate) mod testing {
     use super::*;
 
     /// One of the split train that nothing happens in.
-    pub fn empty(id: &str, scene: &str) -> Trajectory {
+    pub(crate) fn empty(id: &str, scene: &str) -> Trajectory {
         Trajectory {
             id: id.into(),
             split: "train".into(),

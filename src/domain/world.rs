@@ -38,12 +38,12 @@ pub struct Object {
     pub class: Class,
     /// The scene's mesh that it shows, if the scene knows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mesh: Option<u16>,
+    pub(crate) mesh: Option<u16>,
     /// Its pivot. Meaningless while it is in the hand, or in something that is.
-    pub at: Point,
+    pub(crate) at: Point,
     /// Rotation about x, y, z in tenths of a degree, applied z first, then x, then y.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub turn: [i16; 3],
+    pub(crate) turn: [i16; 3],
     /// What holds it.
     #[serde(default, skip_serializing_if = "is_default")]
     pub parent: Parent,
@@ -72,7 +72,7 @@ impl Object {
     const THINNEST_SLICE: i32 = 15;
 
     /// Shape, size and offset in millimetres in the object's own frame. A slice is a disc of what it was cut from.
-    pub fn shape_in(&self, scene: &Scene) -> (Shape, [i32; 3], [i32; 3]) {
+    pub(crate) fn shape_in(&self, scene: &Scene) -> (Shape, [i32; 3], [i32; 3]) {
         let info = self.class.info();
         let whole = match self.mesh.and_then(|index| scene.meshes.get(usize::from(index))) {
             Some(mesh) => (mesh.shape, mesh.size, mesh.offset),
@@ -122,7 +122,7 @@ pub struct World {
 
 impl World {
     /// The world at the start of an episode: every fixture closed and off, nothing in the hand.
-    pub fn new(scene: &Scene, agent: Pose, objects: Vec<Object>) -> World {
+    pub(crate) fn new(scene: &Scene, agent: Pose, objects: Vec<Object>) -> World {
         World { agent, objects, fixtures: vec![FixtureState::default(); scene.fixtures.len()], held: None }
     }
 
@@ -135,18 +135,18 @@ impl World {
     }
 
     /// The movable object of that number.
-    pub fn object(&self, index: u16) -> Option<&Object> {
+    pub(crate) fn object(&self, index: u16) -> Option<&Object> {
         self.objects.get(usize::from(index))
     }
 
     /// Every instance: objects first, then fixtures.
-    pub fn instances(&self, scene: &Scene) -> impl Iterator<Item = Instance> + use<> {
+    pub(crate) fn instances(&self, scene: &Scene) -> impl Iterator<Item = Instance> + use<> {
         let objects = (0..self.objects.len() as u16).map(Instance::Object);
         objects.chain((0..scene.fixtures.len() as u16).map(Instance::Fixture))
     }
 
     /// What directly holds an instance; `None` for fixtures and for objects on the floor or in the hand.
-    pub fn container_of(&self, instance: Instance) -> Option<Instance> {
+    pub(crate) fn container_of(&self, instance: Instance) -> Option<Instance> {
         match instance {
             Instance::Fixture(_) => None,
             Instance::Object(i) => match self.object(i)?.parent {
@@ -169,12 +169,12 @@ impl World {
     }
 
     /// The objects that lie in `receptacle`, directly or in something that does.
-    pub fn contents(&self, receptacle: Instance) -> impl Iterator<Item = u16> {
+    pub(crate) fn contents(&self, receptacle: Instance) -> impl Iterator<Item = u16> {
         (0..self.objects.len() as u16).filter(move |&i| self.is_in(Instance::Object(i), receptacle))
     }
 
     /// Whether the object is in the hand, directly or in something that is.
-    pub fn in_hand(&self, index: u16) -> bool {
+    pub(crate) fn in_hand(&self, index: u16) -> bool {
         self.held.is_some_and(|held| held == index || self.is_in(Instance::Object(index), Instance::Object(held)))
     }
 
@@ -192,14 +192,14 @@ impl World {
     }
 
     /// The first closed receptacle around an instance, if it is shut in.
-    pub fn shut_in(&self, scene: &Scene, instance: Instance) -> Option<Instance> {
+    pub(crate) fn shut_in(&self, scene: &Scene, instance: Instance) -> Option<Instance> {
         self.containers_of(instance).find(|&holder| {
             self.class_of(scene, holder).is_some_and(|class| class.info().openable) && !self.is_open(holder)
         })
     }
 
     /// An instance's pivot.
-    pub fn position(&self, scene: &Scene, instance: Instance) -> Option<Point> {
+    pub(crate) fn position(&self, scene: &Scene, instance: Instance) -> Option<Point> {
         match instance {
             Instance::Fixture(i) => scene.fixtures.get(usize::from(i)).map(|fixture| fixture.pivot),
             Instance::Object(i) => self.object(i).map(|object| object.at),

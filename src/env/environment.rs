@@ -10,33 +10,33 @@ use crate::house::{House, Outcome};
 
 /// What a step came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transition {
+pub(crate) struct Transition {
     /// Whether it was possible, and if not why.
-    pub outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// The grader credited a subtask with it; never without grading.
-    pub completed_subtask: bool,
+    pub(crate) completed_subtask: bool,
 }
 
 /// House behind the seam, for what is about House: its map, its expert, its scenes and worlds.
-pub struct HouseAccess<'a> {
+pub(crate) struct HouseAccess<'a> {
     /// The simulator.
-    pub house: &'a mut House,
+    pub(crate) house: &'a mut House,
     /// Follows the subtasks, where there is a task.
-    pub grader: Option<&'a Grader>,
+    pub(crate) grader: Option<&'a Grader>,
 }
 
 /// A state that an environment can go back to. Only the environment that made it can read it; copies share it.
 #[derive(Clone)]
-pub struct Snapshot(Arc<dyn Any + Send + Sync>);
+pub(crate) struct Snapshot(Arc<dyn Any + Send + Sync>);
 
 impl Snapshot {
     /// Holds a state of some environment's own type.
-    pub fn of<T: Any + Send + Sync>(state: T) -> Snapshot {
+    pub(crate) fn of<T: Any + Send + Sync>(state: T) -> Snapshot {
         Snapshot(Arc::new(state))
     }
 
     /// The state, if it is of that type.
-    pub fn get<T: Any + Send + Sync>(&self) -> Option<&T> {
+    pub(crate) fn get<T: Any + Send + Sync>(&self) -> Option<&T> {
         self.0.downcast_ref()
     }
 }
@@ -45,7 +45,7 @@ impl Snapshot {
 /// an implementation may speak with another process; what an environment cannot do has an answer that says so.
 ///
 /// Only [`Rollout`](crate::episode::rollout::Rollout) steps one.
-pub trait Environment: Send {
+pub(crate) trait Environment: Send {
     /// What it is called in messages.
     fn name(&self) -> &str;
 

@@ -16,11 +16,11 @@ const LONGEST: usize = 1000;
 ///
 /// # Errors
 /// When there is no task, or the expert sees no way.
-pub fn goal_frames(access: &HouseAccess<'_>, count: usize) -> anyhow::Result<Vec<Frame>> {
+pub(crate) fn goal_frames(access: &HouseAccess<'_>, count: usize) -> anyhow::Result<Vec<Frame>> {
     let grader = access.grader.context("the agent is shown its goal, which a task has; it reads no instructions")?;
     let mut house = House::new(Arc::clone(access.house.scene()), access.house.world().clone());
     let mut states = vec![house.world().clone()];
-    demonstrate(&mut house, &mut grader.clone(), LONGEST, &mut |house, _| states.push(house.world().clone()))
+    demonstrate(&mut house, &mut grader.clone(), LONGEST, &mut |house| states.push(house.world().clone()))
         .context("the expert, who shows the goal")?;
     let last = states.split_off(states.len().saturating_sub(count));
     let draw = |world| {

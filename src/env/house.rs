@@ -9,11 +9,11 @@ use crate::house::grading::{Grader, Grading};
 use crate::house::view::{Candidate, Frame};
 
 /// A house with what is asked in it.
-pub struct HouseEnvironment {
+pub(crate) struct HouseEnvironment {
     /// The simulator.
-    pub house: House,
+    pub(crate) house: House,
     /// Follows the subtasks, where there is a task.
-    pub grader: Option<Grader>,
+    pub(crate) grader: Option<Grader>,
     start: HouseState,
 }
 
@@ -26,13 +26,13 @@ struct HouseState {
 
 impl HouseEnvironment {
     /// A house whose present state is the episode's start.
-    pub fn new(house: House, grader: Option<Grader>) -> HouseEnvironment {
+    pub(crate) fn new(house: House, grader: Option<Grader>) -> HouseEnvironment {
         let start = HouseState { world: house.world().clone(), grader: grader.clone() };
         HouseEnvironment { house, grader, start }
     }
 
     /// A task's start, graded.
-    pub fn of_task(task: &Task, house: House, grading: Grading) -> HouseEnvironment {
+    pub(crate) fn of_task(task: &Task, house: House, grading: Grading) -> HouseEnvironment {
         let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
         HouseEnvironment::new(house, Some(grader))
     }

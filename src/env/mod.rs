@@ -1,9 +1,9 @@
 //! What an agent acts in: the trait that everything above knows an environment by, and House behind it.
 
-pub mod environment;
-pub mod goal_frames;
-pub mod house;
+pub(crate) mod environment;
+pub(crate) mod goal_frames;
+pub(crate) mod house;
 
-pub use environment::{Environment, HouseAccess, Snapshot, Transition};
-pub use goal_frames::goal_frames;
-pub use house::HouseEnvironment;
+pub(crate) use environment::{Environment, HouseAccess};
+pub(crate) use goal_frames::goal_frames;
+pub(crate) use house::HouseEnvironment;

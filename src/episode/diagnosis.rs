@@ -38,7 +38,12 @@ struct Evidence {
 ///
 /// # Errors
 /// When the steps cannot be taken again.
-pub fn classify(task: &Task, grading: Grading, setting: &Setting, trace: &[TraceStep]) -> anyhow::Result<Failure> {
+pub(crate) fn classify(
+    task: &Task,
+    grading: Grading,
+    setting: &Setting,
+    trace: &[TraceStep],
+) -> anyhow::Result<Failure> {
     let house = House::new(setting.scene.clone(), setting.world.clone());
     let mut rollout = Rollout::new(HouseEnvironment::of_task(task, house, grading), String::new(), None);
     let last_done = trace.iter().rposition(|step| step.subtask.is_some()).map_or(0, |step| step + 1);

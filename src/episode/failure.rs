@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What kept an episode from success; the first that applies, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Failure {
+pub(crate) enum Failure {
     /// A later subtask was done while its turn had not come.
     OutOfOrder,
     /// The right kind of interaction with a thing that was not asked for.
@@ -21,18 +21,8 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Every class.
-    pub const ALL: [Failure; 6] = [
-        Failure::OutOfOrder,
-        Failure::WrongObject,
-        Failure::WrongAction,
-        Failure::Stuck,
-        Failure::NeverReached,
-        Failure::Timeout,
-    ];
-
     /// The class in words.
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Failure::OutOfOrder => "out of order",
             Failure::WrongObject => "wrong object",

@@ -16,39 +16,39 @@ use crate::language::instruction;
 
 /// An episode with the state after every step.
 #[derive(Clone, Debug)]
-pub struct FrameSequence {
+pub(crate) struct FrameSequence {
     /// Task, scene and result in a line.
-    pub title: String,
+    pub(crate) title: String,
     /// Where it was.
-    pub scene: Arc<Scene>,
+    pub(crate) scene: Arc<Scene>,
     /// What the task asked, in words.
-    pub subtasks: Vec<String>,
+    pub(crate) subtasks: Vec<String>,
     /// The start, and the state after each step.
-    pub shots: Vec<Shot>,
+    pub(crate) shots: Vec<Shot>,
 }
 
 /// A state of a recording.
 #[derive(Clone, Debug)]
-pub struct Shot {
+pub(crate) struct Shot {
     /// How many steps were taken.
-    pub step: u32,
+    pub(crate) step: u32,
     /// The state.
-    pub world: World,
+    pub(crate) world: World,
     /// What the agent was told when it got here.
-    pub told: String,
+    pub(crate) told: String,
     /// What was done to get here, with its target's class; nothing at the start.
-    pub did: Option<String>,
+    pub(crate) did: Option<String>,
     /// What that came to.
-    pub outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// It could be done.
-    pub possible: bool,
+    pub(crate) possible: bool,
     /// The subtask that it completed, in words.
-    pub done: Option<String>,
+    pub(crate) done: Option<String>,
 }
 
 impl Shot {
     /// What was done and what it came to.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         match (&self.did, self.possible) {
             (None, _) => "the start".into(),
             (Some(did), true) => did.clone(),
@@ -58,11 +58,11 @@ impl Shot {
 }
 
 /// Draws the states of a recording.
-pub struct Camera(House);
+pub(crate) struct Camera(House);
 
 impl Camera {
     /// What the agent saw.
-    pub fn draw(&mut self, shot: &Shot) -> Frame {
+    pub(crate) fn draw(&mut self, shot: &Shot) -> Frame {
         self.0.restore(shot.world.clone());
         self.0.frame().clone()
     }
@@ -73,7 +73,7 @@ impl FrameSequence {
     ///
     /// # Errors
     /// When a step does not come to what was recorded.
-    pub fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<FrameSequence> {
+    pub(crate) fn of(setting: &Setting, task: &Task, episode: &Episode) -> anyhow::Result<FrameSequence> {
         let house = House::new(setting.scene.clone(), setting.world.clone());
         let mut rollout = Rollout::in_house(house, String::new(), None, None);
         let subtasks: Vec<String> = task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect();
@@ -125,12 +125,12 @@ impl FrameSequence {
     }
 
     /// What the agent was told first.
-    pub fn told(&self) -> String {
+    pub(crate) fn told(&self) -> String {
         self.shots.first().map_or_else(String::new, |shot| shot.told.clone())
     }
 
     /// Something to draw its states with.
-    pub fn camera(&self) -> Camera {
+    pub(crate) fn camera(&self) -> Camera {
         let world = self.shots.first().map_or_else(World::default, |shot| shot.world.clone());
         Camera(House::new(self.scene.clone(), world))
     }

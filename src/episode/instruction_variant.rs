@@ -15,7 +15,7 @@ use crate::language::{instruction, phrases};
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
 )]
 #[serde(rename_all = "lowercase")]
-pub enum InstructionVariant {
+pub(crate) enum InstructionVariant {
     /// The task's own.
     #[default]
     Original,
@@ -31,7 +31,7 @@ pub enum InstructionVariant {
 
 impl InstructionVariant {
     /// Every variant, the task's own first.
-    pub const ALL: [InstructionVariant; 5] = [
+    pub(crate) const ALL: [InstructionVariant; 5] = [
         InstructionVariant::Original,
         InstructionVariant::Swapped,
         InstructionVariant::Empty,
@@ -40,12 +40,12 @@ impl InstructionVariant {
     ];
 
     /// Whether it is the task's own.
-    pub fn is_original(&self) -> bool {
+    pub(crate) fn is_original(&self) -> bool {
         *self == InstructionVariant::Original
     }
 
     /// What it is called in files and reports.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             InstructionVariant::Original => "original",
             InstructionVariant::Swapped => "swapped",
@@ -57,7 +57,7 @@ impl InstructionVariant {
 }
 
 /// The task's own instruction, or all its steps, each normalised, in one line.
-pub fn task_instruction(task: &Task, step_by_step: bool) -> String {
+pub(crate) fn task_instruction(task: &Task, step_by_step: bool) -> String {
     if step_by_step {
         task.sentences.iter().map(|sentence| instruction::normalise(sentence)).collect::<Vec<_>>().join(" ")
     } else {
@@ -66,7 +66,7 @@ pub fn task_instruction(task: &Task, step_by_step: bool) -> String {
 }
 
 /// The instruction for the task at `index`; `rng_seed` drives what is drawn.
-pub fn instruction_for(
+pub(crate) fn instruction_for(
     tasks: &[Task],
     index: usize,
     variant: InstructionVariant,
@@ -103,7 +103,7 @@ fn swapped(tasks: &[Task], index: usize, step_by_step: bool) -> Option<String> {
 }
 
 /// Whether the instructions of the set differ, so that they can be swapped.
-pub fn can_swap(tasks: &[Task], step_by_step: bool) -> bool {
+pub(crate) fn can_swap(tasks: &[Task], step_by_step: bool) -> bool {
     tasks.iter().map(|task| task_instruction(task, step_by_step)).collect::<BTreeSet<_>>().len() > 1
 }
 

@@ -13,55 +13,55 @@ use crate::house::Outcome;
 /// One line of a run's `episodes.jsonl`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Episode {
+pub(crate) struct Episode {
     /// The id of the task that was played.
-    pub task: String,
+    pub(crate) task: String,
     /// The episode's seed, one of the run's.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// How the instruction was derived from the task's own; the task's own where absent.
     #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
-    pub variant: InstructionVariant,
+    pub(crate) variant: InstructionVariant,
     /// The subtask from which the agent acted; the expert did those before.
     #[serde(default, skip_serializing_if = "is_zero")]
-    pub start_subtask: u32,
+    pub(crate) start_subtask: u32,
     /// Fingerprint of the world at the start.
-    pub start_hash: String,
+    pub(crate) start_hash: String,
     /// The instruction at the start, as the agent got it.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// How many subtasks the agent completed.
-    pub completed: u32,
+    pub(crate) completed: u32,
     /// How many subtasks the agent had to complete.
-    pub of: u32,
+    pub(crate) of: u32,
     /// Every subtask was completed.
-    pub success: bool,
+    pub(crate) success: bool,
     /// How many actions the agent took.
-    pub steps: u32,
+    pub(crate) steps: u32,
     /// Why it ended before its time, if it did: what the policy or the environment reported.
-    pub error: Option<String>,
+    pub(crate) error: Option<String>,
     /// What kept it from success, where it ended in its time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<Failure>,
+    pub(crate) failure: Option<Failure>,
     /// How often it was begun; more than once where an error made it begin anew.
     #[serde(default = "once", skip_serializing_if = "is_one")]
-    pub attempts: u32,
+    pub(crate) attempts: u32,
     /// How many of the trace's steps the expert took first.
     #[serde(default, skip_serializing_if = "is_zero")]
-    pub prefix_steps: u32,
+    pub(crate) prefix_steps: u32,
     /// What was done, step by step.
-    pub trace: Vec<TraceStep>,
+    pub(crate) trace: Vec<TraceStep>,
 }
 
 /// What tells the episodes of a run apart.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct EpisodeKey {
+pub(crate) struct EpisodeKey {
     /// The id of the task.
-    pub task: String,
+    pub(crate) task: String,
     /// One of the run's seeds.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// How the instruction was derived from the task's own.
-    pub variant: InstructionVariant,
+    pub(crate) variant: InstructionVariant,
     /// The subtask from which the agent acts.
-    pub start_subtask: u32,
+    pub(crate) start_subtask: u32,
 }
 
 impl std::fmt::Display for EpisodeKey {
@@ -79,7 +79,7 @@ impl std::fmt::Display for EpisodeKey {
 
 impl Episode {
     /// What tells it apart from others of its run.
-    pub fn key(&self) -> EpisodeKey {
+    pub(crate) fn key(&self) -> EpisodeKey {
         EpisodeKey {
             task: self.task.clone(),
             seed: self.seed,
@@ -89,17 +89,17 @@ impl Episode {
     }
 
     /// Whether it was played as the task asks: from its start, with its own instruction.
-    pub fn is_plain(&self) -> bool {
+    pub(crate) fn is_plain(&self) -> bool {
         self.variant.is_original() && self.start_subtask == 0
     }
 
     /// 1 for a success, else 0.
-    pub fn succeeded(&self) -> f64 {
+    pub(crate) fn succeeded(&self) -> f64 {
         f64::from(u8::from(self.success))
     }
 
     /// Completed subtasks as a share of those that were asked.
-    pub fn progress(&self) -> f64 {
+    pub(crate) fn progress(&self) -> f64 {
         f64::from(self.completed) / f64::from(self.of.max(1))
     }
 }
@@ -121,27 +121,27 @@ fn once() -> u32 {
 /// One action of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TraceStep {
+pub(crate) struct TraceStep {
     /// The action that was taken.
     #[serde(rename = "action")]
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// The thing that it was done to, by its position in the scene or world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub target: Option<Instance>,
+    pub(crate) target: Option<Instance>,
     /// The class of the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub class: Option<Class>,
+    pub(crate) class: Option<Class>,
     /// Whether it was carried out, or why it was impossible.
-    pub outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// The subtask that it completed, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub subtask: Option<u32>,
+    pub(crate) subtask: Option<u32>,
     /// The instruction from this step on, where it changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub instruction: Option<String>,
+    pub(crate) instruction: Option<String>,
     /// Who chose from this step on, where that changed; without any, the run's policy did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub author: Option<Author>,
+    pub(crate) author: Option<Author>,
 }
 
 /// Who chose a step of an explored episode.
@@ -149,40 +149,40 @@ pub struct TraceStep {
 #[serde(deny_unknown_fields)]
 pub struct Author {
     /// `hand` for a person, else the policy's name.
-    pub policy: String,
+    pub(crate) policy: String,
     /// SHA-256 of its checkpoint, where it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub checkpoint: Option<String>,
+    pub(crate) checkpoint: Option<String>,
     /// The seed of its chance.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// It drew its actions from its distribution instead of taking the likeliest.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub sampling: bool,
+    pub(crate) sampling: bool,
 }
 
 impl Author {
     /// The name of a person who acts.
-    pub const HAND: &str = "hand";
+    pub(crate) const HAND: &str = "hand";
 
     /// The author of what a person does.
-    pub fn hand() -> Author {
+    pub(crate) fn hand() -> Author {
         Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, sampling: false }
     }
 
     /// Whether a person chose, no policy.
-    pub fn is_hand(&self) -> bool {
+    pub(crate) fn is_hand(&self) -> bool {
         self.policy == Author::HAND
     }
 }
 
 impl TraceStep {
     /// What was done, as an action that can be taken again.
-    pub fn action(&self) -> Action {
+    pub(crate) fn action(&self) -> Action {
         Action { kind: self.kind, target: self.target }
     }
 
     /// The record of a step that `rollout` just took.
-    pub fn of<E: Environment>(tick: &Tick, rollout: &Rollout<E>) -> TraceStep {
+    pub(crate) fn of<E: Environment>(tick: &Tick, rollout: &Rollout<E>) -> TraceStep {
         let action = tick.decision.action;
         let completed = rollout.env.grading().map_or(0, |(completed, _)| completed as u32);
         TraceStep {

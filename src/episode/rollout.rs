@@ -11,27 +11,27 @@ use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
 
 /// An episode under way: an environment, what is asked, and how far it has come.
-pub struct Rollout<E = HouseEnvironment> {
+pub(crate) struct Rollout<E = HouseEnvironment> {
     /// Where it happens.
-    pub env: E,
+    pub(crate) env: E,
     /// What the agent is told; may change between steps.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// After how many steps it ends; `None` for no limit.
-    pub horizon: Option<u32>,
+    pub(crate) horizon: Option<u32>,
     steps: u32,
 }
 
 /// One step that was taken.
 #[derive(Clone, Debug)]
-pub struct Tick {
+pub(crate) struct Tick {
     /// Which step, from 1.
-    pub step: u32,
+    pub(crate) step: u32,
     /// What was done, and what was behind it.
-    pub decision: Decision,
+    pub(crate) decision: Decision,
     /// What it came to.
-    pub outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// A subtask was completed by it.
-    pub completed_one: bool,
+    pub(crate) completed_one: bool,
 }
 
 /// Why an episode is over.
@@ -45,7 +45,7 @@ pub enum End {
 }
 
 /// Looks on while a rollout goes its way, and may end it.
-pub trait Observer<E> {
+pub(crate) trait Observer<E> {
     /// Before each step, when it is known what will be done. The policy may be asked further questions.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ pub trait Observer<E> {
 impl<E> Observer<E> for () {}
 
 /// Looks on after each step with a closure.
-pub struct AfterEach<F>(pub F);
+pub(crate) struct AfterEach<F>(pub(crate) F);
 
 impl<E, F: FnMut(&mut Rollout<E>, &Tick) -> anyhow::Result<ControlFlow<()>>> Observer<E> for AfterEach<F> {
     fn after(&mut self, rollout: &mut Rollout<E>, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
@@ -82,29 +82,38 @@ impl<E, F: FnMut(&mut Rollout<E>, &Tick) -> anyhow::Result<ControlFlow<()>>> Obs
 
 impl Rollout {
     /// An episode in a house, at its start.
-    pub fn in_house(house: House, instruction: String, grader: Option<Grader>, horizon: Option<u32>) -> Rollout {
+    pub(crate) fn in_house(house: House, instruction: String, grader: Option<Grader>, horizon: Option<u32>) -> Rollout {
         Rollout::new(HouseEnvironment::new(house, grader), instruction, horizon)
     }
 }
 
 impl<E: Environment> Rollout<E> {
     /// An episode at its start.
-    pub fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
+    pub(crate) fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
         Rollout { env, instruction, horizon, steps: 0 }
     }
 
     /// How many steps were taken.
-    pub fn steps(&self) -> u32 {
+    pub(crate) fn steps(&self) -> u32 {
         self.steps
     }
 
+    /// Goes back to the start, to be run again.
+    ///
+    /// # Errors
+    /// When the environment fails.
+    pub(crate) fn restart(&mut self) -> anyhow::Result<()> {
+        self.steps = 0;
+        self.env.reset()
+    }
+
     /// Goes on as if so many steps had been taken: the environment was brought to another state.
-    pub fn set_steps(&mut self, steps: u32) {
+    pub(crate) fn set_steps(&mut self, steps: u32) {
         self.steps = steps;
     }
 
     /// Whether it is over, and why.
-    pub fn end(&self) -> Option<End> {
+    pub(crate) fn end(&self) -> Option<End> {
         if self.env.grading().is_some_and(|(completed, of)| completed == of) {
             return Some(End::Success);
         }
@@ -112,7 +121,7 @@ impl<E: Environment> Rollout<E> {
     }
 
     /// What a policy decides from now.
-    pub fn observation(&mut self) -> Observation<'_> {
+    pub(crate) fn observation(&mut self) -> Observation<'_> {
         Observation { environment: &mut self.env, instruction: &self.instruction, step: self.steps }
     }
 
@@ -120,7 +129,7 @@ impl<E: Environment> Rollout<E> {
     ///
     /// # Errors
     /// Whatever the policy reports.
-    pub fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
+    pub(crate) fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
         policy.act_in(0, self.observation())
     }
 
@@ -128,7 +137,7 @@ impl<E: Environment> Rollout<E> {
     ///
     /// # Errors
     /// Whatever the policy reports.
-    pub fn values(&mut self, policy: &mut dyn Policy, decision: &Decision) -> anyhow::Result<Option<Values>> {
+    pub(crate) fn values(&mut self, policy: &mut dyn Policy, decision: &Decision) -> anyhow::Result<Option<Values>> {
         match &decision.values {
             Some(values) => Ok(Some(values.clone())),
             None => policy.values(0, &mut self.observation()),
@@ -139,7 +148,7 @@ impl<E: Environment> Rollout<E> {
     ///
     /// # Errors
     /// When the environment fails; an impossible action is an outcome.
-    pub fn carry_out(&mut self, decision: Decision) -> anyhow::Result<Tick> {
+    pub(crate) fn carry_out(&mut self, decision: Decision) -> anyhow::Result<Tick> {
         let transition = self.env.step(decision.action)?;
         self.steps += 1;
         let completed_one = transition.completed_subtask;
@@ -150,7 +159,7 @@ impl<E: Environment> Rollout<E> {
     ///
     /// # Errors
     /// Whatever policy, environment or observer report.
-    pub fn run(&mut self, policy: &mut dyn Policy, observer: &mut dyn Observer<E>) -> anyhow::Result<()> {
+    pub(crate) fn run(&mut self, policy: &mut dyn Policy, observer: &mut dyn Observer<E>) -> anyhow::Result<()> {
         while self.end().is_none() {
             let decision = self.decide(policy)?;
             if observer.before(self, Some(policy), &decision)?.is_break() {
@@ -168,7 +177,7 @@ impl<E: Environment> Rollout<E> {
     ///
     /// # Errors
     /// Whatever environment or observer report.
-    pub fn replay(
+    pub(crate) fn replay(
         &mut self,
         actions: impl IntoIterator<Item = Action>,
         observer: &mut dyn Observer<E>,
@@ -191,7 +200,7 @@ impl<E: Environment> Rollout<E> {
 ///
 /// # Errors
 /// Where all slots fail together; a slot's own failure is in its place.
-pub fn decide_all<E: Environment>(
+pub(crate) fn decide_all<E: Environment>(
     policy: &mut dyn Policy,
     rollouts: &mut [Option<Rollout<E>>],
 ) -> anyhow::Result<Decisions> {

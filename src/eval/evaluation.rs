@@ -31,13 +31,13 @@ pub struct Evaluation {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Progress {
     /// Episodes that are over.
-    pub done: usize,
+    pub(crate) done: usize,
     /// Of how many.
-    pub of: usize,
+    pub(crate) of: usize,
     /// Of the done ones, successes.
-    pub successes: usize,
+    pub(crate) successes: usize,
     /// Of the done ones, those that ended with an error.
-    pub errors: usize,
+    pub(crate) errors: usize,
 }
 
 impl Progress {
@@ -102,14 +102,14 @@ impl Evaluation {
     }
 
     /// Every episode of the run, or of its share, in order.
-    pub fn all(&self) -> Vec<EpisodeSpec> {
+    pub(crate) fn all(&self) -> Vec<EpisodeSpec> {
         let all = episode_specs(&self.manifest, &self.plan.tasks);
         let own = self.plan.options.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
         all[own].to_vec()
     }
 
     /// What tells an episode apart from the others.
-    pub fn key(&self, spec: &EpisodeSpec) -> EpisodeKey {
+    pub(crate) fn key(&self, spec: &EpisodeSpec) -> EpisodeKey {
         spec.key(&self.plan.tasks)
     }
 
@@ -119,7 +119,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// When a policy cannot be made, or `sink` fails.
-    pub fn play(
+    pub(crate) fn play(
         &self,
         wanted: &[EpisodeSpec],
         make_policy: &Arc<MakePolicy>,
@@ -204,7 +204,7 @@ pub fn evaluate(
 ///
 /// # Errors
 /// When the folder cannot be read or written to.
-pub fn finish(
+pub(crate) fn finish(
     manifest: &RunManifest,
     tasks: &[Task],
     all: &[EpisodeSpec],

@@ -11,14 +11,14 @@ use crate::episode::record::Episode;
 
 /// What is played, by whom, and whom to tell.
 pub(crate) struct Executor {
-    pub evaluation: EvaluationPlan,
-    pub make_policy: Arc<MakePolicy>,
+    pub(crate) evaluation: EvaluationPlan,
+    pub(crate) make_policy: Arc<MakePolicy>,
     /// Set from outside: what is under way is dropped.
-    pub stop: Arc<AtomicBool>,
+    pub(crate) stop: Arc<AtomicBool>,
     /// Set when nobody takes the episodes any more.
-    pub give_up: AtomicBool,
-    pub queue: WorkQueue,
-    pub sender: Mutex<Sender<Message>>,
+    pub(crate) give_up: AtomicBool,
+    pub(crate) queue: WorkQueue,
+    pub(crate) sender: Mutex<Sender<Message>>,
 }
 
 /// What a worker tells.
@@ -31,7 +31,7 @@ pub(crate) enum Message {
 
 impl Executor {
     /// Tells the thread that waits; false when nobody waits any more.
-    pub fn send(&self, message: Message) -> bool {
+    pub(crate) fn send(&self, message: Message) -> bool {
         self.sender.lock().unwrap_or_else(PoisonError::into_inner).send(message).is_ok()
     }
 }

@@ -13,18 +13,18 @@ use crate::run_dir::episode_spec::EpisodeSpec;
 #[derive(Clone, Debug)]
 pub(crate) struct InFlight {
     /// Its position among what is wanted.
-    pub at: usize,
+    pub(crate) at: usize,
     /// Which one it is.
-    pub spec: EpisodeSpec,
+    pub(crate) spec: EpisodeSpec,
     /// Since when it is played.
-    pub began: Instant,
+    pub(crate) began: Instant,
     /// What was recorded so far.
-    pub episode: Episode,
+    pub(crate) episode: Episode,
 }
 
 impl InFlight {
     /// Before the first step.
-    pub fn new(evaluation: &EvaluationPlan, at: usize, spec: EpisodeSpec) -> InFlight {
+    pub(crate) fn new(evaluation: &EvaluationPlan, at: usize, spec: EpisodeSpec) -> InFlight {
         let task = &evaluation.tasks[spec.task];
         let chance = crate::run_dir::episode_spec::policy_seed(spec.task, spec.seed);
         let step_by_step = evaluation.options.step_by_step;
@@ -48,19 +48,19 @@ impl InFlight {
     }
 
     /// Ends it with an error, unless it has one.
-    pub fn fail(&mut self, problem: &str) {
+    pub(crate) fn fail(&mut self, problem: &str) {
         self.episode.error.get_or_insert_with(|| problem.to_owned());
     }
 
     /// The spec of another attempt, where an error is to be tried again.
-    pub fn again(&self, evaluation: &EvaluationPlan) -> Option<EpisodeSpec> {
+    pub(crate) fn again(&self, evaluation: &EvaluationPlan) -> Option<EpisodeSpec> {
         let tried = self.episode.attempts;
         let again = self.episode.error.is_some() && tried <= evaluation.options.retries;
         again.then_some(EpisodeSpec { attempts: tried, ..self.spec })
     }
 
     /// The record of what it came to.
-    pub fn close(mut self, evaluation: &EvaluationPlan) -> Episode {
+    pub(crate) fn close(mut self, evaluation: &EvaluationPlan) -> Episode {
         let episode = &mut self.episode;
         let own = &episode.trace[(episode.prefix_steps as usize).min(episode.trace.len())..];
         episode.steps = own.len() as u32;
@@ -101,25 +101,25 @@ pub(crate) struct Watchdog {
 #[derive(Debug)]
 pub(crate) struct WatchdogState {
     /// Slot by slot.
-    pub slots: Vec<Option<InFlight>>,
+    pub(crate) slots: Vec<Option<InFlight>>,
     /// Nobody waits for this worker any more: it must record nothing.
-    pub is_abandoned: bool,
+    pub(crate) is_abandoned: bool,
 }
 
 impl Watchdog {
     /// For a worker with empty slots.
-    pub fn new(slots: usize) -> Watchdog {
+    pub(crate) fn new(slots: usize) -> Watchdog {
         Watchdog { state: Mutex::new(WatchdogState { slots: vec![None; slots], is_abandoned: false }) }
     }
 
     /// What is under way now. A worker that panicked while it wrote leaves its last whole record.
-    pub fn lock(&self) -> MutexGuard<'_, WatchdogState> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, WatchdogState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes a worker's episodes away from it when one has taken so much longer than `limit` that the worker must hang within
     /// one step: between two steps it looks at the time itself.
-    pub fn abandon_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
+    pub(crate) fn abandon_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
         let patience = limit + (limit / 10).max(Duration::from_secs(1));
         let mut state = self.lock();
         if state.is_abandoned || !state.slots.iter().flatten().any(|in_flight| in_flight.began.elapsed() >= patience) {

@@ -20,7 +20,7 @@ use crate::run_dir::writer::RunWriter;
 ///
 /// # Errors
 /// When there are none, or the folder cannot be read.
-pub fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
+pub(crate) fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let folder = run.join(Shard::FOLDER);
     let entries = std::fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let mut found: Vec<PathBuf> =
@@ -34,7 +34,7 @@ pub fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// When a share is missing, there twice, not of the same run, or not complete; or when the folder holds another run.
-pub fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummary> {
+pub(crate) fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummary> {
     let mut runs = BTreeMap::new();
     for path in shares {
         let run = RecordedRun::open_evaluated(path)?;

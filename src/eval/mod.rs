@@ -2,15 +2,15 @@
 
 pub mod evaluation;
 pub mod executor;
-pub mod in_flight;
-pub mod merge;
+pub(crate) mod in_flight;
+pub(crate) mod merge;
 pub mod options;
-pub mod plan;
-pub mod progress_event;
-pub mod replay;
+pub(crate) mod plan;
+pub(crate) mod progress_event;
+pub(crate) mod replay;
 pub mod schemas;
 pub mod tasks;
 pub mod verify;
-pub mod work_queue;
+pub(crate) mod work_queue;
 pub mod worker;
-pub mod worker_pool;
+pub(crate) mod worker_pool;

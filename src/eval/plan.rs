@@ -9,7 +9,7 @@ use crate::episode::scenes::Scenes;
 /// Tasks that fit their scenes, and how they are played. Copies share tasks and scenes.
 #[derive(Clone)]
 pub(crate) struct EvaluationPlan {
-    pub tasks: Arc<[Task]>,
-    pub scenes: Arc<Scenes>,
-    pub options: Options,
+    pub(crate) tasks: Arc<[Task]>,
+    pub(crate) scenes: Arc<Scenes>,
+    pub(crate) options: Options,
 }

@@ -7,7 +7,7 @@ use super::evaluation::Progress;
 /// A line of standard error of `sprint eval --json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
-pub enum ProgressEvent {
+pub(crate) enum ProgressEvent {
     /// An episode is over.
     Progress {
         /// The counts so far.

@@ -23,86 +23,86 @@ use crate::house::{House, Outcome, Replay};
 
 /// Which demonstrations to replay, and what to compare beside their outcomes.
 #[derive(Clone, Debug, Default)]
-pub struct ReplayOptions {
+pub(crate) struct ReplayOptions {
     /// Only demonstrations of this split; of all without.
-    pub split: Option<String>,
+    pub(crate) split: Option<String>,
     /// Compare projected with recorded boxes.
-    pub boxes: bool,
+    pub(crate) boxes: bool,
     /// Ask whether an agent there would have seen and reached what was acted on.
-    pub sight: bool,
+    pub(crate) sight: bool,
 }
 
 /// What a replay came to. Shares are of trajectories, from 0 to 1.
 #[derive(Clone, Debug, Serialize)]
-pub struct ReplayReport {
+pub(crate) struct ReplayReport {
     /// How many demonstrations were replayed.
-    pub trajectories: usize,
+    pub(crate) trajectories: usize,
     /// Share whose every action is possible, sight and reach apart.
-    pub legal: f64,
+    pub(crate) legal: f64,
     /// Share in which everything acted on was in view and in reach then.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub seen: Option<f64>,
+    pub(crate) seen: Option<f64>,
     /// Share that meets ALFRED's goal at the end.
-    pub goals: f64,
+    pub(crate) goals: f64,
     /// Share that completes every skill, graded by class.
-    pub skills_class: f64,
+    pub(crate) skills_class: f64,
     /// Share that completes every skill, graded as the released code does.
-    pub skills_strict: f64,
+    pub(crate) skills_strict: f64,
     /// How many trajectories failed at each of these.
-    pub failures: BTreeMap<&'static str, usize>,
+    pub(crate) failures: BTreeMap<&'static str, usize>,
     /// The official task sets that the dataset holds, with the expert's recorded actions as the policy.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub task_sets: BTreeMap<String, SetReport>,
+    pub(crate) task_sets: BTreeMap<String, SetReport>,
     /// How well projected boxes fit the recorded ones, where that was asked.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub boxes: Option<BoxReport>,
+    pub(crate) boxes: Option<BoxReport>,
     /// Every failure: which, the trajectory, and why.
     #[serde(skip)]
-    pub failed: Vec<ReplayFailure>,
+    pub(crate) failed: Vec<ReplayFailure>,
 }
 
 /// A check that one demonstration, or task of an official set, did not pass.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct ReplayFailure {
+pub(crate) struct ReplayFailure {
     /// `legal`, `seen`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// The id of the trajectory or task.
-    pub id: String,
+    pub(crate) id: String,
     /// What the simulator found instead.
-    pub reason: String,
+    pub(crate) reason: String,
 }
 
 /// How many tasks of a set the expert's recorded actions complete.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct SetReport {
+pub(crate) struct SetReport {
     /// How many tasks the set has.
-    pub tasks: usize,
+    pub(crate) tasks: usize,
     /// How many are completed, graded by class.
-    pub class: usize,
+    pub(crate) class: usize,
     /// Completed, graded as the released code does.
-    pub strict: usize,
+    pub(crate) strict: usize,
 }
 
 /// How well the boxes of targets, as the simulator projects them, fit those that ALFRED recorded.
 #[derive(Clone, Debug, Serialize)]
-pub struct BoxReport {
+pub(crate) struct BoxReport {
     /// How many boxes were compared.
-    pub n: usize,
+    pub(crate) n: usize,
     /// Median intersection over union, first pickups of objects that nothing moved before.
-    pub pickup_median_iou: f64,
+    pub(crate) pickup_median_iou: f64,
     /// The same of receptacles that something is put into.
-    pub put_median_iou: f64,
+    pub(crate) put_median_iou: f64,
     /// By what was done and the target's class.
-    pub per_class: BTreeMap<String, ClassBoxes>,
+    pub(crate) per_class: BTreeMap<String, ClassBoxes>,
 }
 
 /// The same for one action and class.
 #[derive(Clone, Debug, Serialize)]
-pub struct ClassBoxes {
+pub(crate) struct ClassBoxes {
     /// How many boxes of it were compared.
-    pub n: usize,
+    pub(crate) n: usize,
     /// Median intersection over union of projected and recorded box.
-    pub median_iou: f64,
+    pub(crate) median_iou: f64,
 }
 
 /// What one trajectory came to.
@@ -116,7 +116,7 @@ struct Replayed {
 ///
 /// # Errors
 /// When a file of the dataset cannot be read or names a scene that is absent.
-pub fn replay(
+pub(crate) fn replay(
     dataset: &Dataset,
     options: &ReplayOptions,
     progress: &(dyn Fn(u64) + Sync),
@@ -291,7 +291,7 @@ fn compare(
 }
 
 /// Intersection over union of two boxes, given by left, top, right and bottom edges.
-pub fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
+pub(crate) fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
     let area = |[left, top, right, bottom]: [f32; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
     let shared = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
     let all = area(a) + area(b) - shared;

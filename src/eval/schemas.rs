@@ -11,7 +11,7 @@ use crate::report::summary::RunSummary;
 use crate::run_dir::manifest::RunManifest;
 
 /// The files and lines that have a schema, as `sprint schema` names them.
-pub const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
+pub(crate) const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
 
 /// The schema of that name.
 pub fn schema(name: &str) -> Option<Schema> {
@@ -39,7 +39,8 @@ mod tests {
     use crate::domain::{ActionType, Class, Instance};
     use crate::episode::record::{Author, TraceStep};
     use crate::eval::evaluation::Progress;
-    use crate::house::{Outcome, Reason};
+    use crate::house::Outcome;
+    use crate::house::outcome::Reason;
     use crate::report::compare::paired::tests::run;
     use crate::report::summary::tests::sample;
     use crate::run_dir::episodes::tests::episode;

@@ -32,43 +32,43 @@ use crate::run_dir::reader::RecordedRun;
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// Episodes that were played again.
-    pub episodes: usize,
+    pub(crate) episodes: usize,
     /// Steps that were the same.
-    pub steps: usize,
+    pub(crate) steps: usize,
     /// Of these, steps whose choice was made again too; the others were a person's, or a policy's that is not at hand.
-    pub choices: usize,
+    pub(crate) choices: usize,
     /// What differed, an entry an episode.
-    pub differences: Vec<Difference>,
+    pub(crate) differences: Vec<Difference>,
     /// Policies that were not at hand, so that only what their actions came to was compared.
-    pub missing: Vec<String>,
+    pub(crate) missing: Vec<String>,
     /// How many of the episodes were played as the tasks ask: from the start, in the task's own words.
-    pub plain: usize,
+    pub(crate) plain: usize,
     /// How many such episodes the run's summary tells of, where there is one.
-    pub summarised: Option<usize>,
+    pub(crate) summarised: Option<usize>,
 }
 
 impl Verdict {
     /// Whether everything came out the same, and nothing is gone.
-    pub fn is_equal(&self) -> bool {
+    pub(crate) fn is_equal(&self) -> bool {
         self.differences.is_empty() && self.summarised.is_none_or(|count| count == self.plain)
     }
 }
 
 /// The first difference of an episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Which episode of the run, from 1.
-    pub episode: usize,
+    pub(crate) episode: usize,
     /// Its task.
-    pub task: String,
+    pub(crate) task: String,
     /// At which step, from 1; 0 for the start or the whole.
-    pub step: u32,
+    pub(crate) step: u32,
     /// Of what.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// What the run says.
-    pub recorded: String,
+    pub(crate) recorded: String,
     /// What it is now.
-    pub found: String,
+    pub(crate) found: String,
 }
 
 /// How many episodes the summary of a run tells of, where there is one.
@@ -79,7 +79,7 @@ fn summarised(run: &Path) -> anyhow::Result<Option<usize>> {
 }
 
 /// Finds the policy of an author; `None` where it is not at hand.
-pub type FindPolicy<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<PolicySource>> + 'a;
+pub(crate) type FindPolicy<'a> = dyn FnMut(&Author) -> anyhow::Result<Option<PolicySource>> + 'a;
 
 /// Plays every episode of a run again: what an evaluation played by the very code that played it, many at once, so that it
 /// decides bit for bit as it did; what a person explored step by step. `progress` hears how many are done.
@@ -425,7 +425,9 @@ mod tests {
         };
         check(|episode| episode.start_hash = "00".into(), 0, "start");
         check(
-            |episode| episode.trace[3].outcome = crate::house::Outcome::Impossible(crate::house::Reason::Blocked),
+            |episode| {
+                episode.trace[3].outcome = crate::house::Outcome::Impossible(crate::house::outcome::Reason::Blocked)
+            },
             4,
             "outcome",
         );

@@ -17,7 +17,7 @@ pub(crate) struct WorkQueue {
 
 impl WorkQueue {
     /// By the slots of their places in the run.
-    pub fn new(wanted: &[EpisodeSpec], slots: usize) -> WorkQueue {
+    pub(crate) fn new(wanted: &[EpisodeSpec], slots: usize) -> WorkQueue {
         let mut by_slot = vec![Vec::new(); slots];
         for (at, spec) in wanted.iter().enumerate() {
             by_slot[spec.slot(slots)].push((at, *spec));
@@ -26,23 +26,23 @@ impl WorkQueue {
     }
 
     /// The next episode for a slot.
-    pub fn next(&self, slot: usize) -> Option<(usize, EpisodeSpec)> {
+    pub(crate) fn next(&self, slot: usize) -> Option<(usize, EpisodeSpec)> {
         let at = self.next[slot].fetch_add(1, Ordering::Relaxed);
         self.by_slot[slot].get(at).copied()
     }
 
     /// Has these played again with nobody beside them.
-    pub fn play_alone(&self, interrupted: impl Iterator<Item = (usize, EpisodeSpec)>) {
+    pub(crate) fn play_alone(&self, interrupted: impl Iterator<Item = (usize, EpisodeSpec)>) {
         self.alone.lock().unwrap_or_else(PoisonError::into_inner).extend(interrupted);
     }
 
     /// Whether somebody is to be played with nobody beside it.
-    pub fn someone_waits_alone(&self) -> bool {
+    pub(crate) fn someone_waits_alone(&self) -> bool {
         !self.alone.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
     }
 
     /// The next of those.
-    pub fn next_alone(&self) -> Option<(usize, EpisodeSpec)> {
+    pub(crate) fn next_alone(&self) -> Option<(usize, EpisodeSpec)> {
         self.alone.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
     }
 }

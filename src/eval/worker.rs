@@ -32,14 +32,14 @@ pub(crate) struct Worker {
 struct Abandoned;
 
 impl Worker {
-    pub fn new(executor: Arc<Executor>, watchdog: Arc<Watchdog>, policy: Option<Box<dyn Policy>>) -> Worker {
+    pub(crate) fn new(executor: Arc<Executor>, watchdog: Arc<Watchdog>, policy: Option<Box<dyn Policy>>) -> Worker {
         let slots = watchdog.lock().slots.len();
         let rollouts = (0..slots).map(|_| None).collect();
         Worker { executor, watchdog, policy, rollouts, is_alone: false }
     }
 
     /// Plays what is wanted until there is nothing left, or nobody waits for it any more.
-    pub fn serve(&mut self) {
+    pub(crate) fn serve(&mut self) {
         while let Ok(true) = self.round() {}
     }
 
@@ -203,9 +203,9 @@ fn start(executor: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyho
     let evaluation = &executor.evaluation;
     let task = &evaluation.tasks[spec.task];
     let setting = evaluation.scenes.setting(task)?;
-    episode.start_hash = setting.world.digest();
     let house = House::new(setting.scene, setting.world);
     let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));
+    episode.start_hash = env.fingerprint().unwrap_or_default();
     let mut rollout = Rollout::new(env, episode.instruction.clone(), Some(task.horizon));
     if spec.start_subtask > 0 {
         lead(&mut rollout, spec.start_subtask, episode)?;

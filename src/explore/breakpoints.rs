@@ -26,21 +26,21 @@ pub enum Condition {
 
 /// What conditions ask of a state.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Facts {
+pub(crate) struct Facts {
     /// How many steps led to it.
-    pub step: u32,
+    pub(crate) step: u32,
     /// Subtasks that are done.
-    pub completed: u32,
+    pub(crate) completed: u32,
     /// The last action was impossible.
-    pub failed: bool,
+    pub(crate) failed: bool,
     /// V, where there are critics.
-    pub value: Option<f32>,
+    pub(crate) value: Option<f32>,
     /// By how much the best choice leads the second.
-    pub gap: Option<f32>,
+    pub(crate) gap: Option<f32>,
     /// The entropy of the choice, in nats.
-    pub entropy: Option<f32>,
+    pub(crate) entropy: Option<f32>,
     /// The classes in view.
-    pub seen: Vec<Class>,
+    pub(crate) seen: Vec<Class>,
 }
 
 impl Condition {
@@ -48,7 +48,7 @@ impl Condition {
     ///
     /// # Errors
     /// Says what conditions there are.
-    pub fn parse(text: &str) -> Result<Condition, String> {
+    pub(crate) fn parse(text: &str) -> Result<Condition, String> {
         let (word, rest) = text.trim().split_once(' ').map_or((text.trim(), ""), |(word, rest)| (word, rest.trim()));
         let number =
             || rest.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or(format!("{word}: {rest:?} is not a number"));
@@ -72,7 +72,7 @@ impl Condition {
     }
 
     /// Whether a run stops at `now`, one step after `before`; why, in words.
-    pub fn hit(self, before: &Facts, now: &Facts) -> Option<String> {
+    pub(crate) fn hit(self, before: &Facts, now: &Facts) -> Option<String> {
         let meets = match self {
             Condition::Subtask => now.completed > before.completed,
             Condition::Failed => now.failed,
@@ -106,7 +106,7 @@ impl fmt::Display for Condition {
 }
 
 /// By how much the best choice leads the second: in Q where there are critics, else in probability.
-pub fn gap(distribution: Option<&ActionDistribution>, values: Option<&Values>) -> Option<f32> {
+pub(crate) fn gap(distribution: Option<&ActionDistribution>, values: Option<&Values>) -> Option<f32> {
     let mut found: Vec<f32> = match (values, distribution) {
         (Some(values), _) => values.choices.iter().map(|choice| choice.q).collect(),
         (None, Some(distribution)) => distribution.actions.iter().flatten().copied().collect(),

@@ -10,24 +10,24 @@ use crate::analysis::chain::{Chain, ChainRun, Draws, LinkSuccess, trials};
 #[derive(Clone, Debug, Default)]
 pub struct ChainReport {
     /// Who follows it.
-    pub who: PolicyIdentity,
+    pub(crate) who: PolicyIdentity,
     /// The instructions, in the order in which they are followed.
-    pub links: Vec<String>,
+    pub(crate) links: Vec<String>,
     /// The digest of the state in which it begins.
-    pub start: String,
+    pub(crate) start: String,
     /// Subtasks of a task grade them.
-    pub graded: bool,
+    pub(crate) graded: bool,
     /// Told link by link.
-    pub by_link: Option<ChainRun>,
+    pub(crate) by_link: Option<ChainRun>,
     /// Told all at once.
-    pub as_one: Option<ChainRun>,
+    pub(crate) as_one: Option<ChainRun>,
     /// How often each link was done from both entries.
-    pub trials: Option<LinkSuccess>,
+    pub(crate) trials: Option<LinkSuccess>,
 }
 
 impl ChainReport {
     /// Nothing is known yet.
-    pub fn new(chain: &Chain, who: PolicyIdentity) -> ChainReport {
+    pub(crate) fn new(chain: &Chain, who: PolicyIdentity) -> ChainReport {
         ChainReport {
             who,
             links: chain.links.clone(),
@@ -38,7 +38,7 @@ impl ChainReport {
     }
 
     /// Whether both are about the same instructions from the same state.
-    pub fn is_same_chain(&self, other: &ChainReport) -> bool {
+    pub(crate) fn is_same_chain(&self, other: &ChainReport) -> bool {
         self.links == other.links && self.start == other.start
     }
 
@@ -47,7 +47,7 @@ impl ChainReport {
     ///
     /// # Errors
     /// Whatever the policy reports.
-    pub fn fill_in(
+    pub(crate) fn fill_in(
         mut self,
         chain: &Chain,
         policy: &mut dyn Policy,

@@ -6,26 +6,26 @@ use crate::domain::{Action, ActionType, Class};
 
 /// A thing that could be done now.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
+pub(crate) struct Choice {
     /// The action.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// The class whose nearest instance it is done to.
-    pub class: Option<Class>,
+    pub(crate) class: Option<Class>,
     /// How likely the policy is to do it.
-    pub probability: Option<f32>,
+    pub(crate) probability: Option<f32>,
     /// The smaller of the critics' Q.
-    pub q: Option<f32>,
+    pub(crate) q: Option<f32>,
     /// How much better than the state's value that is.
-    pub advantage: Option<f32>,
+    pub(crate) advantage: Option<f32>,
     /// It is what the policy chose.
-    pub chosen: bool,
+    pub(crate) chosen: bool,
     /// It is what the policy would take without chance.
-    pub greedy: bool,
+    pub(crate) greedy: bool,
 }
 
 /// By what the table is sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sort {
+pub(crate) enum Sort {
     /// The likeliest first.
     Probability,
     /// The best first.
@@ -36,7 +36,7 @@ pub enum Sort {
 
 impl Sort {
     /// The next way, around.
-    pub fn next(self) -> Sort {
+    pub(crate) fn next(self) -> Sort {
         match self {
             Sort::Probability => Sort::Q,
             Sort::Q => Sort::Action,
@@ -45,7 +45,7 @@ impl Sort {
     }
 
     /// In a word.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Sort::Probability => "probability",
             Sort::Q => "Q",
@@ -55,7 +55,7 @@ impl Sort {
 }
 
 /// Every legal action, interactions once for each class that is a candidate.
-pub fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
+pub(crate) fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
     let class_of = |action: Action| action.target.and_then(|target| now.world.class_of(&now.scene, target));
     let distribution = decision.distribution.as_ref();
     let joint = match distribution {

@@ -16,22 +16,22 @@ use crate::house::{House, generate};
 
 /// An episode's start.
 #[derive(Clone, Debug)]
-pub struct EpisodeStart {
+pub(crate) struct EpisodeStart {
     /// The floor plan.
-    pub scene: Arc<Scene>,
+    pub(crate) scene: Arc<Scene>,
     /// The state at the start.
-    pub world: World,
+    pub(crate) world: World,
     /// How tasks refer to the floor plan.
-    pub reference: SceneRef,
+    pub(crate) reference: SceneRef,
     /// What is asked.
-    pub task: Option<Task>,
+    pub(crate) task: Option<Task>,
     /// The episode ends at the task's horizon.
-    pub limited: bool,
+    pub(crate) limited: bool,
 }
 
 impl EpisodeStart {
     /// The episode at its first step, told the task's words.
-    pub fn rollout(&self) -> Rollout {
+    pub(crate) fn rollout(&self) -> Rollout {
         let house = House::new(self.scene.clone(), self.world.clone());
         match &self.task {
             // What a person made up is not graded.
@@ -82,12 +82,12 @@ impl EpisodeSource {
     }
 
     /// The seed of the present episode.
-    pub fn seed(&self) -> u64 {
+    pub(crate) fn seed(&self) -> u64 {
         self.seed
     }
 
     /// To the next episode: the next seed, or the next task.
-    pub fn advance(&mut self) {
+    pub(crate) fn advance(&mut self) {
         match &mut self.origin {
             EpisodeOrigin::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
             EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
@@ -95,7 +95,7 @@ impl EpisodeSource {
     }
 
     /// To the episode of that seed; for a task set, to the task of that number.
-    pub fn seek(&mut self, seed: u64) {
+    pub(crate) fn seek(&mut self, seed: u64) {
         match &mut self.origin {
             EpisodeOrigin::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
             EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = seed,
@@ -106,7 +106,7 @@ impl EpisodeSource {
     ///
     /// # Errors
     /// When a scene or task cannot be opened.
-    pub fn open(&self) -> anyhow::Result<EpisodeStart> {
+    pub(crate) fn open(&self) -> anyhow::Result<EpisodeStart> {
         match &self.origin {
             EpisodeOrigin::Generated(room) => {
                 let (scene, world) = generate::house(*room, self.seed);

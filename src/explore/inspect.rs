@@ -7,28 +7,28 @@ use crate::house::{rules, view};
 
 /// A thing, as the inspector shows it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thing {
+pub(crate) struct Thing {
     /// Which fixture or object of the house.
-    pub instance: Instance,
+    pub(crate) instance: Instance,
     /// The class that the agent knows it by.
-    pub class: Class,
+    pub(crate) class: Class,
     /// Its state in words: open, on, clean, ...
-    pub state: String,
+    pub(crate) state: String,
     /// What holds it.
-    pub place: String,
+    pub(crate) place: String,
     /// How far away it is, in metres, horizontally.
-    pub metres: f32,
+    pub(crate) metres: f32,
     /// It is in view.
-    pub seen: bool,
+    pub(crate) seen: bool,
     /// What could be done to it now.
-    pub possible: Vec<ActionType>,
+    pub(crate) possible: Vec<ActionType>,
     /// For every other interaction that its class knows, why not.
-    pub impossible: Vec<(ActionType, String)>,
+    pub(crate) impossible: Vec<(ActionType, String)>,
 }
 
 impl Thing {
     /// The verdict in a few words.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         if !self.possible.is_empty() {
             return self.possible.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
         }
@@ -40,7 +40,7 @@ impl Thing {
 }
 
 /// Everything in the house: what can be acted on first, then what is in view, the nearest first.
-pub fn things(now: &Snapshot) -> Vec<Thing> {
+pub(crate) fn things(now: &Snapshot) -> Vec<Thing> {
     let fixtures = (0..now.scene.fixtures.len() as u16).map(Instance::Fixture);
     let objects = (0..now.world.objects.len() as u16).map(Instance::Object);
     let mut found: Vec<Thing> = fixtures.chain(objects).filter_map(|instance| thing(now, instance)).collect();
@@ -91,7 +91,7 @@ fn applies(kind: ActionType, class: Class, now: &Snapshot) -> bool {
 }
 
 /// The state of a thing in words, where it differs from the usual.
-pub fn state(now: &Snapshot, instance: Instance) -> String {
+pub(crate) fn state(now: &Snapshot, instance: Instance) -> String {
     let mut words = Vec::new();
     if now.world.is_open(instance) {
         words.push("open");
@@ -131,7 +131,7 @@ fn place(scene: &Scene, world: &World, instance: Instance) -> String {
 }
 
 /// Where the agent stands and looks, and what it holds.
-pub fn stands(scene: &Scene, world: &World) -> String {
+pub(crate) fn stands(scene: &Scene, world: &World) -> String {
     let pose = world.agent;
     let held = world.held.and_then(|held| world.class_of(scene, Instance::Object(held)));
     let hand = held.map_or("the hand is empty".to_string(), |class| format!("holds the {}", class.spoken()));
@@ -139,7 +139,7 @@ pub fn stands(scene: &Scene, world: &World) -> String {
 }
 
 /// What is different in another state of the same house, the agent's place aside.
-pub fn changes(scene: &Scene, before: &World, after: &World) -> Vec<String> {
+pub(crate) fn changes(scene: &Scene, before: &World, after: &World) -> Vec<String> {
     let fixtures = (0..scene.fixtures.len() as u16).map(Instance::Fixture);
     let objects = (0..after.objects.len() as u16).map(Instance::Object);
     let mut found = Vec::new();

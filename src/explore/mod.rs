@@ -1,17 +1,17 @@
 //! The explorer without a screen: a [`session::Session`] takes commands and tells events; the plain mode writes them as lines,
 //! and `tui` draws them.
 
-pub mod breakpoints;
-pub mod chain_report;
-pub mod choices;
+pub(crate) mod breakpoints;
+pub(crate) mod chain_report;
+pub(crate) mod choices;
 pub mod episode_source;
 pub mod exploration;
-pub mod inspect;
-pub mod plain;
+pub(crate) mod inspect;
+pub(crate) mod plain;
 pub mod session;
-pub mod session_export;
-pub mod side_by_side;
-pub mod timeline;
-pub mod verb;
+pub(crate) mod session_export;
+pub(crate) mod side_by_side;
+pub(crate) mod timeline;
+pub(crate) mod verb;
 #[cfg(test)]
-pub mod testing;
+pub(crate) mod testing;

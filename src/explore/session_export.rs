@@ -24,13 +24,13 @@ use crate::run_dir::writer::RunWriter;
 
 /// The tasks and episodes of an exploration, a branch each.
 #[derive(Clone, Debug)]
-pub struct SessionExport {
+pub(crate) struct SessionExport {
     /// Where it was.
-    pub scene: Arc<Scene>,
+    pub(crate) scene: Arc<Scene>,
     /// What was asked at the start, under each branch's name.
-    pub tasks: Vec<Task>,
+    pub(crate) tasks: Vec<Task>,
     /// What was done.
-    pub episodes: Vec<Episode>,
+    pub(crate) episodes: Vec<Episode>,
 }
 
 /// The folder with its scenes, where they come from a dataset.
@@ -42,7 +42,7 @@ const MOST: u32 = 1000;
 ///
 /// # Errors
 /// When the folder holds something else, or cannot be written to.
-pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
+pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
     ensure!(!path.join(MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let set = TaskSet {
@@ -84,7 +84,7 @@ pub fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
 }
 
 /// A task without subtasks: nobody grades what a person made up.
-pub fn ungraded(scene: SceneRef) -> Task {
+pub(crate) fn ungraded(scene: SceneRef) -> Task {
     Task {
         id: String::new(),
         scene,
@@ -105,7 +105,7 @@ pub fn ungraded(scene: SceneRef) -> Task {
 ///
 /// # Errors
 /// When nobody grades it, nothing is left, or the expert cannot do it.
-pub fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
+pub(crate) fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
     let grader = rollout.env.grader.as_ref().context("nobody grades this instruction, so it cannot be a task")?;
     let done = grader.completed();
     let subtasks = grader.subtasks().get(done..).unwrap_or_default().to_vec();
@@ -142,7 +142,7 @@ fn expert_steps(task: &Task, scene: &Arc<Scene>) -> anyhow::Result<u32> {
 ///
 /// # Errors
 /// When the file is no task file, or cannot be written.
-pub fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(String, usize)> {
+pub(crate) fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(String, usize)> {
     let mut set = if path.exists() {
         taskset::read(path)?.value
     } else {

@@ -6,7 +6,7 @@ use crate::house::view::Frame;
 const GAP: usize = 15;
 
 /// Two frames of one size with a dark gap between them.
-pub fn beside(left: &Frame, right: &Frame) -> Frame {
+pub(crate) fn beside(left: &Frame, right: &Frame) -> Frame {
     let (height, gap) = (left.height.min(right.height), left.width / GAP);
     let width = left.width + gap + right.width;
     let mut both = Frame {

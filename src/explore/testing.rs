@@ -15,7 +15,7 @@ use crate::house::testing::{kitchen, named};
 use crate::house::view::{Candidate, Frame, Sighting, View, code};
 
 /// An exploration in the kitchen with the task to put a mug into the sink.
-pub fn exploration() -> Exploration {
+pub(crate) fn exploration() -> Exploration {
     let (scene, world) = kitchen();
     let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
     let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };
@@ -43,7 +43,7 @@ pub fn exploration() -> Exploration {
 }
 
 /// The exploration's state with a made-up frame: a mug on a table before a wall.
-pub fn snapshot(exploration: &mut Exploration) -> Snapshot {
+pub(crate) fn snapshot(exploration: &mut Exploration) -> Snapshot {
     let mut now = exploration.snapshot();
     let (scene, world) = (&now.scene, &now.world);
     let seen = ["DiningTable", "Mug", "Plate", "Fridge"].map(|name| named(scene, world, name));
@@ -89,7 +89,7 @@ pub fn snapshot(exploration: &mut Exploration) -> Snapshot {
 }
 
 /// What a policy might think of that.
-pub fn decided(now: &Snapshot) -> SessionEvent {
+pub(crate) fn decided(now: &Snapshot) -> SessionEvent {
     let mut actions = [None; ActionType::COUNT];
     let shares = [(0, 0.08), (1, 0.02), (2, 0.12), (3, 0.01), (4, 0.06), (5, 0.66), (7, 0.05)];
     for (at, p) in shares {
@@ -118,7 +118,7 @@ pub fn decided(now: &Snapshot) -> SessionEvent {
 }
 
 /// What critics might say of it.
-pub fn values(now: &Snapshot) -> Values {
+pub(crate) fn values(now: &Snapshot) -> Values {
     let kinds = [(ActionType::MoveAhead, 0.44), (ActionType::RotateLeft, 0.31), (ActionType::RotateRight, 0.47)];
     let navigation = kinds.into_iter().map(|(kind, q)| ChoiceValue { kind, class: None, q });
     let interactions = now.candidates.iter().zip([0.71, 0.28, -0.02]);

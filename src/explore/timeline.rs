@@ -8,57 +8,57 @@ use crate::house::view::Frame;
 
 /// What was tried, for the screen.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Timeline {
+pub(crate) struct Timeline {
     /// The step in hand.
-    pub at: u32,
+    pub(crate) at: u32,
     /// The steps of the branch in hand.
-    pub steps: Vec<TimelineStep>,
+    pub(crate) steps: Vec<TimelineStep>,
     /// Other branches leave it at the start.
-    pub forks_at_start: bool,
+    pub(crate) forks_at_start: bool,
     /// All branches, in the order in which they began.
-    pub branches: Vec<BranchSummary>,
+    pub(crate) branches: Vec<BranchSummary>,
     /// The number of the one in hand.
-    pub branch: usize,
+    pub(crate) branch: usize,
 }
 
 /// A step on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimelineStep {
+pub(crate) struct TimelineStep {
     /// What was done.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// It could be done.
-    pub done: bool,
+    pub(crate) done: bool,
     /// The subtask that it completed, from 1.
-    pub completed: Option<u32>,
+    pub(crate) completed: Option<u32>,
     /// A person chose it.
-    pub by_hand: bool,
+    pub(crate) by_hand: bool,
     /// The agent was told something else before it.
-    pub instructed: bool,
+    pub(crate) instructed: bool,
     /// Other branches leave after it.
-    pub forks: bool,
+    pub(crate) forks: bool,
     /// The entropy of the choice, in nats.
-    pub entropy: Option<f32>,
+    pub(crate) entropy: Option<f32>,
     /// The probability of what was chosen.
-    pub chosen: Option<f32>,
+    pub(crate) chosen: Option<f32>,
     /// V of the state before it.
-    pub value: Option<f32>,
+    pub(crate) value: Option<f32>,
     /// Q of what was chosen.
-    pub q: Option<f32>,
+    pub(crate) q: Option<f32>,
 }
 
 /// A branch in the list of branches.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BranchSummary {
+pub(crate) struct BranchSummary {
     /// As a person or the session named it.
-    pub name: String,
+    pub(crate) name: String,
     /// Why it began.
-    pub why: String,
+    pub(crate) why: String,
     /// The branch that it left, and after which step.
-    pub left: Option<(usize, u32)>,
+    pub(crate) left: Option<(usize, u32)>,
     /// Its last step.
-    pub last: u32,
+    pub(crate) last: u32,
     /// Subtasks that were completed on it.
-    pub completed: u32,
+    pub(crate) completed: u32,
 }
 
 impl TimelineStep {
@@ -80,14 +80,14 @@ impl TimelineStep {
     }
 
     /// Something to jump to.
-    pub fn is_event(&self) -> bool {
+    pub(crate) fn is_event(&self) -> bool {
         self.completed.is_some() || !self.done || self.instructed || self.forks
     }
 }
 
 impl Timeline {
     /// The branch in hand of a tree.
-    pub fn of(tree: &Tree) -> Timeline {
+    pub(crate) fn of(tree: &Tree) -> Timeline {
         let steps: Vec<&TakenStep> = tree.steps().collect();
         let mut forks = tree.forks();
         let forks_at_start = forks.next().unwrap_or(false);
@@ -111,7 +111,7 @@ impl Timeline {
     }
 
     /// The next event after the step in hand (or, backwards, the last before it); the end of the branch without any.
-    pub fn event(&self, forward: bool) -> u32 {
+    pub(crate) fn event(&self, forward: bool) -> u32 {
         let last = self.steps.len() as u32;
         let mut events = (1..=last).zip(&self.steps).filter(|(_, step)| step.is_event()).map(|(step, _)| step);
         match forward {
@@ -121,7 +121,7 @@ impl Timeline {
     }
 
     /// The step that completed a subtask, from 1.
-    pub fn subtask(&self, number: u32) -> Option<u32> {
+    pub(crate) fn subtask(&self, number: u32) -> Option<u32> {
         (1..).zip(&self.steps).find(|(_, step)| step.completed == Some(number)).map(|(step, _)| step)
     }
 }
@@ -130,18 +130,18 @@ impl Timeline {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BranchPosition {
     /// The step in hand.
-    pub step: u32,
+    pub(crate) step: u32,
     /// The last step of the branch.
-    pub of: u32,
+    pub(crate) of: u32,
     /// The branch's name.
-    pub branch: String,
+    pub(crate) branch: String,
     /// What led here, in words; nothing at the start.
-    pub last_step: Option<String>,
+    pub(crate) last_step: Option<String>,
 }
 
 impl BranchPosition {
     /// The place in hand of a tree.
-    pub fn of(tree: &Tree) -> BranchPosition {
+    pub(crate) fn of(tree: &Tree) -> BranchPosition {
         let branch = tree.branches().get(tree.branch()).map_or_else(String::new, |branch| branch.name.clone());
         BranchPosition { step: tree.at(), of: tree.last(), branch, last_step: tree.last_taken().map(words) }
     }
@@ -151,29 +151,29 @@ impl BranchPosition {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Divergence {
     /// The names of the branch in hand and the other one.
-    pub names: [String; 2],
+    pub(crate) names: [String; 2],
     /// How many steps they share.
-    pub shared: u32,
+    pub(crate) shared: u32,
     /// The steps after that, side by side.
-    pub rows: Vec<DivergenceRow>,
+    pub(crate) rows: Vec<DivergenceRow>,
     /// What the agent saw on both, side by side in one picture, at the steps that are named.
-    pub frames: Option<(Arc<Frame>, [u32; 2])>,
+    pub(crate) frames: Option<(Arc<Frame>, [u32; 2])>,
 }
 
 /// A step of two branches that have parted.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DivergenceRow {
+pub(crate) struct DivergenceRow {
     /// Counted from 1.
-    pub step: u32,
+    pub(crate) step: u32,
     /// What each did, in words; nothing where it is over.
-    pub sides: [Option<String>; 2],
+    pub(crate) sides: [Option<String>; 2],
     /// The world was the same after it.
-    pub same: bool,
+    pub(crate) same: bool,
 }
 
 impl Divergence {
     /// How `one` and `other` part.
-    pub fn of(tree: &Tree, one: usize, other: usize) -> Divergence {
+    pub(crate) fn of(tree: &Tree, one: usize, other: usize) -> Divergence {
         let stories = [tree.story(one), tree.story(other)];
         let name = |at: usize| tree.branches().get(at).map_or_else(String::new, |branch| branch.name.clone());
         let shared = tree.shared(one, other);
@@ -189,7 +189,7 @@ impl Divergence {
 }
 
 /// A step in words.
-pub fn words(taken: &TakenStep) -> String {
+pub(crate) fn words(taken: &TakenStep) -> String {
     let class = taken.step.class.map_or(String::new(), |class| format!(" {}", class.name()));
     let hand = if taken.author.is_hand() { " (you)" } else { "" };
     let done = taken.step.subtask.map_or(String::new(), |subtask| format!(" · subtask {} done", subtask + 1));

@@ -13,7 +13,7 @@ use crate::domain::{Point, Scene};
 /// The bounds of an instance's measured shape in a 300 x 300 image: left, top, right, bottom edges in pixels, clipped to the
 /// image. Nothing hides anything. `None` when it is out of view or does not exist. For a fixture the shape is its body and its
 /// surfaces; an open drawer is where it slid to, an open door counts.
-pub fn projected_bounds(scene: &Scene, world: &World, pose: Pose, instance: Instance) -> Option<[f32; 4]> {
+pub(crate) fn projected_bounds(scene: &Scene, world: &World, pose: Pose, instance: Instance) -> Option<[f32; 4]> {
     let camera = Camera::of(scene, pose);
     let mut bounds = Bounds::default();
     match instance {
@@ -47,7 +47,7 @@ pub fn projected_bounds(scene: &Scene, world: &World, pose: Pose, instance: Inst
 
 /// The smallest rectangle around what was added to it, in pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     min: [f32; 2],
     max: [f32; 2],
 }
@@ -60,14 +60,14 @@ impl Default for Bounds {
 
 impl Bounds {
     /// Left, top, right, bottom; `None` when nothing in view was added.
-    pub fn edges(&self) -> Option<[f32; 4]> {
+    pub(crate) fn edges(&self) -> Option<[f32; 4]> {
         let inside = |edge: f32| edge.clamp(0.0, Camera::IMAGE);
         let edges = [inside(self.min[0]), inside(self.min[1]), inside(self.max[0]), inside(self.max[1])];
         (self.min[0] <= self.max[0] && edges[0] <= edges[2] && edges[1] <= edges[3]).then_some(edges)
     }
 
     /// Adds what is seen of a body.
-    pub fn add(&mut self, camera: &Camera, extent: &Extent) {
+    pub(crate) fn add(&mut self, camera: &Camera, extent: &Extent) {
         let (centre, axes) = (camera.local(extent.centre), camera.turn() * extent.axes);
         if extent.shape == Shape::Ellipsoid
             && let Some([left, top, right, bottom]) = ellipse(centre, &axes)
@@ -97,7 +97,7 @@ impl Bounds {
 
 /// The bounds of an ellipsoid's outline in the image, unclipped: the four planes through the eye that touch it. `None` unless
 /// all of it is in front of the eye. `centre` and `axes` are in the camera's frame.
-pub fn ellipse(centre: Vec3, axes: &Mat3) -> Option<[f32; 4]> {
+pub(crate) fn ellipse(centre: Vec3, axes: &Mat3) -> Option<[f32; 4]> {
     // A plane n.p = 0 touches when (n.c)^2 = n.M.n with M = A A^T; for n = (1, 0, -k) that is a quadratic in the slope k.
     let spread = *axes * axes.transpose();
     let ahead = centre.z * centre.z - spread.z_axis.z;

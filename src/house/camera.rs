@@ -7,7 +7,7 @@ use crate::domain::{Point, Scene};
 
 /// Where the agent's eye is and looks, ready to project points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
+pub(crate) struct Camera {
     /// The eye, in metres.
     eye: Vec3,
     /// Rows: right, up, forward; takes a direction of the scene into the camera's frame.
@@ -16,14 +16,14 @@ pub struct Camera {
 
 impl Camera {
     /// The side of the image that pixels refer to.
-    pub const IMAGE: f32 = 300.0;
+    pub(crate) const IMAGE: f32 = 300.0;
     /// Nothing nearer than this, along the optical axis and in metres, is seen.
-    pub const NEAR: f32 = 0.05;
+    pub(crate) const NEAR: f32 = 0.05;
     /// Half the image's width over the focal length: the tangent of 30 degrees.
-    pub const SLOPE: f32 = 0.577_350_27;
+    pub(crate) const SLOPE: f32 = 0.577_350_27;
 
     /// The camera of an agent at `pose`.
-    pub fn of(scene: &Scene, pose: Pose) -> Camera {
+    pub(crate) fn of(scene: &Scene, pose: Pose) -> Camera {
         let Point { x, z, .. } = pose.cell.centre(0);
         // Quarter turns have exact sines, so that the four headings see bit-equal geometry.
         let (sin, cos) = match pose.heading {
@@ -43,22 +43,22 @@ impl Camera {
     }
 
     /// The eye, in metres.
-    pub fn eye(&self) -> Vec3 {
+    pub(crate) fn eye(&self) -> Vec3 {
         self.eye
     }
 
     /// Takes a direction of the scene into the camera's frame: right, up, forward.
-    pub fn turn(&self) -> Mat3 {
+    pub(crate) fn turn(&self) -> Mat3 {
         self.turn
     }
 
     /// A point (metres) in the camera's frame: right, up, forward, in metres.
-    pub fn local(&self, point: Vec3) -> Vec3 {
+    pub(crate) fn local(&self, point: Vec3) -> Vec3 {
         self.turn * (point - self.eye)
     }
 
     /// A point of the camera's frame in the image: column, row and depth. Meaningless at depth 0.
-    pub fn image(local: Vec3) -> Vec3 {
+    pub(crate) fn image(local: Vec3) -> Vec3 {
         let half = Camera::IMAGE / 2.0;
         let scale = half / (Camera::SLOPE * local.z);
         Vec3::new(half + scale * local.x, half - scale * local.y, local.z)
@@ -66,7 +66,7 @@ impl Camera {
 
     /// Where a point (metres) is seen: column and row in pixels of a 300 x 300 image, and its depth along the optical axis
     /// in metres. `None` behind the camera; a point in front may lie outside the image.
-    pub fn project(&self, point: Vec3) -> Option<Vec3> {
+    pub(crate) fn project(&self, point: Vec3) -> Option<Vec3> {
         let local = self.local(point);
         (local.z > Camera::NEAR).then(|| Camera::image(local))
     }

@@ -14,7 +14,7 @@ const THICK: f32 = 0.03;
 const BEYOND: [f32; 2] = [0.342_020_15, 0.939_692_6];
 
 /// A piece of furniture's own directions as somebody sees it who stands before it: to the right, up, and to the back.
-pub fn front(facing: Heading) -> Mat3 {
+pub(crate) fn front(facing: Heading) -> Mat3 {
     let along = |heading: Heading| {
         let (x, z) = heading.step();
         Vec3::new(f32::from(x), 0.0, f32::from(z))
@@ -24,7 +24,7 @@ pub fn front(facing: Heading) -> Mat3 {
 }
 
 /// Half of a box's width, height and depth along the directions of [`front`].
-pub fn half_sides(facing: Heading, cuboid: &Cuboid) -> Vec3 {
+pub(crate) fn half_sides(facing: Heading, cuboid: &Cuboid) -> Vec3 {
     let half = (cuboid.max.metres() - cuboid.min.metres()) / 2.0;
     match facing {
         Heading::North | Heading::South => half,
@@ -34,7 +34,7 @@ pub fn half_sides(facing: Heading, cuboid: &Cuboid) -> Vec3 {
 
 /// The open door of a fixture, hinged at its left edge. Its own x axis runs along the panel, its z axis out of the panel's
 /// face. `None` for what has no door.
-pub fn open_door(fixture: &Fixture) -> Option<Extent> {
+pub(crate) fn open_door(fixture: &Fixture) -> Option<Extent> {
     if !fixture.class.info().door {
         return None;
     }
@@ -53,7 +53,7 @@ pub fn open_door(fixture: &Fixture) -> Option<Extent> {
 }
 
 /// The open lid of a laptop, standing at its back edge. `None` for objects without one, or closed.
-pub fn open_lid(scene: &Scene, object: &Object) -> Option<Extent> {
+pub(crate) fn open_lid(scene: &Scene, object: &Object) -> Option<Extent> {
     if !object.open || !object.class.info().lid {
         return None;
     }

@@ -9,24 +9,24 @@ use crate::domain::{Point, Scene};
 
 /// A box or the round body inscribed in it, anywhere in space. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
+pub(crate) struct Extent {
     /// Which body.
-    pub shape: Shape,
+    pub(crate) shape: Shape,
     /// Its middle.
-    pub centre: Vec3,
+    pub(crate) centre: Vec3,
     /// Columns: from the middle to the middle of the faces towards its own x, y and z.
-    pub axes: Mat3,
+    pub(crate) axes: Mat3,
 }
 
 impl Extent {
     /// An axis-aligned box.
-    pub fn of_cuboid(cuboid: &Cuboid) -> Extent {
+    pub(crate) fn of_cuboid(cuboid: &Cuboid) -> Extent {
         let (min, max) = (cuboid.min.metres(), cuboid.max.metres());
         Extent { shape: Shape::Box, centre: (min + max) / 2.0, axes: Mat3::from_diagonal((max - min) / 2.0) }
     }
 
     /// The measured shape of a movable object, where and as it lies.
-    pub fn of_object(scene: &Scene, object: &Object) -> Extent {
+    pub(crate) fn of_object(scene: &Scene, object: &Object) -> Extent {
         let (shape, size, offset) = object.shape_in(scene);
         let turn = rotation(object.turn);
         let half = Point::from(size).metres() / 2.0;
@@ -39,7 +39,7 @@ impl Extent {
 }
 
 /// The rotation that an object's `turn` stands for: about z first, then x, then y.
-pub fn rotation(turn: [i16; 3]) -> Mat3 {
+pub(crate) fn rotation(turn: [i16; 3]) -> Mat3 {
     let [x, y, z] = turn.map(|tenths| (f32::from(tenths) / 10.0).to_radians());
     Mat3::from_rotation_y(y) * Mat3::from_rotation_x(x) * Mat3::from_rotation_z(z)
 }

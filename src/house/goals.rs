@@ -5,7 +5,7 @@ use crate::domain::world::{Instance, Object};
 use crate::domain::{Class, Scene, World};
 
 /// Whether the goal of a whole trajectory is met in this world.
-pub fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
+pub(crate) fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
     let is_in = |content: u16, holder: Instance| world.is_in(Instance::Object(content), holder);
     let placed = |content: u16| receptacles(goal.receptacle, scene, world).any(|holder| is_in(content, holder));
     let mut targets = objects(goal, world);

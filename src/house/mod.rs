@@ -1,25 +1,25 @@
 //! House: the simulator. Rules, what is seen, graders, the expert, and generated floor plans.
 
-pub mod bounds;
-pub mod camera;
-pub mod doors;
+pub(crate) mod bounds;
+pub(crate) mod camera;
+pub(crate) mod doors;
 pub mod expert;
-pub mod extent;
+pub(crate) mod extent;
 pub mod generate;
-pub mod goals;
+pub(crate) mod goals;
 pub mod grading;
-pub mod occlusion;
-pub mod outcome;
-pub mod placing;
+pub(crate) mod occlusion;
+pub(crate) mod outcome;
+pub(crate) mod placing;
 pub mod render;
-pub mod replay;
+pub(crate) mod replay;
 pub mod rules;
 pub mod session;
 #[cfg(test)]
-pub mod testing;
+pub(crate) mod testing;
 pub mod validate;
 pub mod view;
 
-pub use outcome::{Outcome, Reason};
-pub use replay::Replay;
+pub(crate) use outcome::Outcome;
+pub(crate) use replay::Replay;
 pub use session::House;

@@ -7,7 +7,7 @@ use crate::domain::{Fixture, Point};
 const EDGE: i32 = 25;
 
 /// Whether the eye sees past the receptacle's own boards (shelves, top) or over its own rim to the point.
-pub fn in_sight(fixture: &Fixture, eye: Point, point: Point) -> bool {
+pub(crate) fn in_sight(fixture: &Fixture, eye: Point, point: Point) -> bool {
     let Some(body) = fixture.body.first() else { return true };
     let class = fixture.class.info();
     if class.open_top {

@@ -8,10 +8,10 @@ use crate::domain::{Fixture, Point, Scene};
 /// The raster of points that are tried, in millimetres.
 const RASTER: i32 = 50;
 /// How far a drawer's contents slide out with it, in millimetres (the median of recorded pickups).
-pub const DRAWER_TRAVEL: i32 = 170;
+pub(crate) const DRAWER_TRAVEL: i32 = 170;
 
 /// The outline that an object covers on the floor plan when its pivot is at `at`, turned by whole quarter turns.
-pub fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
+pub(crate) fn outline(scene: &Scene, object: &Object, at: Point) -> Rect {
     let (_, size, offset) = object.shape_in(scene);
     let yaw = i32::from(object.turn[1]);
     let (width, depth) = if (yaw + 450).rem_euclid(1800) >= 900 { (size[2], size[0]) } else { (size[0], size[2]) };
@@ -36,7 +36,7 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 /// away from them, and before all a point that no shelf and no rim hides from the agent; in a garbage can at last on top of the
 /// rest. In a movable receptacle: at its pivot, moved aside for each thing that already lies
 /// there.
-pub fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
+pub(crate) fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
         Instance::Object(holder) => {
             let holder = world.object(holder)?;
@@ -159,7 +159,7 @@ fn raster(area: &Rect) -> impl Iterator<Item = (i32, i32)> + use<> {
 }
 
 /// How far a fixture's contents move when it is opened: drawers slide, doors do not.
-pub fn drawer_shift(scene: &Scene, fixture: u16) -> Point {
+pub(crate) fn drawer_shift(scene: &Scene, fixture: u16) -> Point {
     match scene.fixture(fixture) {
         Some(fixture) if fixture.class.info().slides => {
             let (dx, dz) = fixture.facing.step();
@@ -170,7 +170,7 @@ pub fn drawer_shift(scene: &Scene, fixture: u16) -> Point {
 }
 
 /// Moves an object's contents, at any depth, by `by`.
-pub fn carry_contents(world: &mut World, carrier: Instance, by: Point) {
+pub(crate) fn carry_contents(world: &mut World, carrier: Instance, by: Point) {
     let moved: Vec<u16> = world.contents(carrier).collect();
     for index in moved {
         let at = &mut world.objects[usize::from(index)].at;

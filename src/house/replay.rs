@@ -6,7 +6,7 @@ use super::rules;
 use crate::domain::{Action, Scene, World};
 
 /// Actions on their way through the states that they lead to.
-pub struct Replay<'a> {
+pub(crate) struct Replay<'a> {
     scene: &'a Scene,
     world: World,
     actions: &'a [Action],
@@ -14,29 +14,29 @@ pub struct Replay<'a> {
 
 impl<'a> Replay<'a> {
     /// Before the first action.
-    pub fn new(scene: &'a Scene, start: World, actions: &'a [Action]) -> Replay<'a> {
+    pub(crate) fn new(scene: &'a Scene, start: World, actions: &'a [Action]) -> Replay<'a> {
         Replay { scene, world: start, actions }
     }
 
     /// The present state.
-    pub fn world(&self) -> &World {
+    pub(crate) fn world(&self) -> &World {
         &self.world
     }
 
     /// The action that comes next.
-    pub fn upcoming(&self) -> Option<Action> {
+    pub(crate) fn upcoming(&self) -> Option<Action> {
         self.actions.first().copied()
     }
 
     /// Takes the next action; `None` after the last.
-    pub fn step(&mut self) -> Option<(Action, Outcome)> {
+    pub(crate) fn step(&mut self) -> Option<(Action, Outcome)> {
         let (&action, rest) = self.actions.split_first()?;
         self.actions = rest;
         Some((action, rules::apply(self.scene, &mut self.world, action)))
     }
 
     /// The state after the last action.
-    pub fn finish(mut self) -> World {
+    pub(crate) fn finish(mut self) -> World {
         while self.step().is_some() {}
         self.world
     }

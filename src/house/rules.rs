@@ -19,7 +19,7 @@ pub fn apply(scene: &Scene, world: &mut World, action: Action) -> Outcome {
 }
 
 /// Whether the rules allow `action` now, sight and reach aside.
-pub fn check(scene: &Scene, world: &World, action: Action) -> Result<(), Reason> {
+pub(crate) fn check(scene: &Scene, world: &World, action: Action) -> Result<(), Reason> {
     let agent = &world.agent;
     match action.kind {
         ActionType::MoveAhead if !scene.has_cell(agent.cell.ahead(agent.heading)) => return Err(Reason::Blocked),
@@ -171,7 +171,7 @@ fn toggle_on(scene: &Scene, world: &mut World, index: u16, class: Class) {
 }
 
 /// The sink basin that a faucet at `pivot` runs into.
-pub fn nearest_basin(scene: &Scene, pivot: Point) -> Option<Instance> {
+pub(crate) fn nearest_basin(scene: &Scene, pivot: Point) -> Option<Instance> {
     let basins = (0u16..).zip(&scene.fixtures).filter(|(_, fixture)| fixture.class.info().basin);
     let nearest = basins.min_by(|(_, a), (_, b)| a.pivot.distance(pivot).total_cmp(&b.pivot.distance(pivot)));
     nearest.map(|(index, _)| Instance::Fixture(index))

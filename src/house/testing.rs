@@ -18,20 +18,20 @@ struct Kitchen {
 }
 
 /// The kitchen of `tests/scenarios/kitchen.json`.
-pub fn kitchen() -> (Arc<Scene>, World) {
+pub(crate) fn kitchen() -> (Arc<Scene>, World) {
     let text = include_str!("../../tests/scenarios/kitchen.json");
     let kitchen: Kitchen = serde_json::from_str(text).unwrap();
     (Arc::new(kitchen.scene), kitchen.world)
 }
 
 /// A house in that kitchen.
-pub fn kitchen_house() -> House {
+pub(crate) fn kitchen_house() -> House {
     let (scene, world) = kitchen();
     House::new(scene, world)
 }
 
 /// The thing of that name: a class, with a number from 2 on for further ones. Objects come before fixtures.
-pub fn named(scene: &Scene, world: &World, name: &str) -> Instance {
+pub(crate) fn named(scene: &Scene, world: &World, name: &str) -> Instance {
     let class = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let nth = name[class.len()..].parse::<usize>().unwrap_or(1) - 1;
     let class = Class::named(class).unwrap_or_else(|| panic!("no class {class}"));
@@ -42,32 +42,32 @@ pub fn named(scene: &Scene, world: &World, name: &str) -> Instance {
 }
 
 /// A role for a class.
-pub fn role(class: &str) -> Role {
+pub(crate) fn role(class: &str) -> Role {
     Role { class: Class::named(class).unwrap(), slice: false, bound: None, expert: None }
 }
 
 /// A role for a slice of a class.
-pub fn slice_role(class: &str) -> Role {
+pub(crate) fn slice_role(class: &str) -> Role {
     Role { slice: true, ..role(class) }
 }
 
 /// A subtask about one role.
-pub fn subtask(skill: SkillKind, object: u8) -> Subtask {
+pub(crate) fn subtask(skill: SkillKind, object: u8) -> Subtask {
     Subtask { skill, object, receptacle: None, closes: false, literal: None }
 }
 
 /// A Put.
-pub fn put_subtask(object: u8, receptacle: u8) -> Subtask {
+pub(crate) fn put_subtask(object: u8, receptacle: u8) -> Subtask {
     Subtask { receptacle: Some(receptacle), ..subtask(SkillKind::Put, object) }
 }
 
 /// The same subtask, ending with a close.
-pub fn closing(subtask: Subtask) -> Subtask {
+pub(crate) fn closing(subtask: Subtask) -> Subtask {
     Subtask { closes: true, ..subtask }
 }
 
 /// Lets the expert do a task; the actions it took, or why it could not go on.
-pub fn demonstrate(house: &mut House, grader: &mut Grader, limit: usize) -> Result<Vec<Action>, String> {
+pub(crate) fn demonstrate(house: &mut House, grader: &mut Grader, limit: usize) -> Result<Vec<Action>, String> {
     let mut expert = Expert::new();
     let mut actions = Vec::new();
     while !grader.is_done() {
@@ -87,6 +87,6 @@ pub fn demonstrate(house: &mut House, grader: &mut Grader, limit: usize) -> Resu
 }
 
 /// The interactions among actions, by kind.
-pub fn interactions(actions: &[Action]) -> Vec<ActionType> {
+pub(crate) fn interactions(actions: &[Action]) -> Vec<ActionType> {
     actions.iter().map(|action| action.kind).filter(|kind| kind.is_interaction()).collect()
 }

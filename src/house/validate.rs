@@ -9,32 +9,32 @@ use crate::domain::world::{Instance, Object, Parent, World};
 use crate::domain::{Class, Point, Pose, Scene};
 
 /// The farthest from the origin that anything may be, in millimetres: a house is never near this size, and sums stay far from overflow.
-pub const FARTHEST: i32 = 100_000;
+pub(crate) const FARTHEST: i32 = 100_000;
 /// The longest side of a surface, in millimetres; putting something down tries every point of a raster on it.
-pub const LONGEST_SURFACE: i32 = 20_000;
+pub(crate) const LONGEST_SURFACE: i32 = 20_000;
 /// The most objects a world may hold; a drawn frame can tell this many apart and the slices that they fall into.
-pub const MOST_OBJECTS: usize = 2_000;
+pub(crate) const MOST_OBJECTS: usize = 2_000;
 /// The most fixtures a scene may hold.
-pub const MOST_FIXTURES: usize = 4_000;
+pub(crate) const MOST_FIXTURES: usize = 4_000;
 
 /// What does not fit: the field and the reason.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {problem}")]
 pub struct Misfit {
     /// The path of the field, as in the file: `objects[3].parent`.
-    pub field: String,
+    pub(crate) field: String,
     /// The message, without the field.
-    pub problem: String,
+    pub(crate) problem: String,
 }
 
 impl Misfit {
     /// `field` as a path, such as `fixtures[3].body[0]`.
-    pub fn new(field: impl Into<String>, problem: impl Into<String>) -> Misfit {
+    pub(crate) fn new(field: impl Into<String>, problem: impl Into<String>) -> Misfit {
         Misfit { field: field.into(), problem: problem.into() }
     }
 
     /// The same misfit seen from the file that holds the value under `prefix`.
-    pub fn under(self, prefix: &str) -> Misfit {
+    pub(crate) fn under(self, prefix: &str) -> Misfit {
         Misfit { field: format!("{prefix}.{}", self.field), problem: self.problem }
     }
 }
@@ -55,7 +55,7 @@ fn no_farther() -> String {
 ///
 /// # Errors
 /// Names the first field that the simulator could not live with.
-pub fn scene(scene: &Scene) -> Result<(), Misfit> {
+pub(crate) fn scene(scene: &Scene) -> Result<(), Misfit> {
     let version = scene.format_version;
     require(version == Scene::FORMAT, || "format_version".into(), || format!("{version} is not {}", Scene::FORMAT))?;
     require(!scene.cells.is_empty(), || "cells".into(), || "there is no cell to stand on".into())?;
@@ -178,7 +178,7 @@ fn object(scene: &Scene, world: &World, index: usize, object: &Object) -> Result
 ///
 /// # Errors
 /// Says which one does not; the field is the caller's.
-pub fn instance(scene: &Scene, world: &World, instance: Instance, field: &str) -> Result<(), Misfit> {
+pub(crate) fn instance(scene: &Scene, world: &World, instance: Instance, field: &str) -> Result<(), Misfit> {
     let known = world.class_of(scene, instance).is_some();
     require(known, || field.into(), || format!("there is no such thing in the scene: {instance:?}"))
 }

@@ -7,27 +7,27 @@ use crate::domain::world::{Instance, World};
 use crate::domain::{Action, ActionType, Cell, Class, Point, Scene};
 
 /// How far the agent reaches, horizontally, in millimetres.
-pub const REACH: f32 = 1500.0;
+pub(crate) const REACH: f32 = 1500.0;
 /// Fewer pixels than this of a 300 x 300 frame do not count as seen.
-pub const FEWEST_PIXELS: u32 = 12;
+pub(crate) const FEWEST_PIXELS: u32 = 12;
 
 /// A drawn frame: colour, depth and instance in one pass. Row-major, top left first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Pixels in a row.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Rows.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Three bytes a pixel: red, green, blue.
-    pub rgb: Vec<u8>,
+    pub(crate) rgb: Vec<u8>,
     /// Distance along the optical axis in metres; infinite where nothing is.
-    pub depth: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
     /// What each pixel shows: see [`code`].
-    pub ids: Vec<u16>,
+    pub(crate) ids: Vec<u16>,
 }
 
 /// The number of an instance in [`Frame::ids`]; 0 is structure (walls, floor, nothing).
-pub fn code(instance: Instance) -> u16 {
+pub(crate) fn code(instance: Instance) -> u16 {
     match instance {
         Instance::Fixture(i) => 1 + i,
         Instance::Object(i) => 0x8000 | i,
@@ -35,7 +35,7 @@ pub fn code(instance: Instance) -> u16 {
 }
 
 /// The instance that a number in [`Frame::ids`] stands for.
-pub fn decode(code: u16) -> Option<Instance> {
+pub(crate) fn decode(code: u16) -> Option<Instance> {
     match code {
         0 => None,
         fixture if fixture < 0x8000 => Some(Instance::Fixture(fixture - 1)),
@@ -47,18 +47,18 @@ pub fn decode(code: u16) -> Option<Instance> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sighting {
     /// The thing whose pixels these are.
-    pub instance: Instance,
+    pub(crate) instance: Instance,
     /// How many pixels show it.
-    pub pixels: u32,
+    pub(crate) pixels: u32,
     /// The edges of those pixels: left, top, right, bottom (right and bottom inclusive).
-    pub bounds: [u16; 4],
+    pub(crate) bounds: [u16; 4],
 }
 
 /// Everything in a frame that counts as seen, in the order of instances.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct View {
     /// One for each instance with a pixel.
-    pub sightings: Vec<Sighting>,
+    pub(crate) sightings: Vec<Sighting>,
 }
 
 impl View {
@@ -68,7 +68,7 @@ impl View {
     }
 
     /// Reads the rows of a square image of `size` rows, each pixel as in [`Frame::ids`].
-    pub fn of_rows<Row: Iterator<Item = u16>>(size: usize, rows: impl Iterator<Item = Row>) -> View {
+    pub(crate) fn of_rows<Row: Iterator<Item = u16>>(size: usize, rows: impl Iterator<Item = Row>) -> View {
         let mut found: std::collections::BTreeMap<u16, Sighting> = std::collections::BTreeMap::new();
         for (y, row) in (0u16..).zip(rows) {
             let mut add = |id: u16, left: u16, end: u16| {
@@ -102,12 +102,12 @@ impl View {
 
 /// Horizontal distance from the agent to an instance in millimetres: to the pivot, or to the nearest point of a fixture's
 /// body or surfaces when that is nearer.
-pub fn distance(scene: &Scene, world: &World, instance: Instance) -> Option<f32> {
+pub(crate) fn distance(scene: &Scene, world: &World, instance: Instance) -> Option<f32> {
     distance_from(scene, world, world.agent.cell, instance)
 }
 
 /// The same distance for an agent that stands in `cell`.
-pub fn distance_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> Option<f32> {
+pub(crate) fn distance_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> Option<f32> {
     let agent = cell.centre(scene.agent_y);
     let pivot = agent.floor_distance(world.position(scene, instance)?);
     let Instance::Fixture(index) = instance else { return Some(pivot) };
@@ -118,18 +118,18 @@ pub fn distance_from(scene: &Scene, world: &World, cell: Cell, instance: Instanc
 }
 
 /// Distance in space from the agent's own point to the pivot, in millimetres: what "nearest" of a class means (paper's code).
-pub fn nearness(scene: &Scene, world: &World, instance: Instance) -> f32 {
+pub(crate) fn nearness(scene: &Scene, world: &World, instance: Instance) -> f32 {
     nearness_from(scene, world, world.agent.cell, instance)
 }
 
 /// The same distance for an agent that stands in `cell`.
-pub fn nearness_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> f32 {
+pub(crate) fn nearness_from(scene: &Scene, world: &World, cell: Cell, instance: Instance) -> f32 {
     let agent: Point = cell.centre(scene.agent_y);
     world.position(scene, instance).map_or(f32::INFINITY, |pivot| agent.distance(pivot))
 }
 
 /// Whether the agent could act on an instance from where it stands: it sees it and reaches it.
-pub fn reachable(scene: &Scene, world: &World, view: &View, instance: Instance) -> Result<(), Reason> {
+pub(crate) fn reachable(scene: &Scene, world: &World, view: &View, instance: Instance) -> Result<(), Reason> {
     let class = world.class_of(scene, instance).ok_or(Reason::UnknownTarget)?;
     if view.sighting(instance).is_none() {
         return Err(Reason::NotVisible(class));
@@ -145,25 +145,25 @@ pub fn reachable(scene: &Scene, world: &World, view: &View, instance: Instance) 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
     /// The interaction.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// Its target.
-    pub instance: Instance,
+    pub(crate) instance: Instance,
     /// The target's class, by which a policy chooses it.
-    pub class: Class,
+    pub(crate) class: Class,
     /// From the agent's own point to its pivot, in millimetres.
-    pub distance: f32,
+    pub(crate) distance: f32,
 }
 
 impl Candidate {
     /// As the house takes it.
-    pub fn action(&self) -> Action {
+    pub(crate) fn action(&self) -> Action {
         Action::interact(self.kind, self.instance)
     }
 }
 
 /// Every interaction that is possible now, by action and then by distance: the target's class can be named, it is seen and in
 /// reach, and the rules would carry it out.
-pub fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candidate> {
+pub(crate) fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candidate> {
     let mut found = Vec::new();
     for sighting in &view.sightings {
         let instance = sighting.instance;
@@ -182,6 +182,6 @@ pub fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candidate> {
 }
 
 /// The candidate that a policy means by an action and a class: the nearest one.
-pub fn nearest(candidates: &[Candidate], kind: ActionType, class: Class) -> Option<&Candidate> {
+pub(crate) fn nearest(candidates: &[Candidate], kind: ActionType, class: Class) -> Option<&Candidate> {
     candidates.iter().find(|candidate| candidate.kind == kind && candidate.class == class)
 }

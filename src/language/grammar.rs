@@ -15,7 +15,7 @@ const DEEPEST: usize = 8;
 /// The phrase table.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Grammar {
+pub(crate) struct Grammar {
     rules: BTreeMap<String, Vec<String>>,
     names: BTreeMap<Class, Vec<String>>,
     plurals: BTreeMap<Class, String>,
@@ -30,10 +30,10 @@ struct Phrasal {
 }
 
 /// What the program fills into a phrase.
-pub type Slots<'a> = BTreeMap<&'a str, String>;
+pub(crate) type Slots<'a> = BTreeMap<&'a str, String>;
 
 /// The table that is part of the program.
-pub fn grammar() -> &'static Grammar {
+pub(crate) fn grammar() -> &'static Grammar {
     static GRAMMAR: OnceLock<Grammar> = OnceLock::new();
     // A test parses the table, so the default cannot be reached in a build that passed.
     GRAMMAR.get_or_init(|| toml::from_str(include_str!("../../assets/phrases.toml")).unwrap_or_default())
@@ -46,12 +46,13 @@ fn pieces(alternative: &str) -> impl Iterator<Item = (bool, &str)> {
 
 impl Grammar {
     /// How many alternatives a rule has.
-    pub fn count(&self, rule: &str) -> usize {
+    #[cfg(test)]
+    pub(crate) fn count(&self, rule: &str) -> usize {
         self.rules.get(rule).map_or(0, Vec::len)
     }
 
     /// A random alternative of a rule, filled in; empty when none can be filled.
-    pub fn say(&self, rule: &str, slots: &Slots<'_>, rng: &mut ChaCha8Rng) -> String {
+    pub(crate) fn say(&self, rule: &str, slots: &Slots<'_>, rng: &mut ChaCha8Rng) -> String {
         let mut out = String::new();
         self.expand(rule, slots, rng, &mut out, 0);
         self.phrasal.verbs.iter().fold(out, |text, verb| match verb.split_once(' ') {
@@ -82,23 +83,23 @@ impl Grammar {
     }
 
     /// Every name of a class; the first is the usual one.
-    pub fn names(&self, class: Class) -> impl Iterator<Item = &str> {
+    pub(crate) fn names(&self, class: Class) -> impl Iterator<Item = &str> {
         std::iter::once(class.spoken()).chain(self.names.get(&class).into_iter().flatten().map(String::as_str))
     }
 
     /// One of a class's names; mostly the usual one.
-    pub fn name(&self, class: Class, rng: &mut ChaCha8Rng) -> &str {
+    pub(crate) fn name(&self, class: Class, rng: &mut ChaCha8Rng) -> &str {
         let other = self.names.get(&class).filter(|_| rng.random_bool(0.3));
         other.map_or(class.spoken(), |names| names[rng.random_range(0..names.len() as u32) as usize].as_str())
     }
 
     /// "a mug", "an egg", "a loaf of bread".
-    pub fn one(&self, class: Class) -> String {
+    pub(crate) fn one(&self, class: Class) -> String {
         self.one.get(&class).cloned().unwrap_or_else(|| with_article(class.spoken()))
     }
 
     /// "mugs", "loaves of bread".
-    pub fn plural(&self, class: Class) -> String {
+    pub(crate) fn plural(&self, class: Class) -> String {
         self.plurals.get(&class).cloned().unwrap_or_else(|| format!("{}s", class.spoken()))
     }
 }
@@ -112,7 +113,7 @@ fn put_between(text: &str, verb: &str, particle: &str) -> String {
 }
 
 /// A noun with "a" or "an".
-pub fn with_article(noun: &str) -> String {
+pub(crate) fn with_article(noun: &str) -> String {
     let vowel = noun.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O']);
     format!("{} {noun}", if vowel { "an" } else { "a" })
 }

@@ -1,11 +1,11 @@
 //! Instructions: typed text in the form that agents are trained on.
 
 /// The longest instruction that is accepted, in characters; a sentence encoder reads some 1,000 at most.
-pub const LONGEST: usize = 2_000;
+pub(crate) const LONGEST: usize = 2_000;
 
 /// Why a text is no instruction.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum InstructionError {
+pub(crate) enum InstructionError {
     /// Nothing is left of it.
     #[error("the instruction is empty: say what is to be done")]
     Empty,
@@ -28,7 +28,7 @@ pub enum InstructionError {
 /// Brings a text into the form of the paper's instructions: trimmed, lower case, single spaces, ending in a full
 /// stop unless it ends in one of `.?!`, with a capital first letter. Control and invisible formatting characters are dropped.
 /// Empty text stays empty. Applying it twice changes nothing more.
-pub fn normalise(text: &str) -> String {
+pub(crate) fn normalise(text: &str) -> String {
     let spaced = text.chars().map(|c| if c.is_whitespace() { ' ' } else { c });
     let clean: String = spaced.filter(|&c| !is_control(c)).collect();
     let words: Vec<&str> = clean.split(' ').filter(|word| !word.is_empty()).collect();
@@ -48,7 +48,7 @@ pub fn normalise(text: &str) -> String {
 ///
 /// # Errors
 /// When it is empty, longer than [`LONGEST`], or holds control characters.
-pub fn parse(text: &str) -> Result<String, InstructionError> {
+pub(crate) fn parse(text: &str) -> Result<String, InstructionError> {
     let characters = text.chars().count();
     if characters > LONGEST {
         return Err(InstructionError::TooLong { characters });

@@ -1,14 +1,14 @@
 //! Instructions: how they are read, and the grammar in which the program itself asks for things.
 
-pub mod grammar;
-pub mod instruction;
-pub mod nouns;
-pub mod passage;
-pub mod phrases;
-pub mod rules;
-pub mod story;
-pub mod summary;
-pub mod vocabulary;
+pub(crate) mod grammar;
+pub(crate) mod instruction;
+pub(crate) mod nouns;
+pub(crate) mod passage;
+pub(crate) mod phrases;
+pub(crate) mod rules;
+pub(crate) mod story;
+pub(crate) mod summary;
+pub(crate) mod vocabulary;
 
 mod outcome;
 mod place_slots;

@@ -33,16 +33,16 @@ fn table() -> &'static NounTable {
 
 /// A noun with what was said of its looks, without an article: "small black table".
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Noun {
+pub(crate) struct Noun {
     /// Words of looks, in order; at most two.
-    pub modifiers: Vec<String>,
+    pub(crate) modifiers: Vec<String>,
     /// The name.
-    pub head: String,
+    pub(crate) head: String,
 }
 
 /// How a noun is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Number {
+pub(crate) enum Number {
     /// "a mug".
     One,
     /// "soap".
@@ -52,13 +52,13 @@ pub enum Number {
 }
 
 /// Every name of a class that counts as naming it.
-pub fn heads(class: Class) -> impl Iterator<Item = &'static str> {
+pub(crate) fn heads(class: Class) -> impl Iterator<Item = &'static str> {
     let known = table().heads.get(&class).into_iter().flatten().map(String::as_str);
     std::iter::once(class.spoken()).chain(grammar().names(class)).chain(known)
 }
 
 /// Whether a text calls something by one of a class's names, in the singular or plural.
-pub fn names(text: &str, class: Class) -> bool {
+pub(crate) fn names(text: &str, class: Class) -> bool {
     let words = words(text);
     let plural = |head: &str| plural_of(head).unwrap_or_else(|| grammar().plural(class));
     heads(class).any(|head| {
@@ -87,13 +87,13 @@ fn words(text: &str) -> Vec<String> {
 
 impl Noun {
     /// A class by its usual name.
-    pub fn usual(class: Class) -> Noun {
+    pub(crate) fn usual(class: Class) -> Noun {
         Noun { modifiers: Vec::new(), head: class.spoken().to_string() }
     }
 
     /// What a sentence calls a thing of that class: its longest name, with the words of looks before it. The first one with an
     /// article counts, or for a place the first one that something is put "in" or "on".
-    pub fn find(class: Class, sentence: &str, is_place: bool) -> Option<Noun> {
+    pub(crate) fn find(class: Class, sentence: &str, is_place: bool) -> Option<Noun> {
         let words = words(sentence);
         let ends = |at: usize| words.get(at).is_none_or(|word| is_mark(word) || table().words.after.contains(word));
         let mut found: Option<(usize, usize)> = None;
@@ -131,7 +131,7 @@ impl Noun {
     }
 
     /// How it is counted.
-    pub fn number(&self) -> Number {
+    pub(crate) fn number(&self) -> Number {
         if table().words.mass.contains(&self.head) {
             Number::Mass
         } else if table().words.many.contains(&self.head) {
@@ -142,7 +142,7 @@ impl Noun {
     }
 
     /// "small black table".
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         self.with(&[], &self.head)
     }
 
@@ -153,7 +153,7 @@ impl Noun {
     }
 
     /// "a rinsed mug", "the keys", "some soap": one that was not spoken of before.
-    pub fn one(&self, states: &[String]) -> String {
+    pub(crate) fn one(&self, states: &[String]) -> String {
         let text = self.with(states, &self.head);
         match self.number() {
             Number::One => with_article(&text),
@@ -163,12 +163,12 @@ impl Noun {
     }
 
     /// "the rinsed mug".
-    pub fn the(&self, states: &[String]) -> String {
+    pub(crate) fn the(&self, states: &[String]) -> String {
         format!("the {}", self.with(states, &self.head))
     }
 
     /// "small mugs"; `class` says what there are many of where the noun is not counted.
-    pub fn plural(&self, states: &[String], class: Class) -> String {
+    pub(crate) fn plural(&self, states: &[String], class: Class) -> String {
         let head = match self.number() {
             Number::One => plural_of(&self.head),
             _ => None,

@@ -9,18 +9,22 @@ use crate::domain::{Role, Subtask, Trajectory};
 
 /// Skills with a sentence each.
 #[derive(Clone, Copy, Debug)]
-pub struct Passage<'a> {
+pub(crate) struct Passage<'a> {
     /// The parts that instances play.
-    pub roles: &'a [Role],
+    pub(crate) roles: &'a [Role],
     /// The steps, in order.
-    pub subtasks: &'a [Subtask],
+    pub(crate) subtasks: &'a [Subtask],
     /// A sentence for each.
-    pub sentences: &'a [String],
+    pub(crate) sentences: &'a [String],
 }
 
 impl<'a> Passage<'a> {
     /// Some skills of a trajectory in one annotator's words; nothing when the annotation is not aligned or there are no such skills.
-    pub fn of(trajectory: &'a Trajectory, annotation: &'a Annotation, skills: Range<usize>) -> Option<Passage<'a>> {
+    pub(crate) fn of(
+        trajectory: &'a Trajectory,
+        annotation: &'a Annotation,
+        skills: Range<usize>,
+    ) -> Option<Passage<'a>> {
         if annotation.steps.len() != trajectory.skills.len() {
             return None;
         }
@@ -30,7 +34,7 @@ impl<'a> Passage<'a> {
 
     /// Identifies what a summary is made of, which is the skills, what they are about, and the sentences: the first 16 digits
     /// of a sha256. Roles count by the order in which they appear.
-    pub fn digest(&self) -> String {
+    pub(crate) fn digest(&self) -> String {
         let mut hash = Sha256::new();
         let mut known: Vec<u8> = Vec::new();
         let mut tell = |role: u8, hash: &mut Sha256| {
@@ -55,7 +59,7 @@ impl<'a> Passage<'a> {
 }
 
 /// Sums passages up.
-pub trait Summarizer: Sync {
+pub(crate) trait Summarizer: Sync {
     /// What it is called where its work is kept: `rules`, `concat`, the name of a model.
     fn source(&self) -> &str;
 
@@ -70,10 +74,10 @@ pub trait Summarizer: Sync {
 }
 
 /// One sentence after the other, as they are: what the paper's ablation trains on.
-pub struct Concatenation;
+pub(crate) struct Concatenation;
 
 /// The sentences one after the other, each brought into the form of an instruction.
-pub fn concatenated(sentences: &[String]) -> String {
+pub(crate) fn concatenated(sentences: &[String]) -> String {
     let instructions: Vec<String> = sentences.iter().map(|sentence| super::instruction::normalise(sentence)).collect();
     instructions.join(" ")
 }

@@ -11,18 +11,18 @@ use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::{Class, Instance, Parent, Scene, World};
 
 /// An instruction for a whole chain.
-pub fn instruction(roles: &[Role], subtasks: &[Subtask], rng: &mut ChaCha8Rng) -> String {
+pub(crate) fn instruction(roles: &[Role], subtasks: &[Subtask], rng: &mut ChaCha8Rng) -> String {
     Story { roles, subtasks, origins: &[] }.instruction(rng)
 }
 
 /// A sentence for one subtask.
-pub fn sentence(roles: &[Role], subtask: &Subtask, rng: &mut ChaCha8Rng) -> String {
+pub(crate) fn sentence(roles: &[Role], subtask: &Subtask, rng: &mut ChaCha8Rng) -> String {
     let story = Story { roles, subtasks: std::slice::from_ref(subtask), origins: &[] };
     finish(story.clause(0, false, rng), rng)
 }
 
 /// What each role's instance lies in at the start, by class, from the expert's instances; nothing for slices and fixtures.
-pub fn origins(scene: &Scene, world: &World, roles: &[Role]) -> Vec<Option<Class>> {
+pub(crate) fn origins(scene: &Scene, world: &World, roles: &[Role]) -> Vec<Option<Class>> {
     let origin = |role: &Role| {
         let original = role.expert.filter(|original| original.slice.is_none())?;
         let Instance::Object(index) = original.instance else { return None };
@@ -36,7 +36,7 @@ pub fn origins(scene: &Scene, world: &World, roles: &[Role]) -> Vec<Option<Class
 
 impl Story<'_> {
     /// An instruction for the whole chain: a summary of what it comes to, or its steps one after another.
-    pub fn instruction(&self, rng: &mut ChaCha8Rng) -> String {
+    pub(crate) fn instruction(&self, rng: &mut ChaCha8Rng) -> String {
         let text = match self.subtasks.len() {
             0 => String::new(),
             1 => self.clause(0, false, rng),
@@ -47,7 +47,7 @@ impl Story<'_> {
     }
 
     /// A sentence for each subtask.
-    pub fn sentences(&self, rng: &mut ChaCha8Rng) -> Vec<String> {
+    pub(crate) fn sentences(&self, rng: &mut ChaCha8Rng) -> Vec<String> {
         let steps = 0..self.subtasks.len();
         steps.map(|step| finish(self.clause(step, false, rng), rng)).collect()
     }

@@ -9,13 +9,13 @@ use crate::domain::skill::{Role, SkillKind, Subtask};
 
 /// What is known of a task when it is put into words.
 #[derive(Clone, Copy, Debug)]
-pub struct Story<'a> {
+pub(crate) struct Story<'a> {
     /// The parts that instances play.
-    pub roles: &'a [Role],
+    pub(crate) roles: &'a [Role],
     /// The steps, in order.
-    pub subtasks: &'a [Subtask],
+    pub(crate) subtasks: &'a [Subtask],
     /// For each role, the class of the receptacle in which its instance lies at the start; may be shorter than the roles.
-    pub origins: &'a [Option<Class>],
+    pub(crate) origins: &'a [Option<Class>],
 }
 
 impl Story<'_> {

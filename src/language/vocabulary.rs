@@ -4,32 +4,32 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Known words. Their numbers start at 2; 0 is padding, 1 any unknown word.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Vocabulary {
+pub(crate) struct Vocabulary {
     words: Vec<String>,
     numbers: HashMap<String, i64>,
 }
 
 impl Vocabulary {
     /// What fills a text up to a length.
-    pub const PADDING: i64 = 0;
+    pub(crate) const PADDING: i64 = 0;
     /// The number of an unknown word.
-    pub const UNKNOWN: i64 = 1;
+    pub(crate) const UNKNOWN: i64 = 1;
     const FIRST: usize = 2;
 
     /// A vocabulary of these words, in this order.
-    pub fn new(words: Vec<String>) -> Vocabulary {
+    pub(crate) fn new(words: Vec<String>) -> Vocabulary {
         let numbers =
             words.iter().enumerate().map(|(i, word)| (word.clone(), (i + Vocabulary::FIRST) as i64)).collect();
         Vocabulary { words, numbers }
     }
 
     /// How many words a table of so many `entries` has numbers for.
-    pub fn most(entries: i64) -> usize {
+    pub(crate) fn most(entries: i64) -> usize {
         usize::try_from(entries).unwrap_or(0).saturating_sub(Vocabulary::FIRST)
     }
 
     /// The most frequent words of texts, so many that all numbers lie below `entries`.
-    pub fn of<'a>(texts: impl Iterator<Item = &'a str>, entries: i64) -> Vocabulary {
+    pub(crate) fn of<'a>(texts: impl Iterator<Item = &'a str>, entries: i64) -> Vocabulary {
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         texts.flat_map(split).for_each(|word| *counts.entry(word).or_default() += 1);
         let mut words: Vec<(String, usize)> = counts.into_iter().collect();
@@ -40,12 +40,12 @@ impl Vocabulary {
     }
 
     /// The words, in the order of their numbers.
-    pub fn words(&self) -> &[String] {
+    pub(crate) fn words(&self) -> &[String] {
         &self.words
     }
 
     /// The numbers of a text's words; of a text without words, that of an unknown one.
-    pub fn numbers(&self, text: &str) -> Vec<i64> {
+    pub(crate) fn numbers(&self, text: &str) -> Vec<i64> {
         let number = |word: String| self.numbers.get(&word).copied().unwrap_or(Vocabulary::UNKNOWN);
         let numbers: Vec<i64> = split(text).map(number).collect();
         if numbers.is_empty() { vec![Vocabulary::UNKNOWN] } else { numbers }

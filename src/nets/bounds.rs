@@ -6,7 +6,7 @@ use anyhow::ensure;
 ///
 /// # Errors
 /// Names the field and the size.
-pub fn sizes(field: &str, sizes: &[i64], most: i64) -> anyhow::Result<()> {
+pub(crate) fn sizes(field: &str, sizes: &[i64], most: i64) -> anyhow::Result<()> {
     for &size in sizes {
         ensure!((1..=most).contains(&size), "{field} is {size}, which is not between 1 and {most}");
     }
@@ -17,7 +17,7 @@ pub fn sizes(field: &str, sizes: &[i64], most: i64) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Names the field and the share.
-pub fn dropout(field: &str, share: f64) -> anyhow::Result<()> {
+pub(crate) fn dropout(field: &str, share: f64) -> anyhow::Result<()> {
     ensure!((0.0..1.0).contains(&share), "{field} is {share}, which is not a share");
     Ok(())
 }

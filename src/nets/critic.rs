@@ -15,20 +15,20 @@ use crate::domain::{ActionType, Class};
 #[serde(deny_unknown_fields)]
 pub struct CriticSpec {
     /// Channels of a trunk's four convolutions.
-    pub channels: [i64; 4],
+    pub(crate) channels: [i64; 4],
     /// Whether the second convolution reads every other place.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub downsample: bool,
+    pub(crate) downsample: bool,
     /// Width of the fully connected layers of each head.
-    pub hidden: Vec<i64>,
+    pub(crate) hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
-    pub dropout: f64,
+    pub(crate) dropout: f64,
     /// Numbers that stand for an action.
-    pub action_embedding: i64,
+    pub(crate) action_embedding: i64,
     /// Numbers that stand for an object class; navigation has the class `None`.
-    pub object_embedding: i64,
+    pub(crate) object_embedding: i64,
     /// Whether both Q and V read one trunk. The paper's have one each.
-    pub shared_trunk: bool,
+    pub(crate) shared_trunk: bool,
 }
 
 impl CriticSpec {
@@ -36,7 +36,7 @@ impl CriticSpec {
     ///
     /// # Errors
     /// Names the field of `critic` that is out of its bounds.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
         bounds::sizes("critic.channels", &self.channels, 4096)?;
         bounds::sizes("critic.hidden", &self.hidden, 16_384)?;
         bounds::sizes("critic.action_embedding", &[self.action_embedding], 8192)?;
@@ -45,18 +45,18 @@ impl CriticSpec {
     }
 
     /// Whether a critic of this size can take another's weights: dropout is no matter of size.
-    pub fn fits(&self, other: &CriticSpec) -> bool {
+    pub(crate) fn fits(&self, other: &CriticSpec) -> bool {
         CriticSpec { dropout: other.dropout, ..self.clone() } == *other
     }
 }
 
 /// The sizes of a critic's inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CriticInputs {
+pub(crate) struct CriticInputs {
     /// Channels of an observation.
-    pub channels: i64,
+    pub(crate) channels: i64,
     /// Numbers in a sentence embedding, or in the vector that a goal becomes.
-    pub conditioning: i64,
+    pub(crate) conditioning: i64,
     /// The channels of the convolutions that see a goal, where there is one.
     pub goal: Option<[i64; 4]>,
 }
@@ -93,18 +93,18 @@ impl QHead {
 
 /// Q and V of a batch in training.
 #[derive(Debug)]
-pub struct CriticValues {
+pub(crate) struct CriticValues {
     /// Both Q, each `[n]`.
-    pub q: [Tensor; 2],
+    pub(crate) q: [Tensor; 2],
     /// V `[n]`.
-    pub value: Tensor,
+    pub(crate) value: Tensor,
     /// V `[n]` of the same features without dropout and without gradient: what advantages are measured against.
-    pub baseline: Tensor,
+    pub(crate) baseline: Tensor,
 }
 
 /// Twin Q and V over one trunk or one each.
 #[derive(Debug)]
-pub struct Critic {
+pub(crate) struct Critic {
     conditioner: Conditioning,
     trunks: Vec<Trunk>,
     q: [QHead; 2],
@@ -113,7 +113,7 @@ pub struct Critic {
 
 impl Critic {
     /// A critic with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, spec: &CriticSpec, inputs: CriticInputs) -> Critic {
+    pub(crate) fn new(path: &nn::Path<'_>, spec: &CriticSpec, inputs: CriticInputs) -> Critic {
         let names: &[&str] = if spec.shared_trunk { &["trunk"] } else { &["trunk1", "trunk2", "trunk_value"] };
         let over = |channels| Convolutions { channels, downsample: spec.downsample };
         let trunk =
@@ -148,7 +148,7 @@ impl Critic {
 
     /// Q and V of a batch in training: `observation` [n, channels, 7, 7], `conditioning` as the policy's, `actions` and `objects` [n]
     /// (class indices, 0 for navigation).
-    pub fn evaluate(
+    pub(crate) fn evaluate(
         &self,
         observation: &Tensor,
         conditioning: &Tensor,
@@ -167,7 +167,13 @@ impl Critic {
     }
 
     /// min(Q1, Q2) [n], without dropout and without gradient.
-    pub fn min_q(&self, observation: &Tensor, conditioning: &Tensor, actions: &Tensor, objects: &Tensor) -> Tensor {
+    pub(crate) fn min_q(
+        &self,
+        observation: &Tensor,
+        conditioning: &Tensor,
+        actions: &Tensor,
+        objects: &Tensor,
+    ) -> Tensor {
         tch::no_grad(|| {
             let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
             let first = self.input(0, observation, &conditioning, None, false);
@@ -179,7 +185,7 @@ impl Critic {
     }
 
     /// V [n], without dropout and without gradient.
-    pub fn value(&self, observation: &Tensor, conditioning: &Tensor) -> Tensor {
+    pub(crate) fn value(&self, observation: &Tensor, conditioning: &Tensor) -> Tensor {
         tch::no_grad(|| {
             let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
             self.value.forward(&self.input(2, observation, &conditioning, None, false), false)
@@ -187,7 +193,7 @@ impl Critic {
     }
 
     /// V of one observation and min(Q1, Q2) of each (action, object) pair; the trunk runs once.
-    pub fn evaluate_actions(
+    pub(crate) fn evaluate_actions(
         &self,
         observation: &Tensor,
         conditioning: &Tensor,

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-pub use tch::Device;
+pub(crate) use tch::Device;
 
 /// The libtorch version that the bindings are written for.
-pub const LIBTORCH_VERSION: &str = "2.11.0";
+pub(crate) const LIBTORCH_VERSION: &str = "2.11.0";
 
 /// The best device that is there: the first CUDA device where libtorch's CUDA part could be loaded, else the CPU.
 pub fn best_device() -> Device {
@@ -15,7 +15,7 @@ pub fn best_device() -> Device {
 }
 
 /// What computes, for reports: `CPU`, `CUDA (2 devices)`, or `CPU` with the reason why a CUDA part is not used.
-pub fn device_report() -> String {
+pub(crate) fn device_report() -> String {
     load_cuda();
     match (best_device(), cuda_part().is_file()) {
         (Device::Cuda(_), _) => format!("CUDA ({} devices)", tch::Cuda::device_count()),
@@ -25,7 +25,7 @@ pub fn device_report() -> String {
 }
 
 /// How many threads libtorch computes with.
-pub fn threads() -> usize {
+pub(crate) fn threads() -> usize {
     usize::try_from(tch::get_num_threads()).unwrap_or(1)
 }
 
@@ -36,14 +36,14 @@ pub fn set_threads(count: usize) {
 }
 
 /// The libtorch folder that this binary is linked to.
-pub fn libtorch_folder() -> PathBuf {
+pub(crate) fn libtorch_folder() -> PathBuf {
     let lib = Path::new(env!("SPRINT_LIBTORCH_LIB"));
     lib.parent().unwrap_or(lib).to_path_buf()
 }
 
 /// The version that a libtorch folder says it is, from its headers or a `build-version`
 /// file; a suffix such as `+cpu` is left off.
-pub fn version_in(folder: &Path) -> Option<String> {
+pub(crate) fn version_in(folder: &Path) -> Option<String> {
     let header = std::fs::read_to_string(folder.join("include/torch/headeronly/version.h")).unwrap_or_default();
     if let Some((_, rest)) = header.split_once("#define TORCH_VERSION \\") {
         return rest.split('"').nth(1).map(str::to_string);

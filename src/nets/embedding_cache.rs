@@ -108,13 +108,9 @@ impl EmbeddingCache {
     }
 
     /// How many texts are stored.
-    pub fn len(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
         self.records.len()
-    }
-
-    /// Whether no text is stored.
-    pub fn is_empty(&self) -> bool {
-        self.records.is_empty()
     }
 
     /// A text's embedding, if it is stored. A record that was damaged is forgotten, so that it is written anew.
@@ -186,7 +182,7 @@ impl Embedder {
     ///
     /// # Errors
     /// As [`SentenceEncoder::load`].
-    pub fn open(folder: &Path, device: Device) -> anyhow::Result<Embedder> {
+    pub(crate) fn open(folder: &Path, device: Device) -> anyhow::Result<Embedder> {
         let encoder = SentenceEncoder::load(folder, device)?;
         let cache = EmbeddingCache::open(&home::cache_folder().join("embeddings"), encoder.digest(), encoder.width());
         if let Err(error) = &cache {
@@ -201,7 +197,7 @@ impl Embedder {
     }
 
     /// The encoder itself.
-    pub fn encoder(&self) -> &SentenceEncoder {
+    pub(crate) fn encoder(&self) -> &SentenceEncoder {
         &self.encoder
     }
 

@@ -15,13 +15,13 @@ use super::visual::SIDE;
 #[serde(deny_unknown_fields)]
 pub struct AttentionSpec {
     /// Entries of the table of words: at most so many, those for padding and unknown words included.
-    pub vocabulary_size: i64,
+    pub(crate) vocabulary_size: i64,
     /// Layers that read the words alone, and again as many that read words and frames.
-    pub layers: i64,
+    pub(crate) layers: i64,
     /// Heads of a layer.
-    pub heads: i64,
+    pub(crate) heads: i64,
     /// Width of a layer's inner network.
-    pub feedforward: i64,
+    pub(crate) feedforward: i64,
 }
 
 impl AttentionSpec {
@@ -30,7 +30,7 @@ impl AttentionSpec {
     /// # Errors
     /// Names the field of `policy` that is out of its bounds; also when tokens do not divide among the heads, or have no halves
     /// for sines and cosines.
-    pub fn check(&self, width: i64) -> anyhow::Result<()> {
+    pub(crate) fn check(&self, width: i64) -> anyhow::Result<()> {
         bounds::sizes("policy.attention.vocabulary_size", &[self.vocabulary_size], 1 << 20)?;
         bounds::sizes("policy.attention.layers", &[self.layers], 64)?;
         bounds::sizes("policy.attention.heads", &[self.heads], 64)?;
@@ -91,7 +91,7 @@ impl AttentionLayer {
 
 /// Reads words and frames; gives the last frame's token.
 #[derive(Debug)]
-pub struct Episodic {
+pub(crate) struct Episodic {
     words: nn::Embedding,
     trunk: Trunk,
     frame: nn::Linear,
@@ -104,7 +104,7 @@ pub struct Episodic {
 
 impl Episodic {
     /// A network with fresh weights under `path` over `history` frames of `features` channels.
-    pub fn new(
+    pub(crate) fn new(
         path: &nn::Path<'_>,
         spec: &AttentionSpec,
         (history, features): (i64, i64),
@@ -129,7 +129,7 @@ impl Episodic {
     }
 
     /// `observation` [n, history * features, 7, 7] and `words` [n, words], 0 for padding, to [n, width].
-    pub fn forward(&self, observation: &Tensor, words: &Tensor, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, observation: &Tensor, words: &Tensor, train: bool) -> Tensor {
         let (n, kind) = (words.size()[0], observation.kind());
         let present = words.gt(0).to_kind(Kind::Float);
         let bias = |mask: &Tensor| (mask.unsqueeze(1).unsqueeze(1) - 1.0) * 1e4;

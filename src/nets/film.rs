@@ -7,14 +7,14 @@ use super::precision;
 
 /// Per-channel scale and shift, read off a sentence embedding. It starts as the identity.
 #[derive(Debug)]
-pub struct Film {
+pub(crate) struct Film {
     scale: nn::Linear,
     shift: nn::Linear,
 }
 
 impl Film {
     /// Modulates `channels` channels by an embedding of `width` numbers.
-    pub fn new(path: &nn::Path<'_>, width: i64, channels: i64) -> Film {
+    pub(crate) fn new(path: &nn::Path<'_>, width: i64, channels: i64) -> Film {
         let zero = nn::LinearConfig { ws_init: Init::Const(0.0), bs_init: Some(Init::Const(0.0)), bias: true };
         Film {
             scale: nn::linear(path / "scale", width, channels, zero),
@@ -23,7 +23,7 @@ impl Film {
     }
 
     /// `features` [n, channels, h, w] by `sentence` [n, width].
-    pub fn forward(&self, features: &Tensor, sentence: &Tensor) -> Tensor {
+    pub(crate) fn forward(&self, features: &Tensor, sentence: &Tensor) -> Tensor {
         let spread = |per_channel: Tensor| per_channel.unsqueeze(-1).unsqueeze(-1);
         // In place, as much as the gradient allows: for maps this small memory costs as much as arithmetic.
         let mut scaled = features * (spread(precision::linear(&self.scale, sentence)) + 1.0);

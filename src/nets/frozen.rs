@@ -5,10 +5,7 @@ use tch::{Kind, Tensor, nn};
 use crate::house::view::Frame;
 
 /// A visual encoder that only computes.
-pub trait FrameEncoder: Send {
-    /// The side of the image it reads, in pixels.
-    fn side(&self) -> usize;
-
+pub(crate) trait FrameEncoder: Send {
     /// What it reads of a frame: planes of bytes, red, green, blue.
     fn image(&self, frame: &Frame) -> Vec<u8>;
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use etcetera::BaseStrategy;
 
 /// The folder that set-up fetches into: `SPRINT_HOME`, else `sprint` in the user's XDG cache folder.
-pub fn cache_folder() -> PathBuf {
+pub(crate) fn cache_folder() -> PathBuf {
     if let Some(folder) = std::env::var_os("SPRINT_HOME").filter(|folder| !folder.is_empty()) {
         return PathBuf::from(folder);
     }

@@ -1,23 +1,23 @@
 //! Networks: weights files, sentence encoders, the visual encoder, policy and critic, and where they compute.
 
-pub mod critic;
+pub(crate) mod critic;
 pub mod device;
 pub mod embedding_cache;
-pub mod episodic;
-pub mod film;
-pub mod frozen;
-pub mod home;
-pub mod perception_heads;
-pub mod policy;
-pub mod precision;
-pub mod resize;
+pub(crate) mod episodic;
+pub(crate) mod film;
+pub(crate) mod frozen;
+pub(crate) mod home;
+pub(crate) mod perception_heads;
+pub(crate) mod policy;
+pub(crate) mod precision;
+pub(crate) mod resize;
 pub mod resnet18;
 pub mod sentence;
 #[cfg(test)]
-pub mod testing;
-pub mod trunk;
-pub mod value;
-pub mod visual;
+pub(crate) mod testing;
+pub(crate) mod trunk;
+pub(crate) mod value;
+pub(crate) mod visual;
 pub mod visual_encoder;
 pub mod weights;
 

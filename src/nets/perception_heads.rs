@@ -8,7 +8,7 @@ use crate::domain::Class;
 
 /// Heads over a feature map; thrown away after training.
 #[derive(Debug)]
-pub struct PerceptionHeads {
+pub(crate) struct PerceptionHeads {
     marks: nn::Conv2D,
     depth: nn::Conv2D,
     held: nn::Linear,
@@ -16,36 +16,36 @@ pub struct PerceptionHeads {
 
 /// A batch's losses; each a scalar tensor.
 #[derive(Debug)]
-pub struct PerceptionLoss {
+pub(crate) struct PerceptionLoss {
     /// Binary cross-entropy of the marks, added up over the marks of a place.
-    pub marks: Tensor,
+    pub(crate) marks: Tensor,
     /// Mean absolute error of the logarithm of depth.
-    pub depth: Tensor,
+    pub(crate) depth: Tensor,
     /// Cross-entropy of the held class.
-    pub held: Tensor,
+    pub(crate) held: Tensor,
 }
 
 impl PerceptionLoss {
     /// The sum, unweighted.
-    pub fn total(&self) -> Tensor {
+    pub(crate) fn total(&self) -> Tensor {
         &self.marks + &self.depth + &self.held
     }
 }
 
 /// The labels of a batch of frames.
 #[derive(Debug)]
-pub struct FrameLabels {
+pub(crate) struct FrameLabels {
     /// [n, marks, 7, 7], 0 or 1.
-    pub marks: Tensor,
+    pub(crate) marks: Tensor,
     /// [n, 1, 7, 7], the logarithm of metres.
-    pub depth: Tensor,
+    pub(crate) depth: Tensor,
     /// `[n]`, class indices.
-    pub held: Tensor,
+    pub(crate) held: Tensor,
 }
 
 impl PerceptionHeads {
     /// Heads for that many marks, over maps of `features` channels.
-    pub fn new(path: &nn::Path<'_>, features: i64, marks: i64) -> PerceptionHeads {
+    pub(crate) fn new(path: &nn::Path<'_>, features: i64, marks: i64) -> PerceptionHeads {
         PerceptionHeads {
             marks: nn::conv2d(path / "marks", features, marks, 1, Default::default()),
             depth: nn::conv2d(path / "depth", features, 1, 1, Default::default()),
@@ -54,7 +54,7 @@ impl PerceptionHeads {
     }
 
     /// How far `maps` are from the `labels`. A mark that holds weighs `positive_weight` times one that does not.
-    pub fn loss(&self, maps: &Tensor, labels: &FrameLabels, positive_weight: f64) -> PerceptionLoss {
+    pub(crate) fn loss(&self, maps: &Tensor, labels: &FrameLabels, positive_weight: f64) -> PerceptionLoss {
         let logits = maps.apply(&self.marks);
         let weight = Tensor::from(positive_weight as f32).to_device(logits.device());
         let marks =
@@ -67,7 +67,7 @@ impl PerceptionHeads {
     }
 
     /// Of the marks `from..to`: how many hold and are predicted, hold, are predicted; and how many held classes are right.
-    pub fn counts(&self, maps: &Tensor, labels: &FrameLabels, from: i64, to: i64) -> [f64; 4] {
+    pub(crate) fn counts(&self, maps: &Tensor, labels: &FrameLabels, from: i64, to: i64) -> [f64; 4] {
         let predicted = maps.apply(&self.marks).gt(0.0).to_kind(Kind::Float).narrow(1, from, to - from);
         let holds = labels.marks.narrow(1, from, to - from);
         let held = self.held.forward(&maps.flatten(1, -1)).argmax(-1, false).eq_tensor(&labels.held);

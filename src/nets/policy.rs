@@ -19,14 +19,14 @@ pub struct PolicySpec {
     /// Numbers in a sentence embedding, or in a token's where the agent reads words.
     pub embedding: i64,
     /// Channels of the four convolutions; the first is 1 x 1, the others 3 x 3.
-    pub channels: [i64; 4],
+    pub(crate) channels: [i64; 4],
     /// Whether the second convolution reads every other place.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub downsample: bool,
+    pub(crate) downsample: bool,
     /// Width of the fully connected layers.
-    pub hidden: Vec<i64>,
+    pub(crate) hidden: Vec<i64>,
     /// Share of the fully connected units that is dropped in training.
-    pub dropout: f64,
+    pub(crate) dropout: f64,
     /// Where a state to reach takes the place of an instruction: the channels of the four convolutions that see it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_channels: Option<[i64; 4]>,
@@ -40,7 +40,7 @@ impl PolicySpec {
     ///
     /// # Errors
     /// Names the field of `policy` that is out of its bounds.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
         bounds::sizes("policy.history", &[self.history], 64)?;
         bounds::sizes("policy.embedding", &[self.embedding], 8192)?;
         bounds::sizes("policy.channels", &self.channels, 4096)?;
@@ -53,18 +53,18 @@ impl PolicySpec {
     }
 
     /// Whether a network of this size can take another's weights: dropout is no matter of size.
-    pub fn fits(&self, other: &PolicySpec) -> bool {
+    pub(crate) fn fits(&self, other: &PolicySpec) -> bool {
         PolicySpec { dropout: other.dropout, ..self.clone() } == *other
     }
 }
 
 /// Logits of both heads, in 32 bits.
 #[derive(Debug)]
-pub struct Logits {
+pub(crate) struct Logits {
     /// [n, 12]: what to do.
-    pub actions: Tensor,
+    pub(crate) actions: Tensor,
     /// [n, 82]: to which class; entry 0 is `None`.
-    pub objects: Tensor,
+    pub(crate) objects: Tensor,
 }
 
 /// How the observation and the conditioning become features.
@@ -76,8 +76,7 @@ enum Body {
 
 /// From the last few frames and an instruction or goal to logits of actions and object classes.
 #[derive(Debug)]
-pub struct PolicyNet {
-    spec: PolicySpec,
+pub(crate) struct PolicyNet {
     body: Body,
     dense: DenseLayers,
     actions: nn::Linear,
@@ -86,7 +85,7 @@ pub struct PolicyNet {
 
 impl PolicyNet {
     /// A network with fresh weights under `path`, over maps of `features` channels a frame.
-    pub fn new(path: &nn::Path<'_>, spec: &PolicySpec, features: i64) -> PolicyNet {
+    pub(crate) fn new(path: &nn::Path<'_>, spec: &PolicySpec, features: i64) -> PolicyNet {
         let from = spec.history * features;
         let over = |channels| Convolutions { channels, downsample: spec.downsample };
         let (body, width) = match &spec.attention {
@@ -107,18 +106,12 @@ impl PolicyNet {
             actions: nn::linear(path / "actions", dense.width(), ActionType::COUNT as i64, Default::default()),
             objects: nn::linear(path / "objects", dense.width(), Class::VOCABULARY as i64, Default::default()),
             dense,
-            spec: spec.clone(),
         }
-    }
-
-    /// The size that it was built with.
-    pub fn spec(&self) -> &PolicySpec {
-        &self.spec
     }
 
     /// `observation` [n, history * features, 7, 7], oldest frame first, and `conditioning`: sentences [n, embedding] of unit length,
     /// goals of the observation's shape, or numbers of words [n, words].
-    pub fn forward(&self, observation: &Tensor, conditioning: &Tensor, train: bool) -> Logits {
+    pub(crate) fn forward(&self, observation: &Tensor, conditioning: &Tensor, train: bool) -> Logits {
         let features = match &self.body {
             Body::Episodic(episodic) => episodic.forward(observation, conditioning, train),
             Body::Trunk { conditioner, trunk } => {

@@ -7,7 +7,7 @@ use tch::{Kind, Tensor, nn};
 /// How wide the numbers are that networks compute with while they learn; when they act, always 32 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Precision {
+pub(crate) enum Precision {
     /// 32 bits.
     #[default]
     Full,
@@ -18,7 +18,7 @@ pub enum Precision {
 impl Precision {
     /// `maps` [n, channels, h, w] as a network in training is to see them. Narrow ones lie channel by channel in memory, as the
     /// kernels for them read it.
-    pub fn cast(self, maps: &Tensor) -> Tensor {
+    pub(crate) fn cast(self, maps: &Tensor) -> Tensor {
         match self {
             Precision::Full => maps.to_kind(Kind::Float),
             Precision::Mixed => maps.permute([0, 2, 3, 1]).to_kind(Kind::BFloat16).contiguous().permute([0, 3, 1, 2]),
@@ -27,17 +27,17 @@ impl Precision {
 }
 
 /// A layer of `x` [n, from].
-pub fn linear(layer: &nn::Linear, x: &Tensor) -> Tensor {
+pub(crate) fn linear(layer: &nn::Linear, x: &Tensor) -> Tensor {
     x.linear(&layer.ws.to_kind(x.kind()), layer.bs.as_ref().map(|bias| bias.to_kind(x.kind())))
 }
 
 /// The same in 32 bits, whatever the width of `x`.
-pub fn linear_f32(layer: &nn::Linear, x: &Tensor) -> Tensor {
+pub(crate) fn linear_f32(layer: &nn::Linear, x: &Tensor) -> Tensor {
     linear(layer, &x.to_kind(Kind::Float))
 }
 
 /// A convolution of `x` [n, from, h, w] without bias, padded so that at a stride of 1 the places stay as many.
-pub fn convolution(layer: &nn::Conv2D, x: &Tensor, stride: i64) -> Tensor {
+pub(crate) fn convolution(layer: &nn::Conv2D, x: &Tensor, stride: i64) -> Tensor {
     let padding = layer.ws.size()[2] / 2;
     x.conv2d(&layer.ws.to_kind(x.kind()), None::<Tensor>, [stride], [padding], [1], 1)
 }

@@ -4,12 +4,12 @@
 
 /// Averages a square image of `from` x `from` pixels, three bytes a pixel, down to `to` x `to`. Planes: all red, then all green,
 /// then all blue, each row-major. Returns nothing but zeros when the image is shorter than its size says.
-pub fn resize_area(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
+pub(crate) fn resize_area(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
     weighted(rgb, from, to, &areas(from, to))
 }
 
 /// As [`resize_area`], with weights that fall off linearly from each target pixel's centre: what image libraries call bilinear.
-pub fn resize_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
+pub(crate) fn resize_bilinear(rgb: &[u8], from: usize, to: usize) -> Vec<u8> {
     weighted(rgb, from, to, &triangles(from, to))
 }
 

@@ -12,9 +12,9 @@ use super::weights::{self, TensorSpec, Tensors};
 use crate::house::view::Frame;
 
 /// The side of the image it reads, in pixels.
-pub const INPUT: usize = 224;
+pub(crate) const INPUT: usize = 224;
 /// Channels of its maps.
-pub const FEATURES: i64 = 512;
+pub(crate) const FEATURES: i64 = 512;
 /// The means and deviations of ImageNet's colours, of 1.
 const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
 const DEVIATION: [f32; 3] = [0.229, 0.224, 0.225];
@@ -72,7 +72,7 @@ impl ResNet18 {
     ///
     /// # Errors
     /// When the file cannot be read, or tensors are missing, unknown or of another shape: each is named.
-    pub fn read(path: &Path, device: Device) -> anyhow::Result<ResNet18> {
+    pub(crate) fn read(path: &Path, device: Device) -> anyhow::Result<ResNet18> {
         let mut tensors = weights::read(path)?;
         tensors.retain(|name, _| !name.starts_with("fc.") && !name.ends_with(".num_batches_tracked"));
         weights::check(path, &tensors, &forms())
@@ -132,10 +132,6 @@ impl Block {
 }
 
 impl FrameEncoder for ResNet18 {
-    fn side(&self) -> usize {
-        INPUT
-    }
-
     fn image(&self, frame: &Frame) -> Vec<u8> {
         resize_bilinear(&frame.rgb, frame.width, INPUT)
     }

@@ -32,7 +32,7 @@ pub fn default_folder() -> PathBuf {
 ///
 /// # Errors
 /// When a file is missing or has another sha256.
-pub fn verify_default(folder: &Path) -> anyhow::Result<()> {
+pub(crate) fn verify_default(folder: &Path) -> anyhow::Result<()> {
     for (name, expected) in DEFAULT_FILES {
         let path = folder.join(name);
         let found = format!("{:x}", Sha256::digest(read(&path)?));
@@ -43,11 +43,11 @@ pub fn verify_default(folder: &Path) -> anyhow::Result<()> {
 
 /// How much of a text an encoder reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TokenCount {
+pub(crate) struct TokenCount {
     /// Tokens that are read, the two that mark start and end included.
-    pub used: usize,
+    pub(crate) used: usize,
     /// Tokens at the end of the text that are left out because it is too long.
-    pub truncated: usize,
+    pub(crate) truncated: usize,
 }
 
 /// A frozen encoder of sentences.
@@ -148,7 +148,7 @@ impl SentenceEncoder {
     }
 
     /// Where the encoder computes, and its results lie.
-    pub fn device(&self) -> Device {
+    pub(crate) fn device(&self) -> Device {
         self.device
     }
 
@@ -161,7 +161,7 @@ impl SentenceEncoder {
     ///
     /// # Errors
     /// When the tokenizer refuses the text.
-    pub fn tokens(&self, text: &str) -> anyhow::Result<TokenCount> {
+    pub(crate) fn tokens(&self, text: &str) -> anyhow::Result<TokenCount> {
         let (encoding, truncated) = self.tokenize(text)?;
         Ok(TokenCount { used: encoding.len(), truncated })
     }
@@ -194,7 +194,7 @@ impl SentenceEncoder {
     ///
     /// # Errors
     /// As [`SentenceEncoder::encode`].
-    pub fn encode_rows(&self, texts: &[&str]) -> anyhow::Result<Vec<Vec<f32>>> {
+    pub(crate) fn encode_rows(&self, texts: &[&str]) -> anyhow::Result<Vec<Vec<f32>>> {
         let values: Vec<f32> = Vec::try_from(self.encode(texts)?.to_device(Device::Cpu).flatten(0, -1))?;
         Ok(values.chunks_exact(self.width).map(<[f32]>::to_vec).collect())
     }

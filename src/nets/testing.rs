@@ -6,7 +6,7 @@ static CHANCE: Mutex<()> = Mutex::new(());
 
 /// Holds libtorch's random numbers: tests that seed and draw from them run one after another. They compute with one thread: what
 /// they compute is small, and on a busy machine threads that wait for each other take ten times as long.
-pub fn chance() -> MutexGuard<'static, ()> {
+pub(crate) fn chance() -> MutexGuard<'static, ()> {
     tch::set_num_threads(1);
     CHANCE.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -10,11 +10,11 @@ use super::visual::SIDE;
 
 /// The convolutions of a trunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Convolutions<'a> {
+pub(crate) struct Convolutions<'a> {
     /// Output channels of each.
-    pub channels: &'a [i64; 4],
+    pub(crate) channels: &'a [i64; 4],
     /// Whether the second one reads every other place, so that those after it see 4 x 4 places instead of 7 x 7.
-    pub downsample: bool,
+    pub(crate) downsample: bool,
 }
 
 impl Convolutions<'_> {
@@ -31,7 +31,7 @@ impl Convolutions<'_> {
 
 /// Four convolutions, the first 1 x 1, the others 3 x 3, each with batch norm, FiLM and ReLU.
 #[derive(Debug)]
-pub struct Trunk {
+pub(crate) struct Trunk {
     stages: Vec<TrunkStage>,
     width: i64,
 }
@@ -48,7 +48,12 @@ impl Trunk {
     /// A trunk over `from` channels with fresh weights under `path`; `conditioning` is the width of the vector that modulates it, if
     /// there is one. Norms begin with scales by chance between 0 and 1: where they began at 1, a clone had a held-out action loss
     /// of 0.66 after 2,000 updates instead of 0.64.
-    pub fn new(path: &nn::Path<'_>, from: i64, convolutions: Convolutions<'_>, conditioning: Option<i64>) -> Trunk {
+    pub(crate) fn new(
+        path: &nn::Path<'_>,
+        from: i64,
+        convolutions: Convolutions<'_>,
+        conditioning: Option<i64>,
+    ) -> Trunk {
         let mut from = from;
         let mut stages = Vec::new();
         for (i, &to) in convolutions.channels.iter().enumerate() {
@@ -68,12 +73,12 @@ impl Trunk {
     }
 
     /// Features of an item.
-    pub fn width(&self) -> i64 {
+    pub(crate) fn width(&self) -> i64 {
         self.width
     }
 
     /// `observation` [n, channels, 7, 7] and `conditioning` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
-    pub fn forward(&self, observation: &Tensor, conditioning: Option<&Tensor>, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, observation: &Tensor, conditioning: Option<&Tensor>, train: bool) -> Tensor {
         let mut x = observation.shallow_clone();
         for TrunkStage { conv, stride, norm, film } in &self.stages {
             x = norm.forward_t(&precision::convolution(conv, &x, *stride), train);
@@ -88,7 +93,7 @@ impl Trunk {
 
 /// Fully connected layers with ReLU and dropout, named `dense1`, `dense2` and so on.
 #[derive(Debug)]
-pub struct DenseLayers {
+pub(crate) struct DenseLayers {
     layers: Vec<nn::Linear>,
     dropout: f64,
     width: i64,
@@ -96,7 +101,7 @@ pub struct DenseLayers {
 
 impl DenseLayers {
     /// Layers of widths `hidden` over `from` numbers with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> DenseLayers {
+    pub(crate) fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> DenseLayers {
         let mut width = from;
         let mut layers = Vec::new();
         for (i, &to) in hidden.iter().enumerate() {
@@ -107,19 +112,19 @@ impl DenseLayers {
     }
 
     /// Features of an item.
-    pub fn width(&self) -> i64 {
+    pub(crate) fn width(&self) -> i64 {
         self.width
     }
 
     /// `x` [n, from] to [n, [`DenseLayers::width`]].
-    pub fn forward(&self, x: Tensor, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, x: Tensor, train: bool) -> Tensor {
         self.layers.iter().fold(x, |x, layer| precision::linear(layer, &x).relu_().dropout(self.dropout, train))
     }
 }
 
 /// Turns an instruction or a goal into the vector that modulates the trunk and joins its features.
 #[derive(Debug)]
-pub enum Conditioning {
+pub(crate) enum Conditioning {
     /// A sentence embedding of unit length.
     Sentence {
         /// Its width.
@@ -136,7 +141,7 @@ pub enum Conditioning {
 
 impl Conditioning {
     /// For sentences of `width` numbers, or with `goal`, its convolutions, for stacks of `from` channels.
-    pub fn new(path: &nn::Path<'_>, width: i64, goal: Option<Convolutions<'_>>, from: i64) -> Conditioning {
+    pub(crate) fn new(path: &nn::Path<'_>, width: i64, goal: Option<Convolutions<'_>>, from: i64) -> Conditioning {
         let Some(convolutions) = goal else { return Conditioning::Sentence { width } };
         let path = path / "goal";
         let trunk = Trunk::new(&path, from, convolutions, None);
@@ -145,7 +150,7 @@ impl Conditioning {
     }
 
     /// `conditioning`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width], as wide as `kind` says.
-    pub fn forward(&self, conditioning: &Tensor, kind: Kind, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, conditioning: &Tensor, kind: Kind, train: bool) -> Tensor {
         match self {
             // A unit vector's entries are tiny; scaled to unit variance they weigh as much as the other features.
             Conditioning::Sentence { width } => (conditioning * (*width as f64).sqrt()).to_kind(kind),

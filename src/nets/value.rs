@@ -8,20 +8,20 @@ use super::trunk::DenseLayers;
 
 /// Fully connected layers over a trunk's features and the conditioning, down to one number.
 #[derive(Debug)]
-pub struct ValueHead {
+pub(crate) struct ValueHead {
     dense: DenseLayers,
     out: nn::Linear,
 }
 
 impl ValueHead {
     /// A head over `from` numbers with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> ValueHead {
+    pub(crate) fn new(path: &nn::Path<'_>, from: i64, hidden: &[i64], dropout: f64) -> ValueHead {
         let dense = DenseLayers::new(path, from, hidden, dropout);
         ValueHead { out: nn::linear(path / "out", dense.width(), 1, Default::default()), dense }
     }
 
     /// `input` [n, from] to `[n]`.
-    pub fn forward(&self, input: &Tensor, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, input: &Tensor, train: bool) -> Tensor {
         precision::linear_f32(&self.out, &self.dense.forward(input.shallow_clone(), train)).squeeze_dim(1)
     }
 }

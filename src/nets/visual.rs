@@ -13,16 +13,16 @@ use super::weights;
 use crate::house::view::Frame;
 
 /// The side of a feature map.
-pub const SIDE: i64 = 7;
+pub(crate) const SIDE: i64 = 7;
 
 /// The size of a visual encoder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VisualSpec {
     /// The side of the image it reads, in pixels: [`SIDE`], doubled as often as there are channels.
-    pub image_size: i64,
+    pub(crate) image_size: i64,
     /// Channels at 1/2, 1/4, 1/8 of the image and so on; the last are the features.
-    pub channels: Vec<i64>,
+    pub(crate) channels: Vec<i64>,
 }
 
 impl VisualSpec {
@@ -30,7 +30,7 @@ impl VisualSpec {
     ///
     /// # Errors
     /// When it becomes another, or there is no channel.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
         let halvings = self.channels.len();
         anyhow::ensure!((1..=6).contains(&halvings), "visual_encoder.channels has {halvings} entries, not 1 to 6");
         let side = SIDE << halvings;
@@ -44,7 +44,7 @@ impl VisualSpec {
     }
 
     /// Features in each of the 7 x 7 places.
-    pub fn features(&self) -> i64 {
+    pub(crate) fn features(&self) -> i64 {
         self.channels.last().copied().unwrap_or(0)
     }
 
@@ -54,7 +54,7 @@ impl VisualSpec {
     }
 
     /// What the encoder reads of a frame: planes of bytes.
-    pub fn image(&self, frame: &Frame) -> Vec<u8> {
+    pub(crate) fn image(&self, frame: &Frame) -> Vec<u8> {
         resize_area(&frame.rgb, frame.width, self.image_size as usize)
     }
 }
@@ -120,7 +120,7 @@ pub struct HouseEncoder {
 
 impl HouseEncoder {
     /// An encoder with fresh weights under `path`.
-    pub fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> HouseEncoder {
+    pub(crate) fn new(path: &nn::Path<'_>, spec: &VisualSpec) -> HouseEncoder {
         let stage =
             |(i, pair): (usize, &[i64])| ResidualStage::new(&(path / format!("stage{}", i + 1)), pair[0], pair[1]);
         HouseEncoder {
@@ -132,22 +132,22 @@ impl HouseEncoder {
     }
 
     /// The size that it was built with.
-    pub fn spec(&self) -> &VisualSpec {
+    pub(crate) fn spec(&self) -> &VisualSpec {
         &self.spec
     }
 
     /// The device of its weights.
-    pub fn device(&self) -> Device {
+    pub(crate) fn device(&self) -> Device {
         self.device
     }
 
     /// `pixels` [n, 3, image_size, image_size] in 0..255, any kind, to [n, features, 7, 7].
-    pub fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
+    pub(crate) fn forward(&self, pixels: &Tensor, train: bool) -> Tensor {
         self.forward_with(Precision::Full, pixels, train)
     }
 
     /// The same, computed with `precision`; the maps have 32 bits.
-    pub fn forward_with(&self, precision: Precision, pixels: &Tensor, train: bool) -> Tensor {
+    pub(crate) fn forward_with(&self, precision: Precision, pixels: &Tensor, train: bool) -> Tensor {
         let x = precision.cast(&((pixels.to_device(self.device).to_kind(Kind::Float) - 127.5) / 64.0));
         let stem = self.stem.forward(&x, train).relu();
         self.stages.iter().fold(stem, |x, stage| stage.forward(&x, train)).to_kind(Kind::Float)
@@ -157,7 +157,7 @@ impl HouseEncoder {
     ///
     /// # Errors
     /// When the weights cannot be read.
-    pub fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
+    pub(crate) fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
         let stage = |stage: &ResidualStage| [stage.down.folded(), stage.first.folded(), stage.second.folded()];
         Ok(FrozenVisual {
             spec: self.spec.clone(),
@@ -169,7 +169,8 @@ impl HouseEncoder {
     }
 
     /// The feature maps [n, features, 7, 7] of shrunken frames (see [`VisualSpec::image`]), without gradients.
-    pub fn encode(&self, images: &[Vec<u8>]) -> Tensor {
+    #[cfg(test)]
+    pub(crate) fn encode(&self, images: &[Vec<u8>]) -> Tensor {
         let side = self.spec.image_size;
         let pixels = Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]);
         tch::no_grad(|| self.forward(&pixels, false))
@@ -178,7 +179,7 @@ impl HouseEncoder {
 
 /// A trained encoder that only computes, faster than it trains.
 #[derive(Debug)]
-pub struct FrozenVisual {
+pub(crate) struct FrozenVisual {
     spec: VisualSpec,
     stem: FoldedConv,
     stages: Vec<[FoldedConv; 3]>,
@@ -187,10 +188,6 @@ pub struct FrozenVisual {
 }
 
 impl FrameEncoder for FrozenVisual {
-    fn side(&self) -> usize {
-        self.spec.image_size as usize
-    }
-
     fn image(&self, frame: &Frame) -> Vec<u8> {
         self.spec.image(frame)
     }

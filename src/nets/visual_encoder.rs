@@ -32,7 +32,7 @@ impl VisualEncoder {
     }
 
     /// Where ResNet-18's weights are looked for.
-    pub fn resnet18_file() -> PathBuf {
+    pub(crate) fn resnet18_file() -> PathBuf {
         cache_folder().join("encoders/resnet18.safetensors")
     }
 
@@ -40,7 +40,7 @@ impl VisualEncoder {
     ///
     /// # Errors
     /// When the file is missing or holds something else.
-    pub fn resnet18(file: &Path, device: Device) -> anyhow::Result<VisualEncoder> {
+    pub(crate) fn resnet18(file: &Path, device: Device) -> anyhow::Result<VisualEncoder> {
         let net = ResNet18::read(file, device).with_context(|| {
             format!("ResNet-18's weights belong in {}: assets/convert_resnet18.py makes that file", file.display())
         })?;
@@ -48,7 +48,7 @@ impl VisualEncoder {
     }
 
     /// Features in each of a map's 7 x 7 places.
-    pub fn features(&self) -> i64 {
+    pub(crate) fn features(&self) -> i64 {
         match self {
             VisualEncoder::House { encoder, .. } => encoder.spec().features(),
             VisualEncoder::ResNet18(_) => resnet18::FEATURES,
@@ -56,7 +56,7 @@ impl VisualEncoder {
     }
 
     /// The weights that a checkpoint keeps.
-    pub fn store(&self) -> Option<&nn::VarStore> {
+    pub(crate) fn store(&self) -> Option<&nn::VarStore> {
         match self {
             VisualEncoder::House { store, .. } => Some(store),
             VisualEncoder::ResNet18(_) => None,
@@ -67,7 +67,7 @@ impl VisualEncoder {
     ///
     /// # Errors
     /// When the weights cannot be read.
-    pub fn frozen(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
+    pub(crate) fn frozen(&self) -> anyhow::Result<Box<dyn FrameEncoder>> {
         match self {
             VisualEncoder::House { encoder, store } => Ok(Box::new(encoder.frozen(store)?)),
             VisualEncoder::ResNet18(net) => Ok(net.share()),
@@ -92,7 +92,7 @@ mod tests {
         let (scene, world) = kitchen();
         let sight = eyes.frozen().unwrap();
         let image = sight.image(Renderer::new(300).draw(&scene, &world));
-        assert_eq!(image.len(), 3 * sight.side() * sight.side());
+        assert_eq!(image.len(), 3 * 224 * 224);
         assert_eq!(sight.encode(&[image]).size(), [1, eyes.features(), 7, 7]);
         assert!(eyes.store().is_none());
     }

@@ -26,12 +26,12 @@ pub struct TensorSpec {
 
 impl TensorSpec {
     /// A tensor of 32-bit floats.
-    pub fn float(shape: &[i64]) -> TensorSpec {
+    pub(crate) fn float(shape: &[i64]) -> TensorSpec {
         TensorSpec { kind: Kind::Float, shape: shape.to_vec() }
     }
 
     /// The form of an existing tensor.
-    pub fn of(tensor: &Tensor) -> TensorSpec {
+    pub(crate) fn of(tensor: &Tensor) -> TensorSpec {
         TensorSpec { kind: tensor.kind(), shape: tensor.size() }
     }
 }
@@ -44,24 +44,24 @@ impl fmt::Display for TensorSpec {
 
 /// A tensor that is there, in another form than the model expects.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Misshapen {
+pub(crate) struct Misshapen {
     /// The tensor's name.
-    pub name: String,
+    pub(crate) name: String,
     /// What the file holds.
-    pub found: TensorSpec,
+    pub(crate) found: TensorSpec,
     /// What the model expects.
-    pub expected: TensorSpec,
+    pub(crate) expected: TensorSpec,
 }
 
 /// Every difference between a weights file and what a model expects.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Differences {
     /// Names that the model expects and the file lacks.
-    pub missing: Vec<String>,
+    pub(crate) missing: Vec<String>,
     /// Names that the model does not know.
-    pub extra: Vec<String>,
+    pub(crate) extra: Vec<String>,
     /// Tensors in another form.
-    pub misshapen: Vec<Misshapen>,
+    pub(crate) misshapen: Vec<Misshapen>,
 }
 
 impl fmt::Display for Differences {
@@ -155,7 +155,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Tensors, BTreeMap<String, String>),
 ///
 /// # Errors
 /// When a tensor cannot be read as 32-bit floats.
-pub fn digest(tensors: impl IntoIterator<Item = (String, Tensor)>) -> anyhow::Result<String> {
+pub(crate) fn digest(tensors: impl IntoIterator<Item = (String, Tensor)>) -> anyhow::Result<String> {
     let tensors: BTreeMap<String, Tensor> = tensors.into_iter().collect();
     let mut hash = Sha256::new();
     for (name, tensor) in tensors {
@@ -170,7 +170,11 @@ pub fn digest(tensors: impl IntoIterator<Item = (String, Tensor)>) -> anyhow::Re
 ///
 /// # Errors
 /// [`WeightsError::Unfit`], which names every missing, extra and misshapen tensor and the file.
-pub fn check(path: &Path, tensors: &Tensors, expected: &BTreeMap<String, TensorSpec>) -> Result<(), WeightsError> {
+pub(crate) fn check(
+    path: &Path,
+    tensors: &Tensors,
+    expected: &BTreeMap<String, TensorSpec>,
+) -> Result<(), WeightsError> {
     let mut differences = Differences::default();
     for (name, expected) in expected {
         match tensors.get(name).map(TensorSpec::of) {
@@ -192,7 +196,8 @@ pub fn check(path: &Path, tensors: &Tensors, expected: &BTreeMap<String, TensorS
 ///
 /// # Errors
 /// When the file cannot be read, is damaged, or differs from the variables in any name, shape or type.
-pub fn load(path: &Path, variables: &mut nn::VarStore) -> Result<BTreeMap<String, String>, WeightsError> {
+#[cfg(test)]
+pub(crate) fn load(path: &Path, variables: &mut nn::VarStore) -> Result<BTreeMap<String, String>, WeightsError> {
     let (tensors, metadata) = read_with_metadata(path)?;
     let mut targets: Tensors = variables.variables().into_iter().collect();
     let expected = targets.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
@@ -211,7 +216,7 @@ pub fn load(path: &Path, variables: &mut nn::VarStore) -> Result<BTreeMap<String
 ///
 /// # Errors
 /// When one is missing or of another shape.
-pub fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<()> {
+pub(crate) fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<()> {
     tch::no_grad(|| {
         for (name, mut variable) in to.variables() {
             let name = format!("{prefix}{name}");
@@ -223,12 +228,12 @@ pub fn copy(from: &Tensors, prefix: &str, to: &nn::VarStore) -> anyhow::Result<(
 }
 
 /// The tensors with `prefix` before each name.
-pub fn prefixed(prefix: &str, tensors: Tensors) -> Tensors {
+pub(crate) fn prefixed(prefix: &str, tensors: Tensors) -> Tensors {
     tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)).collect()
 }
 
 /// The tensors under `prefix`, without it.
-pub fn under(prefix: &str, tensors: &Tensors) -> Tensors {
+pub(crate) fn under(prefix: &str, tensors: &Tensors) -> Tensors {
     let stripped =
         |(name, tensor): (&String, &Tensor)| Some((name.strip_prefix(prefix)?.to_string(), tensor.shallow_clone()));
     tensors.iter().filter_map(stripped).collect()

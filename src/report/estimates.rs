@@ -6,21 +6,21 @@ use super::stats;
 use super::stats::Interval;
 
 /// Drives the resampling of the bootstrap.
-pub const BOOTSTRAP_SEED: u64 = 0;
+pub(crate) const BOOTSTRAP_SEED: u64 = 0;
 
 /// A mean and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Mean {
+pub(crate) struct Mean {
     /// The mean of all episodes, whatever their task.
-    pub mean: f64,
+    pub(crate) mean: f64,
     /// Its 95 % interval, lower end first: bootstrap over tasks.
-    pub interval: Interval,
+    pub(crate) interval: Interval,
 }
 
 impl Mean {
     /// Of the values of each task's episodes.
-    pub fn of(groups: &[Vec<f64>]) -> Mean {
+    pub(crate) fn of(groups: &[Vec<f64>]) -> Mean {
         let mean = stats::mean(groups.iter().flatten().copied());
         Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
     }
@@ -31,13 +31,13 @@ impl Mean {
 #[serde(deny_unknown_fields)]
 pub struct SkillRate {
     /// Subtasks of the kind whose turn came.
-    pub reached: usize,
+    pub(crate) reached: usize,
     /// Subtasks among those that were completed.
-    pub completed: usize,
+    pub(crate) completed: usize,
     /// `completed` as a share of `reached`; 0 when none was reached.
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// The 95 % Wilson interval of the rate, lower end first.
-    pub interval: Interval,
+    pub(crate) interval: Interval,
 }
 
 impl SkillRate {

@@ -16,72 +16,72 @@ use crate::episode::record::Episode;
 /// Episodes episodes by task, in the set's order and by seed within: sums of floats then do not depend on the order in which
 /// the episodes ended.
 #[derive(Clone)]
-pub struct EpisodesByTask<'a> {
+pub(crate) struct EpisodesByTask<'a> {
     groups: Vec<(&'a Task, Vec<&'a Episode>)>,
 }
 
 /// Figures of some of a run's episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct GroupFigures {
+pub(crate) struct GroupFigures {
     /// How many episodes the figures are of.
-    pub episodes: usize,
+    pub(crate) episodes: usize,
     /// How many of them completed every subtask.
-    pub successes: usize,
+    pub(crate) successes: usize,
     /// `successes` as a share of `episodes`.
-    pub success: f64,
+    pub(crate) success: f64,
     /// The 95 % Wilson interval of `success`, lower end first.
-    pub success_interval: Interval,
+    pub(crate) success_interval: Interval,
     /// Completed subtasks as a share of those that were asked.
-    pub progress: Mean,
+    pub(crate) progress: Mean,
 }
 
 /// Episodes that fell short for one reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FailureCount {
+pub(crate) struct FailureCount {
     /// How many episodes fell short for this reason.
-    pub episodes: usize,
+    pub(crate) episodes: usize,
     /// As a share of all episodes.
-    pub share: f64,
+    pub(crate) share: f64,
     /// The task of the first such episode.
-    pub example_task: String,
+    pub(crate) example_task: String,
     /// The seed of that episode.
-    pub example_seed: u64,
+    pub(crate) example_seed: u64,
 }
 
 /// An episode that ended with an error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ErroredEpisode {
+pub(crate) struct ErroredEpisode {
     /// The id of its task.
-    pub task: String,
+    pub(crate) task: String,
     /// Its seed.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// How the instruction was derived from the task's own.
     #[serde(default, skip_serializing_if = "InstructionVariant::is_original")]
-    pub variant: InstructionVariant,
+    pub(crate) variant: InstructionVariant,
     /// The subtask from which the agent acted.
-    pub start_subtask: u32,
+    pub(crate) start_subtask: u32,
     /// How often it was begun.
-    pub attempts: u32,
+    pub(crate) attempts: u32,
     /// The error that ended it, as the policy or the environment reported it.
-    pub error: String,
+    pub(crate) error: String,
 }
 
 /// Episodes that the expert led to the same subtask.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct StartSubtaskFigures {
+pub(crate) struct StartSubtaskFigures {
     /// The agent's very first subtask.
-    pub first_subtask: SkillRate,
+    pub(crate) first_subtask: SkillRate,
     /// Figures of all subtasks that were left to the agent.
-    pub remaining: GroupFigures,
+    pub(crate) remaining: GroupFigures,
 }
 
 impl<'a> EpisodesByTask<'a> {
     /// Groups episodes by their tasks.
-    pub fn new(tasks: &'a [Task], episodes: &'a [Episode]) -> EpisodesByTask<'a> {
+    pub(crate) fn new(tasks: &'a [Task], episodes: &'a [Episode]) -> EpisodesByTask<'a> {
         let mut of_task: BTreeMap<&str, Vec<&Episode>> = BTreeMap::new();
         for episode in episodes {
             of_task.entry(&episode.task).or_default().push(episode);
@@ -95,29 +95,29 @@ impl<'a> EpisodesByTask<'a> {
     }
 
     /// The episodes that `keep` accepts.
-    pub fn filter(&self, keep: impl Fn(&Episode) -> bool) -> EpisodesByTask<'a> {
+    pub(crate) fn filter(&self, keep: impl Fn(&Episode) -> bool) -> EpisodesByTask<'a> {
         let kept = |group: &[&'a Episode]| group.iter().copied().filter(|episode| keep(episode)).collect::<Vec<_>>();
         let groups = self.groups.iter().map(|(task, group)| (*task, kept(group)));
         EpisodesByTask { groups: groups.filter(|(_, group)| !group.is_empty()).collect() }
     }
 
     /// How many tasks there are.
-    pub fn tasks(&self) -> usize {
+    pub(crate) fn tasks(&self) -> usize {
         self.groups.len()
     }
 
     /// Every episode with its task.
-    pub fn iter(&self) -> Vec<(&'a Task, &'a Episode)> {
+    pub(crate) fn iter(&self) -> Vec<(&'a Task, &'a Episode)> {
         self.groups.iter().flat_map(|(task, group)| group.iter().map(|&episode| (*task, episode))).collect()
     }
 
     /// A figure of every episode, by task.
-    pub fn values(&self, value: fn(&Episode) -> f64) -> Vec<Vec<f64>> {
+    pub(crate) fn values(&self, value: fn(&Episode) -> f64) -> Vec<Vec<f64>> {
         self.groups.iter().map(|(_, group)| group.iter().map(|episode| value(episode)).collect()).collect()
     }
 
     /// The figures of all of them.
-    pub fn figures(&self) -> GroupFigures {
+    pub(crate) fn figures(&self) -> GroupFigures {
         let all = self.iter();
         let successes = all.iter().filter(|(_, episode)| episode.success).count();
         GroupFigures {
@@ -130,7 +130,7 @@ impl<'a> EpisodesByTask<'a> {
     }
 
     /// The figures of each scene's episodes; generated houses count by their room.
-    pub fn by_scene(&self) -> BTreeMap<String, GroupFigures> {
+    pub(crate) fn by_scene(&self) -> BTreeMap<String, GroupFigures> {
         let mut scenes: BTreeMap<String, Vec<(&'a Task, Vec<&'a Episode>)>> = BTreeMap::new();
         for (task, group) in &self.groups {
             let name = match &task.scene {
@@ -143,7 +143,7 @@ impl<'a> EpisodesByTask<'a> {
     }
 
     /// Steps of successful episodes as a multiple of the expert's, where the task says how many those are.
-    pub fn steps_over_expert(&self) -> Option<Mean> {
+    pub(crate) fn steps_over_expert(&self) -> Option<Mean> {
         let ratios = self.groups.iter().filter(|(task, _)| task.expert_steps > 0).map(|(task, group)| {
             let successes = group.iter().filter(|episode| episode.success);
             successes.map(|episode| f64::from(episode.steps) / f64::from(task.expert_steps)).collect::<Vec<_>>()
@@ -154,7 +154,7 @@ impl<'a> EpisodesByTask<'a> {
 }
 
 /// How many episodes fell short for each reason, with an example.
-pub fn failures(episodes: &EpisodesByTask<'_>) -> BTreeMap<Failure, FailureCount> {
+pub(crate) fn failures(episodes: &EpisodesByTask<'_>) -> BTreeMap<Failure, FailureCount> {
     let all = episodes.iter();
     let mut classes: BTreeMap<Failure, FailureCount> = BTreeMap::new();
     for (task, episode) in &all {
@@ -169,7 +169,7 @@ pub fn failures(episodes: &EpisodesByTask<'_>) -> BTreeMap<Failure, FailureCount
 }
 
 /// Every episode that ended with an error.
-pub fn errored(episodes: &EpisodesByTask<'_>) -> Vec<ErroredEpisode> {
+pub(crate) fn errored(episodes: &EpisodesByTask<'_>) -> Vec<ErroredEpisode> {
     let errors = episodes.iter().into_iter().filter_map(|(_, episode)| Some((episode, episode.error.clone()?)));
     let listed = errors.map(|(episode, error)| ErroredEpisode {
         task: episode.task.clone(),
@@ -183,7 +183,7 @@ pub fn errored(episodes: &EpisodesByTask<'_>) -> Vec<ErroredEpisode> {
 }
 
 /// The figures of each instruction variant, over episodes that start where their tasks do.
-pub fn instruction_variants(episodes: &EpisodesByTask<'_>) -> BTreeMap<InstructionVariant, GroupFigures> {
+pub(crate) fn instruction_variants(episodes: &EpisodesByTask<'_>) -> BTreeMap<InstructionVariant, GroupFigures> {
     let of = |variant: InstructionVariant| {
         episodes.filter(|episode| episode.variant == variant && episode.start_subtask == 0).figures()
     };
@@ -195,7 +195,7 @@ pub fn instruction_variants(episodes: &EpisodesByTask<'_>) -> BTreeMap<Instructi
 }
 
 /// Figures by the subtask from which the agent acted.
-pub fn start_subtasks(episodes: &EpisodesByTask<'_>) -> BTreeMap<u32, StartSubtaskFigures> {
+pub(crate) fn start_subtasks(episodes: &EpisodesByTask<'_>) -> BTreeMap<u32, StartSubtaskFigures> {
     let own = episodes.filter(|episode| episode.variant.is_original());
     let last = own.iter().iter().map(|(_, episode)| episode.start_subtask).max();
     let of = |from: u32| {
@@ -207,7 +207,7 @@ pub fn start_subtasks(episodes: &EpisodesByTask<'_>) -> BTreeMap<u32, StartSubta
 }
 
 /// How often a subtask whose turn came was completed, by its kind.
-pub fn skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
+pub(crate) fn skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
     rates(episodes, |task, episode| {
         let completed = episode.completed as usize;
         let turns = task.subtasks.iter().enumerate().take(completed + 1);
@@ -216,7 +216,7 @@ pub fn skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
 }
 
 /// How often the agent completed its very first subtask, by the subtask's kind.
-pub fn first_subtask_skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
+pub(crate) fn first_subtask_skills(episodes: &EpisodesByTask<'_>) -> BTreeMap<SkillKind, SkillRate> {
     let own = episodes.filter(|episode| episode.variant.is_original());
     rates(&own, |task, episode| {
         let first = task.subtasks.get(episode.start_subtask as usize);

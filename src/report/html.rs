@@ -29,7 +29,7 @@ const TEMPLATE: &str = include_str!("../../assets/report.html");
 ///
 /// # Errors
 /// When a scene is missing, or a frame cannot be encoded.
-pub fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -> anyhow::Result<String> {
+pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -> anyhow::Result<String> {
     let row = |(number, episode): (usize, &Episode)| -> anyhow::Result<serde_json::Value> {
         let task = run.set.tasks.iter().find(|task| task.id == episode.task).context("an episode of no task")?;
         let outcome = match (&episode.error, episode.failure) {
@@ -70,7 +70,7 @@ pub fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -> anyho
 ///
 /// # Errors
 /// Never for values that JSON has.
-pub fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
+pub(crate) fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }
 

@@ -13,13 +13,13 @@ pub(crate) fn between([low, high]: Interval) -> String {
 }
 
 /// A Markdown table of rows of one width.
-pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
+pub(crate) fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().map(Vec::from).collect();
     aligned_table(&head.map(String::from), &rows)
 }
 
 /// A Markdown table whose columns line up in plain text too; all but the first are aligned right.
-pub fn aligned_table(head: &[String], rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned_table(head: &[String], rows: &[Vec<String>]) -> String {
     let lines = || std::iter::once(head).chain(rows.iter().map(Vec::as_slice));
     let columns = 0..head.len();
     let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();

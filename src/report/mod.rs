@@ -2,14 +2,14 @@
 
 pub mod charts;
 pub mod compare;
-pub mod estimates;
-pub mod export;
-pub mod groups;
-pub mod html;
-pub mod markdown_table;
-pub mod pixmap;
-pub mod stats;
-pub mod summary;
-pub mod summary_files;
-pub mod summary_markdown;
-pub mod threshold;
+pub(crate) mod estimates;
+pub(crate) mod export;
+pub(crate) mod groups;
+pub(crate) mod html;
+pub(crate) mod markdown_table;
+pub(crate) mod pixmap;
+pub(crate) mod stats;
+pub(crate) mod summary;
+pub(crate) mod summary_files;
+pub(crate) mod summary_markdown;
+pub(crate) mod threshold;

@@ -14,44 +14,44 @@ use image::{ExtendedColorType, ImageEncoder};
 use crate::house::view::Frame;
 
 /// A colour: red, green, blue.
-pub type RgbColour = [u8; 3];
+pub(crate) type RgbColour = [u8; 3];
 
 /// A picture of three bytes a pixel, row by row. Whatever `embedded-graphics` has can be drawn on it; what lies outside is cut.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pixmap {
+pub(crate) struct Pixmap {
     /// Pixels in a row.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Rows of pixels.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Red, green and blue of every pixel, row by row.
-    pub rgb: Vec<u8>,
+    pub(crate) rgb: Vec<u8>,
 }
 
 /// A colour as `embedded-graphics` names it.
-pub fn rgb888([red, green, blue]: RgbColour) -> Rgb888 {
+pub(crate) fn rgb888([red, green, blue]: RgbColour) -> Rgb888 {
     Rgb888::new(red, green, blue)
 }
 
 impl Pixmap {
     /// A picture of one colour.
-    pub fn new(width: usize, height: usize, colour: RgbColour) -> Pixmap {
+    pub(crate) fn new(width: usize, height: usize, colour: RgbColour) -> Pixmap {
         Pixmap { width, height, rgb: colour.repeat(width * height) }
     }
 
     /// Draws a shape or a text of `embedded-graphics`.
-    pub fn draw(&mut self, drawable: &impl Drawable<Color = Rgb888>) {
+    pub(crate) fn draw(&mut self, drawable: &impl Drawable<Color = Rgb888>) {
         let Ok(_) = drawable.draw(self);
     }
 
     /// Writes a line of text with its upper left corner at (x, y).
-    pub fn text(&mut self, x: usize, y: usize, text: &str, font: &MonoFont<'_>, colour: RgbColour) {
+    pub(crate) fn text(&mut self, x: usize, y: usize, text: &str, font: &MonoFont<'_>, colour: RgbColour) {
         let style = TextStyleBuilder::new().alignment(Alignment::Left).baseline(Baseline::Top).build();
         let at = Point::new(x as i32, y as i32);
         self.draw(&Text::with_text_style(text, at, MonoTextStyle::new(font, rgb888(colour)), style));
     }
 
     /// Draws a frame with its upper left corner at (x, y), every `step`th pixel of it.
-    pub fn frame(&mut self, frame: &Frame, x: usize, y: usize, step: usize) {
+    pub(crate) fn frame(&mut self, frame: &Frame, x: usize, y: usize, step: usize) {
         for row in 0..frame.height / step {
             for column in 0..frame.width / step {
                 let at = 3 * (row * step * frame.width + column * step);
@@ -71,7 +71,7 @@ impl Pixmap {
     ///
     /// # Errors
     /// Never in practice: it is written to memory.
-    pub fn png(&self) -> anyhow::Result<Vec<u8>> {
+    pub(crate) fn png(&self) -> anyhow::Result<Vec<u8>> {
         let mut data = Vec::new();
         let (width, height) = (self.width as u32, self.height as u32);
         PngEncoder::new(&mut data)

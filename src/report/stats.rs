@@ -7,20 +7,20 @@ use rand_chacha::ChaCha8Rng;
 /// The 0.975 quantile of the standard normal distribution: 95 % lie within.
 const Z: f64 = 1.959_963_984_540_054;
 /// How often [`bootstrap_mean`] resamples.
-pub const RESAMPLES: usize = 10_000;
+pub(crate) const RESAMPLES: usize = 10_000;
 
 /// An interval, lower end first.
-pub type Interval = [f64; 2];
+pub(crate) type Interval = [f64; 2];
 
 /// Wilson's 95 % score interval of a rate; everything is possible when nothing was tried.
-pub fn wilson(successes: usize, trials: usize) -> Interval {
+pub(crate) fn wilson(successes: usize, trials: usize) -> Interval {
     score(successes as f64 / trials.max(1) as f64, trials as f64)
 }
 
 /// Wilson's interval of the rate of successes (1, else 0) in whole groups. Episodes of one task (different seeds) are alike, so
 /// they count for as many as are as informative, had they been drawn independently: the rate's variance between tasks says how
 /// many. That is no fewer than there are tasks and no more than there are episodes (Dean and Pagano, 2015, with a bound).
-pub fn wilson_of_groups(groups: &[Vec<f64>]) -> Interval {
+pub(crate) fn wilson_of_groups(groups: &[Vec<f64>]) -> Interval {
     let sums: Vec<(f64, f64)> =
         groups.iter().filter(|group| !group.is_empty()).map(|group| (group.iter().sum(), group.len() as f64)).collect();
     let (tasks, trials) = (sums.len() as f64, sums.iter().map(|(_, count)| count).sum::<f64>());
@@ -47,14 +47,14 @@ fn score(rate: f64, n: f64) -> Interval {
 }
 
 /// The mean of all values; 0 when there are none.
-pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0usize), |(sum, count), value| (sum + value, count + 1));
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
 /// A 95 % percentile bootstrap interval of the mean of all values, resampling whole groups: episodes of one task (different
 /// seeds) are alike, so the tasks are what varies. Both ends are 0 when there is nothing.
-pub fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
+pub(crate) fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
     let sums: Vec<(f64, usize)> =
         groups.iter().filter(|group| !group.is_empty()).map(|group| (group.iter().sum(), group.len())).collect();
     if sums.is_empty() {
@@ -73,7 +73,7 @@ pub fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
 }
 
 /// McNemar's exact test, two-sided: how likely so uneven a split of the pairs that differ is when neither side is better.
-pub fn mcnemar(only_first: usize, only_second: usize) -> f64 {
+pub(crate) fn mcnemar(only_first: usize, only_second: usize) -> f64 {
     let (n, fewer) = (only_first + only_second, only_first.min(only_second));
     // The binomial distribution's terms in logarithms: 2^-n underflows for large n.
     let mut log_term = -(n as f64) * std::f64::consts::LN_2;

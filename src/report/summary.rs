@@ -19,11 +19,11 @@ use crate::run_dir::manifest::RunManifest;
 /// How the intervals were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct IntervalMethods {
+pub(crate) struct IntervalMethods {
     /// How intervals of rates were made.
-    pub rates: String,
+    pub(crate) rates: String,
     /// How intervals of means were made.
-    pub means: String,
+    pub(crate) means: String,
 }
 
 /// The summary of a run. Its figures are of the episodes in the tasks' own words from their starts; those in other words or
@@ -33,72 +33,72 @@ pub struct IntervalMethods {
 pub struct RunSummary {
     /// Version of the format of `summary.json`.
     #[schemars(extend("const" = RunSummary::FORMAT))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The name that the task file gives itself.
-    pub task_set: String,
+    pub(crate) task_set: String,
     /// The name of the policy that acted: of an agent, its checkpoint's.
-    pub policy: String,
+    pub(crate) policy: String,
     /// The rules by which subtasks counted as completed.
-    pub grader: Grading,
+    pub(crate) grader: Grading,
     /// The run was interrupted; only some of its episodes are in.
-    pub partial: bool,
+    pub(crate) partial: bool,
     /// Tasks with at least one episode.
-    pub tasks: usize,
+    pub(crate) tasks: usize,
     /// Episodes, failed and errored ones included.
-    pub episodes: usize,
+    pub(crate) episodes: usize,
     /// Episodes that ended with an error, in other words and from later subtasks too; they count as no success.
-    pub errors: usize,
+    pub(crate) errors: usize,
     /// The share of episodes in which every subtask was completed.
-    pub success: f64,
+    pub(crate) success: f64,
     /// The 95 % Wilson interval of `success`, lower end first.
-    pub success_interval: Interval,
+    pub(crate) success_interval: Interval,
     /// Completed subtasks of an episode.
-    pub completed_subtasks: Mean,
+    pub(crate) completed_subtasks: Mean,
     /// Completed subtasks of an episode as a share of its subtasks.
-    pub progress: Mean,
+    pub(crate) progress: Mean,
     /// By the number of subtasks: mean completed ones as a share of them.
-    pub progress_by_length: BTreeMap<u32, f64>,
+    pub(crate) progress_by_length: BTreeMap<u32, f64>,
     /// By the number of subtasks: the 95 % interval of that.
-    pub progress_interval_by_length: BTreeMap<u32, Interval>,
+    pub(crate) progress_interval_by_length: BTreeMap<u32, Interval>,
     /// By the number of subtasks: the share of successes.
-    pub success_by_length: BTreeMap<u32, f64>,
+    pub(crate) success_by_length: BTreeMap<u32, f64>,
     /// By the number of subtasks: the episodes.
-    pub episodes_by_length: BTreeMap<u32, usize>,
+    pub(crate) episodes_by_length: BTreeMap<u32, usize>,
     /// By the kind of skill.
     pub skills: BTreeMap<SkillKind, SkillRate>,
     /// By the scene; generated houses by their room.
-    pub scenes: BTreeMap<String, GroupFigures>,
+    pub(crate) scenes: BTreeMap<String, GroupFigures>,
     /// Mean steps of an episode, successful or not.
-    pub steps_mean: f64,
+    pub(crate) steps_mean: f64,
     /// Steps that the expert takes, for the same episodes.
-    pub expert_steps_mean: f64,
+    pub(crate) expert_steps_mean: f64,
     /// Steps of a successful episode as a multiple of the expert's; nothing without any.
-    pub steps_over_expert: Option<Mean>,
+    pub(crate) steps_over_expert: Option<Mean>,
     /// Why episodes fell short, by class.
-    pub failures: BTreeMap<Failure, FailureCount>,
+    pub(crate) failures: BTreeMap<Failure, FailureCount>,
     /// Every episode that ended with an error.
-    pub errored_episodes: Vec<ErroredEpisode>,
+    pub(crate) errored_episodes: Vec<ErroredEpisode>,
     /// By instruction variant, where a run asked for them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub instruction_variants: BTreeMap<InstructionVariant, GroupFigures>,
+    pub(crate) instruction_variants: BTreeMap<InstructionVariant, GroupFigures>,
     /// By the subtask from which the agent acted, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub start_subtasks: BTreeMap<u32, StartSubtaskFigures>,
+    pub(crate) start_subtasks: BTreeMap<u32, StartSubtaskFigures>,
     /// By the kind of the first subtask that was the agent's own, where a run asked for it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub first_subtask_skills: BTreeMap<SkillKind, SkillRate>,
+    pub(crate) first_subtask_skills: BTreeMap<SkillKind, SkillRate>,
     /// SHA-256 of the episodes' lines in the run's order.
-    pub episodes_hash: String,
+    pub(crate) episodes_hash: String,
     /// How the intervals were made.
-    pub interval_methods: IntervalMethods,
+    pub(crate) interval_methods: IntervalMethods,
 }
 
 impl RunSummary {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 2;
+    pub(crate) const FORMAT: u32 = 2;
 
     /// Sums up `episodes`, each of one of `tasks`; the order of the episodes does not matter.
-    pub fn of(manifest: &RunManifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> RunSummary {
+    pub(crate) fn of(manifest: &RunManifest, tasks: &[Task], episodes: &[Episode], partial: bool) -> RunSummary {
         let every = EpisodesByTask::new(tasks, episodes);
         let plain = every.filter(|episode| episode.is_plain());
         let all = plain.iter();

@@ -11,7 +11,7 @@ use crate::run_dir::layout::SUMMARY;
 ///
 /// # Errors
 /// When the folder cannot be written to.
-pub fn write(summary: &RunSummary, folder: &Path) -> anyhow::Result<()> {
+pub(crate) fn write(summary: &RunSummary, folder: &Path) -> anyhow::Result<()> {
     atomic_file::write(&folder.join("summary.md"), summary.markdown().as_bytes())?;
     atomic_file::write(&folder.join("summary.csv"), &summary.csv()?)?;
     progress_by_length::draw(&[summary]).write(folder, progress_by_length::FILE_STEM)?;

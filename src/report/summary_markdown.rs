@@ -11,7 +11,7 @@ use crate::domain::SkillKind;
 
 impl RunSummary {
     /// The page that people read.
-    pub fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let partial =
             "\n**Partial: the run was interrupted. The same command with this folder as --out continues it.**\n";
         let mut parts = vec![
@@ -107,7 +107,7 @@ impl RunSummary {
     ///
     /// # Errors
     /// Never in practice: it writes to memory.
-    pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
+    pub(crate) fn csv(&self) -> anyhow::Result<Vec<u8>> {
         let mut table = csv::Writer::from_writer(Vec::new());
         table.write_record(["group", "measure", "count", "value", "low", "high"])?;
         let mut row = |group: &str, measure: &str, count: usize, value: f64, interval: Option<Interval>| {

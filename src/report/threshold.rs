@@ -6,20 +6,20 @@ use super::summary::RunSummary;
 
 /// A figure that a run must reach, as `METRIC=X`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Threshold {
+pub(crate) struct Threshold {
     metric: String,
     least: f64,
 }
 
 impl Threshold {
     /// What may stand left of the equals sign.
-    pub const METRICS: &str = "success, completed_subtasks, progress, success_by_length.N, progress_by_length.N";
+    pub(crate) const METRICS: &str = "success, completed_subtasks, progress, success_by_length.N, progress_by_length.N";
 
     /// The measured figure when it falls short; `None` when it is reached.
     ///
     /// # Errors
     /// When no episode has that many subtasks.
-    pub fn missed_by(&self, summary: &RunSummary) -> anyhow::Result<Option<f64>> {
+    pub(crate) fn missed_by(&self, summary: &RunSummary) -> anyhow::Result<Option<f64>> {
         let of_length =
             |map: &BTreeMap<u32, f64>, length: &str| length.parse().ok().and_then(|n: u32| map.get(&n).copied());
         let measured = match self.metric.split_once('.') {

@@ -7,7 +7,7 @@ use time::UtcDateTime;
 
 /// The folder of a run that was given none: `runs/NAME-YYYYMMDD-HHMMSS`, in universal time. Where there is one already,
 /// of a run that began in the same second or before the clock was set back, a number is added.
-pub fn default_path(name: &str, unix_seconds: u64, is_taken: &dyn Fn(&Path) -> bool) -> PathBuf {
+pub(crate) fn default_path(name: &str, unix_seconds: u64, is_taken: &dyn Fn(&Path) -> bool) -> PathBuf {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
     let name: String = name.trim().trim_start_matches('.').chars().take(60).map(plain).collect();
     let first = Path::new("runs").join(format!("{name}-{}", timestamp(unix_seconds)));

@@ -10,28 +10,28 @@ use crate::episode::seed;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EpisodeSpec {
     /// Its position in the run, from 0.
-    pub index: usize,
+    pub(crate) index: usize,
     /// The task's position in the set.
-    pub task: usize,
+    pub(crate) task: usize,
     /// One of the run's seeds, from 0.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// How the instruction is derived from the task's own.
-    pub variant: InstructionVariant,
+    pub(crate) variant: InstructionVariant,
     /// The subtask from which the agent acts.
-    pub start_subtask: u32,
+    pub(crate) start_subtask: u32,
     /// How often it was begun before.
-    pub attempts: u32,
+    pub(crate) attempts: u32,
 }
 
 impl EpisodeSpec {
     /// The slot of a policy that acts in so many episodes at once: it follows from the episode's index alone, so that its
     /// record does not depend on what is played beside it.
-    pub fn slot(&self, slots: usize) -> usize {
+    pub(crate) fn slot(&self, slots: usize) -> usize {
         self.index % slots.max(1)
     }
 
     /// What tells it apart from the other episodes of the run.
-    pub fn key(&self, tasks: &[Task]) -> EpisodeKey {
+    pub(crate) fn key(&self, tasks: &[Task]) -> EpisodeKey {
         EpisodeKey {
             task: tasks[self.task].id.clone(),
             seed: self.seed,
@@ -42,12 +42,12 @@ impl EpisodeSpec {
 }
 
 /// What drives a policy's chance in an episode: the task's position and the seed, and nothing else.
-pub fn policy_seed(task: usize, seed: u64) -> u64 {
+pub(crate) fn policy_seed(task: usize, seed: u64) -> u64 {
     seed::mix(task as u64, seed)
 }
 
 /// Every episode of a run in its order: by task, then seed, then instruction variant, then start subtask.
-pub fn episode_specs(manifest: &RunManifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
+pub(crate) fn episode_specs(manifest: &RunManifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
     let variants: &[InstructionVariant] =
         if manifest.instruction_variants { &InstructionVariant::ALL } else { &InstructionVariant::ALL[..1] };
     let mut all = Vec::new();

@@ -14,7 +14,7 @@ use crate::episode::record::{Episode, EpisodeKey};
 ///
 /// # Errors
 /// When a line before the last is not an episode, or one is there twice; names file and line.
-pub fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
+pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
     let name = path.display();
     let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
     let mut reader = BufReader::new(file);

@@ -14,44 +14,44 @@ use crate::house::grading::Grading;
 pub struct RunManifest {
     /// Version of the format of the whole folder.
     #[schemars(extend("const" = RunManifest::FORMAT))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of the program.
-    pub sprint_version: String,
+    pub(crate) sprint_version: String,
     /// The name that the task file gives itself.
-    pub task_set: String,
+    pub(crate) task_set: String,
     /// SHA-256 of the task file.
-    pub task_set_hash: String,
+    pub(crate) task_set_hash: String,
     /// SHA-256 over the scenes that its tasks play in.
-    pub scenes_hash: String,
+    pub(crate) scenes_hash: String,
     /// The name of the policy that acts: of an agent, its checkpoint's.
-    pub policy: String,
+    pub(crate) policy: String,
     /// SHA-256 of the checkpoint, where the policy has one.
-    pub checkpoint_hash: Option<String>,
+    pub(crate) checkpoint_hash: Option<String>,
     /// How many tasks of the set, from the first.
-    pub tasks: usize,
+    pub(crate) tasks: usize,
     /// Each task is played with the seeds 0 to this, exclusive.
-    pub seeds: u64,
+    pub(crate) seeds: u64,
     /// The rules by which subtasks count as completed.
-    pub grader: Grading,
+    pub(crate) grader: Grading,
     /// The agent is told all steps instead of the task's instruction.
-    pub step_by_step: bool,
+    pub(crate) step_by_step: bool,
     /// The agent draws its actions by chance instead of taking the likeliest.
     #[serde(default)]
-    pub sampling: bool,
+    pub(crate) sampling: bool,
     /// Each task is also played with every other variant of its instruction.
     #[serde(default)]
-    pub instruction_variants: bool,
+    pub(crate) instruction_variants: bool,
     /// Each task is also played from each of its subtasks on.
     #[serde(default)]
-    pub all_start_subtasks: bool,
+    pub(crate) all_start_subtasks: bool,
     /// Which share of the run this is; nothing for a whole one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shard: Option<Shard>,
+    pub(crate) shard: Option<Shard>,
 }
 
 impl RunManifest {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 2;
+    pub(crate) const FORMAT: u32 = 2;
     /// The most episodes, other words and starts apart, that a run may have: its episodes are listed in memory.
     const MOST: u64 = 10_000_000;
 
@@ -59,7 +59,7 @@ impl RunManifest {
     ///
     /// # Errors
     /// When it cannot be read, or an older or newer program wrote it; names the file and the field.
-    pub fn read(path: &Path) -> anyhow::Result<RunManifest> {
+    pub(crate) fn read(path: &Path) -> anyhow::Result<RunManifest> {
         Ok(json::read(path, RunManifest::FORMAT)?.value)
     }
 
@@ -67,7 +67,7 @@ impl RunManifest {
     ///
     /// # Errors
     /// When it has more episodes than that.
-    pub fn check(&self) -> anyhow::Result<()> {
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
         let episodes = self.seeds.saturating_mul(self.tasks as u64);
         anyhow::ensure!(
             episodes <= RunManifest::MOST,
@@ -80,7 +80,7 @@ impl RunManifest {
     }
 
     /// The fields in which `other` differs, each as `field: this, not that`.
-    pub fn differences(&self, other: &RunManifest) -> Vec<String> {
+    pub(crate) fn differences(&self, other: &RunManifest) -> Vec<String> {
         let fields = |manifest| match serde_json::to_value(manifest) {
             Ok(serde_json::Value::Object(fields)) => fields,
             _ => serde_json::Map::new(),

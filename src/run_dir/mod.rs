@@ -1,10 +1,10 @@
 //! Run folders: the manifest, the episodes of a run in order, reader and writer, shards.
 
-pub mod default_path;
-pub mod episode_spec;
-pub mod episodes;
-pub mod layout;
-pub mod manifest;
+pub(crate) mod default_path;
+pub(crate) mod episode_spec;
+pub(crate) mod episodes;
+pub(crate) mod layout;
+pub(crate) mod manifest;
 pub mod reader;
-pub mod shard;
+pub(crate) mod shard;
 pub mod writer;

@@ -18,17 +18,17 @@ use crate::episode::scenes::{Scenes, Setting};
 /// A run as it lies on the disk.
 pub struct RecordedRun {
     /// Its folder; of [joined](RecordedRun::joined) runs their folders with commas between.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// The folders that its episodes lie in, with the number of them in each, in the order of the episodes.
-    pub sources: Vec<(PathBuf, usize)>,
+    pub(crate) sources: Vec<(PathBuf, usize)>,
     /// What it was made from.
     pub manifest: RunManifest,
     /// The tasks that it plays.
-    pub set: TaskSet,
+    pub(crate) set: TaskSet,
     /// The scenes that its tasks play in.
-    pub scenes: Scenes,
+    pub(crate) scenes: Scenes,
     /// Its episodes, in the order of their lines.
-    pub episodes: Vec<Episode>,
+    pub(crate) episodes: Vec<Episode>,
 }
 
 impl RecordedRun {
@@ -69,7 +69,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// When there is none, or they differ in more than the checkpoint and its name; says in what.
-    pub fn joined(runs: Vec<RecordedRun>) -> anyhow::Result<RecordedRun> {
+    pub(crate) fn joined(runs: Vec<RecordedRun>) -> anyhow::Result<RecordedRun> {
         let mut runs = runs.into_iter();
         let mut all = runs.next().context("name the runs to join")?;
         let (seeds, own) = (all.manifest.seeds, all.manifest.clone());
@@ -93,24 +93,18 @@ impl RecordedRun {
         Ok(all)
     }
 
-    /// What it is called in tables: its folder's name.
-    pub fn name(&self) -> String {
-        let last = self.path.file_name().or_else(|| self.path.parent().and_then(Path::file_name));
-        last.map_or_else(|| self.path.display().to_string(), |name| name.to_string_lossy().into_owned())
-    }
-
     /// The task of an episode, with its position in the set, and where it starts.
     ///
     /// # Errors
     /// When the set has no such task, or it fits its scene no longer.
-    pub fn setting(&self, episode: &Episode) -> anyhow::Result<(usize, &Task, Setting)> {
+    pub(crate) fn setting(&self, episode: &Episode) -> anyhow::Result<(usize, &Task, Setting)> {
         let found = self.set.tasks.iter().enumerate().find(|(_, task)| task.id == episode.task);
         let (index, task) = found.with_context(|| format!("the tasks hold no {:?}", episode.task))?;
         Ok((index, task, self.scenes.setting(task)?))
     }
 
     /// Who acted in an episode that does not say so.
-    pub fn author(&self, task: usize, episode: &Episode) -> Author {
+    pub(crate) fn author(&self, task: usize, episode: &Episode) -> Author {
         Author {
             policy: self.manifest.policy.clone(),
             checkpoint: self.manifest.checkpoint_hash.clone(),
@@ -130,7 +124,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// When the run has no such episode.
-    pub fn reference(&self, key: &EpisodeKey) -> anyhow::Result<String> {
+    pub(crate) fn reference(&self, key: &EpisodeKey) -> anyhow::Result<String> {
         let place = |episodes: &[Episode]| episodes.iter().position(|episode| episode.key() == *key);
         let found = self.by_folder().find_map(|(folder, episodes)| Some((folder, place(episodes)?)));
         let (folder, place) = found.with_context(|| format!("{}: no episode of {key}", self.path.display()))?;
@@ -138,7 +132,7 @@ impl RecordedRun {
     }
 
     /// Its folders, each with the episodes that lie in it.
-    pub fn by_folder(&self) -> impl Iterator<Item = (&Path, &[Episode])> {
+    pub(crate) fn by_folder(&self) -> impl Iterator<Item = (&Path, &[Episode])> {
         let mut rest = self.episodes.as_slice();
         self.sources.iter().map(move |(folder, count)| {
             let (own, others) = rest.split_at(*count);

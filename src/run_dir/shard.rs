@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Written")]
 pub struct Shard {
     /// The number of this share, from 1.
-    pub index: u32,
+    pub(crate) index: u32,
     /// How many shares the run has.
-    pub of: u32,
+    pub(crate) of: u32,
 }
 
 /// A share as it stands in a file.
@@ -38,13 +38,13 @@ impl Shard {
     /// The most shares of a run.
     const MOST: u32 = 10_000;
     /// The folder under a run's own that holds its shares.
-    pub const FOLDER: &str = "shards";
+    pub(crate) const FOLDER: &str = "shards";
 
     /// The share of the job of a Slurm array, from what its environment says.
     ///
     /// # Errors
     /// When the variables are not there, or the array's numbers are not consecutive.
-    pub fn of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+    pub(crate) fn of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let number = |name: &str| -> Result<u32, String> {
             let text = variable(name).ok_or_else(|| {
                 format!("{name} is not set: --shard slurm is for a job of a Slurm array (sbatch --array)")
@@ -61,13 +61,13 @@ impl Shard {
     }
 
     /// Which of `count` episodes are its own.
-    pub fn range(self, count: usize) -> Range<usize> {
+    pub(crate) fn range(self, count: usize) -> Range<usize> {
         let edge = |index: u32| (count as u128 * u128::from(index) / u128::from(self.of.max(1))) as usize;
         edge(self.index - 1)..edge(self.index)
     }
 
     /// Its folder, under the run's.
-    pub fn folder(self) -> PathBuf {
+    pub(crate) fn folder(self) -> PathBuf {
         PathBuf::from(Shard::FOLDER).join(format!("{}-of-{}", self.index, self.of))
     }
 }

@@ -21,7 +21,7 @@ pub struct RunWriter {
     path: PathBuf,
     episodes: File,
     /// The episodes that were there when it was opened, without their traces.
-    pub earlier: Vec<Episode>,
+    pub(crate) earlier: Vec<Episode>,
 }
 
 impl RunWriter {
@@ -70,7 +70,7 @@ impl RunWriter {
     }
 
     /// The run's folder.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -78,7 +78,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// When the disk is full or the folder went away.
-    pub fn append(&mut self, episode: &Episode) -> anyhow::Result<()> {
+    pub(crate) fn append(&mut self, episode: &Episode) -> anyhow::Result<()> {
         let context = || format!("cannot write {}", self.path.join(EPISODES).display());
         let mut line = serde_json::to_vec(episode).with_context(context)?;
         line.push(b'\n');
@@ -99,7 +99,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// When the file cannot be read any more.
-    pub fn result(&self, order: &[EpisodeKey]) -> anyhow::Result<(Vec<Episode>, String)> {
+    pub(crate) fn result(&self, order: &[EpisodeKey]) -> anyhow::Result<(Vec<Episode>, String)> {
         let (episodes, _) = read_episodes(&self.path.join(EPISODES))?;
         let mut by_key: BTreeMap<EpisodeKey, Episode> = episodes.into_iter().map(|e| (e.key(), e)).collect();
         let mut digest = Sha256::new();

@@ -73,7 +73,7 @@ impl<'a> BatchSampler<'a> {
     ///
     /// # Errors
     /// When a frame has no label.
-    pub fn held_out(&self, spans: &[Span], count: usize, chunk: usize) -> anyhow::Result<Vec<Transitions>> {
+    pub(crate) fn held_out(&self, spans: &[Span], count: usize, chunk: usize) -> anyhow::Result<Vec<Transitions>> {
         let items = self.draw(spans, u64::MAX / 2, count);
         items.chunks(chunk).map(|items| self.base(items)).collect()
     }

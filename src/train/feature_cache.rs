@@ -30,7 +30,7 @@ const SAMPLED_TRAJECTORIES: usize = 24;
 ///
 /// # Errors
 /// When a frame cannot be drawn, or a cache be read or written.
-pub fn features(
+pub(crate) fn features(
     encoder: &dyn FrameEncoder,
     datasets: &[Dataset],
     frame_store: &FrameStore,
@@ -78,7 +78,7 @@ fn appearance_digest(frame_store: &FrameStore, trajectories: &Range<usize>) -> a
 ///
 /// # Errors
 /// When a frame cannot be drawn or the file not be written.
-pub fn encode(
+pub(crate) fn encode(
     encoder: &dyn FrameEncoder,
     frame_store: &FrameStore,
     trajectories: Range<usize>,

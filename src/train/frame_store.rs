@@ -14,16 +14,16 @@ use crate::domain::{Scene, Trajectory, World};
 use crate::house::{Replay, generate, validate};
 
 /// The trajectories of datasets with the scenes they play in.
-pub struct FrameStore {
+pub(crate) struct FrameStore {
     /// The trajectories, in the datasets' order.
-    pub trajectories: Vec<Trajectory>,
+    pub(crate) trajectories: Vec<Trajectory>,
     scenes: HashMap<SceneRef, Arc<Scene>>,
     /// The trajectories of each dataset.
-    pub parts: Vec<Range<usize>>,
+    pub(crate) parts: Vec<Range<usize>>,
     /// The number of each trajectory's first frame, and at the end the number of frames.
     firsts: Vec<usize>,
     /// Trajectories of which the whole must not be trained on as one span.
-    pub held_out: Vec<String>,
+    pub(crate) held_out: Vec<String>,
 }
 
 impl FrameStore {
@@ -31,7 +31,7 @@ impl FrameStore {
     ///
     /// # Errors
     /// When a trajectory or a scene cannot be read, or a trajectory does not fit its scene; it is named with the field.
-    pub fn open(datasets: &[Dataset]) -> anyhow::Result<FrameStore> {
+    pub(crate) fn open(datasets: &[Dataset]) -> anyhow::Result<FrameStore> {
         let mut trajectories: Vec<Trajectory> = Vec::new();
         let mut parts = Vec::new();
         for dataset in datasets {
@@ -67,18 +67,18 @@ impl FrameStore {
     }
 
     /// How many frames there are: each trajectory has one more than it has actions.
-    pub fn frames(&self) -> usize {
+    pub(crate) fn frames(&self) -> usize {
         self.firsts[self.firsts.len() - 1]
     }
 
     /// How many frames some trajectories have.
-    pub fn frames_of(&self, trajectories: &Range<usize>) -> usize {
+    pub(crate) fn frames_of(&self, trajectories: &Range<usize>) -> usize {
         self.firsts[trajectories.end] - self.firsts[trajectories.start]
     }
 
     /// Which trajectories are kept apart from all training, to measure on: those of splits other than `train`, and every
     /// `hold_out`th of a dataset (0: none), the same ones each time that a dataset is named.
-    pub fn kept_apart(&self, hold_out: usize) -> Vec<bool> {
+    pub(crate) fn kept_apart(&self, hold_out: usize) -> Vec<bool> {
         let places = self.parts.iter().flat_map(|part| 0..part.len());
         let kept = |(trajectory, place): (&Trajectory, usize)| {
             trajectory.split != "train" || hold_out > 0 && place % hold_out == hold_out - 1
@@ -87,7 +87,7 @@ impl FrameStore {
     }
 
     /// The trajectory that a frame belongs to.
-    pub fn trajectory_of(&self, frame: usize) -> usize {
+    pub(crate) fn trajectory_of(&self, frame: usize) -> usize {
         self.firsts.partition_point(|&first| first <= frame) - 1
     }
 
@@ -95,7 +95,7 @@ impl FrameStore {
     ///
     /// # Errors
     /// Never for a trajectory of this store.
-    pub fn scene(&self, trajectory: usize) -> anyhow::Result<&Arc<Scene>> {
+    pub(crate) fn scene(&self, trajectory: usize) -> anyhow::Result<&Arc<Scene>> {
         self.scenes.get(&self.trajectories[trajectory].scene).context("a trajectory's scene is missing")
     }
 
@@ -103,7 +103,7 @@ impl FrameStore {
     ///
     /// # Errors
     /// Whatever `visit` reports.
-    pub fn replay(
+    pub(crate) fn replay(
         &self,
         trajectory: usize,
         mut visit: impl FnMut(&Scene, &World, usize) -> anyhow::Result<()>,
@@ -124,7 +124,7 @@ impl FrameStore {
     ///
     /// # Errors
     /// When there is no such frame.
-    pub fn state(&self, frame: usize) -> anyhow::Result<(&Arc<Scene>, World)> {
+    pub(crate) fn state(&self, frame: usize) -> anyhow::Result<(&Arc<Scene>, World)> {
         anyhow::ensure!(frame < self.frames(), "there is no frame {frame}");
         let trajectory = self.trajectory_of(frame);
         let (scene, recorded) = (self.scene(trajectory)?, &self.trajectories[trajectory]);
@@ -137,7 +137,7 @@ impl FrameStore {
     ///
     /// # Errors
     /// Never for a store that was opened.
-    pub fn labels(&self) -> anyhow::Result<Vec<Option<ActionLabel>>> {
+    pub(crate) fn labels(&self) -> anyhow::Result<Vec<Option<ActionLabel>>> {
         let of = |trajectory: usize| -> anyhow::Result<Vec<Option<ActionLabel>>> {
             let recorded = &self.trajectories[trajectory];
             let mut labels = Vec::with_capacity(recorded.actions.len() + 1);

@@ -19,18 +19,18 @@ use crate::house::grading::Grading;
 
 /// Which tasks are played, and how often.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InTrainingEval {
+pub(crate) struct InTrainingEval {
     /// A task set's file; its scenes are looked for beside it.
-    pub tasks: PathBuf,
+    pub(crate) tasks: PathBuf,
     /// Only that many tasks, from the first.
-    pub limit: Option<usize>,
+    pub(crate) limit: Option<usize>,
     /// Steps between two evaluations; each is run when the training is saved next.
-    pub every: u64,
+    pub(crate) every: u64,
 }
 
 impl InTrainingEval {
     /// Whether the tasks are played at the save at `step`, when the save before it was at `before`.
-    pub fn is_due(&self, before: u64, step: u64) -> bool {
+    pub(crate) fn is_due(&self, before: u64, step: u64) -> bool {
         step / self.every.max(1) > before / self.every.max(1)
     }
 
@@ -38,7 +38,7 @@ impl InTrainingEval {
     ///
     /// # Errors
     /// When the task file or a scene cannot be read.
-    pub fn prepare(&self) -> anyhow::Result<Evaluation> {
+    pub(crate) fn prepare(&self) -> anyhow::Result<Evaluation> {
         let set = taskset::read(&self.tasks)?;
         let options = Options { limit: self.limit, ..Options::plain(Grading::Class) };
         Evaluation::prepare(&set, Scenes::of(&self.tasks, &set.value), options, "agent", None)
@@ -51,7 +51,7 @@ impl InTrainingEval {
 ///
 /// # Errors
 /// When the checkpoint cannot be read. An episode that fails counts as no success.
-pub fn run(
+pub(crate) fn run(
     evaluation: &Evaluation,
     folder: &Path,
     sentences: &SharedEmbedder,

@@ -13,14 +13,14 @@ use tch::{Kind, Tensor};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scalars {
     /// The stage, such as `visual_encoder`, `features`, `text_embeddings` or `policy`.
-    pub stage: &'static str,
+    pub(crate) stage: &'static str,
     /// The step, from 1 to `of`.
-    pub step: u64,
+    pub(crate) step: u64,
     /// How many steps the stage has.
-    pub of: u64,
+    pub(crate) of: u64,
     /// Measured numbers by name; empty at most steps.
     #[serde(flatten)]
-    pub values: BTreeMap<String, f64>,
+    pub(crate) values: BTreeMap<String, f64>,
 }
 
 impl Scalars {
@@ -30,7 +30,7 @@ impl Scalars {
     }
 
     /// Adds a tensor of one element.
-    pub fn add(&mut self, name: &str, value: &Tensor) {
+    pub(crate) fn add(&mut self, name: &str, value: &Tensor) {
         self.set(name, value.to_kind(Kind::Double).double_value(&[]));
     }
 
@@ -50,7 +50,7 @@ pub trait ProgressLogger {
 }
 
 /// Appends every step that has numbers to a file, a JSON object a line, and passes everything on.
-pub struct JsonLinesLogger<'a> {
+pub(crate) struct JsonLinesLogger<'a> {
     file: File,
     next: &'a mut dyn ProgressLogger,
 }
@@ -60,7 +60,7 @@ impl<'a> JsonLinesLogger<'a> {
     ///
     /// # Errors
     /// When it cannot be written to.
-    pub fn open(path: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<JsonLinesLogger<'a>> {
+    pub(crate) fn open(path: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<JsonLinesLogger<'a>> {
         let file = OpenOptions::new().create(true).append(true).open(path);
         Ok(JsonLinesLogger { file: file.with_context(|| format!("{} cannot be written to", path.display()))?, next })
     }

@@ -103,7 +103,7 @@ fn source_checkpoints(provenance: &Provenance) -> String {
 }
 
 /// The card in Markdown; `name` is the checkpoint folder's.
-pub fn card(name: &str, config: &CheckpointConfig, report: &ValidationReport) -> String {
+pub(crate) fn card(name: &str, config: &CheckpointConfig, report: &ValidationReport) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write!(

@@ -9,10 +9,10 @@ use crate::house::view::{Frame, View, decode};
 use crate::nets::visual::SIDE;
 
 /// Cells of a feature map: 7 x 7.
-pub const CELLS: usize = (SIDE * SIDE) as usize;
+pub(crate) const CELLS: usize = (SIDE * SIDE) as usize;
 /// Labels of a cell: the 82 classes that may show there, the 7 interactions that are possible there, and whether something
 /// there stands open.
-pub const CELL_LABELS: usize = Class::VOCABULARY + INTERACTIONS + 1;
+pub(crate) const CELL_LABELS: usize = Class::VOCABULARY + INTERACTIONS + 1;
 const INTERACTIONS: usize = ActionType::COUNT - 5;
 /// As few pixels of a 300 x 300 frame in one cell show a thing there.
 const FEWEST_PIXELS: u16 = 8;
@@ -21,18 +21,18 @@ const FARTHEST: f32 = 10.0;
 
 /// The targets of one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PerceptionTargets {
+pub(crate) struct PerceptionTargets {
     /// [`CELL_LABELS`] x [`CELLS`], label by label: 1 where the label holds.
-    pub cell_labels: Vec<u8>,
+    pub(crate) cell_labels: Vec<u8>,
     /// The logarithm of each cell's mean depth in metres.
-    pub depth: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
     /// The held class; 0 for an empty hand.
-    pub held: u8,
+    pub(crate) held: u8,
 }
 
 impl PerceptionTargets {
     /// The targets of a frame that was drawn of `world`.
-    pub fn of(scene: &Scene, world: &World, frame: &Frame) -> PerceptionTargets {
+    pub(crate) fn of(scene: &Scene, world: &World, frame: &Frame) -> PerceptionTargets {
         let mut cell_labels = vec![0u8; CELL_LABELS * CELLS];
         let candidates = view::candidates(scene, world, &View::of(frame));
         for (code, pixels) in pixels_by_cell(frame) {

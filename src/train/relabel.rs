@@ -17,15 +17,15 @@ const CHUNK: usize = 4096;
 
 /// Counts of a relabelling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Relabelled {
+pub(crate) struct Relabelled {
     /// Spans, once for each aligned annotation.
-    pub spans: usize,
+    pub(crate) spans: usize,
     /// Of those, how many had this source's label already.
-    pub known: usize,
+    pub(crate) known: usize,
     /// How many passages the summarizer was asked for.
-    pub asked: usize,
+    pub(crate) asked: usize,
     /// Whether it was stopped before the end.
-    pub stopped: bool,
+    pub(crate) stopped: bool,
 }
 
 /// A run of two or more skills of a trajectory, in the words of one annotator.
@@ -42,7 +42,7 @@ struct CompositeSpan<'a> {
 ///
 /// # Errors
 /// When the dataset cannot be read, its labels not be written, or the summarizer fails; what was labelled until then stays.
-pub fn relabel(
+pub(crate) fn relabel(
     folder: &Path,
     summarizer: &dyn Summarizer,
     logger: &mut dyn ProgressLogger,

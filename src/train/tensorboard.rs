@@ -15,7 +15,7 @@ use anyhow::Context;
 use super::metrics::{ProgressLogger, Scalars};
 
 /// Appends every step that has numbers to an event file, and passes everything on.
-pub struct TensorBoard<'a> {
+pub(crate) struct TensorBoard<'a> {
     file: File,
     next: &'a mut dyn ProgressLogger,
 }
@@ -25,7 +25,7 @@ impl<'a> TensorBoard<'a> {
     ///
     /// # Errors
     /// When it cannot be written to.
-    pub fn open(folder: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<TensorBoard<'a>> {
+    pub(crate) fn open(folder: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<TensorBoard<'a>> {
         let now = now();
         let path = folder.join(format!("events.out.tfevents.{now:.6}.sprint"));
         let open = || -> std::io::Result<File> {

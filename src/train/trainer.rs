@@ -37,7 +37,7 @@ pub struct Trainer<'a> {
 }
 
 /// Keeps the networks of a saved step, and may add to what is reported of it.
-pub type SaveCheckpoint<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
+pub(crate) type SaveCheckpoint<'a> = dyn FnMut(u64, &mut Scalars) -> anyhow::Result<()> + 'a;
 
 impl Trainer<'_> {
     /// Trains up to the preset's last step, from where the state left off if it is there. `save_checkpoint` is called right before the
@@ -46,7 +46,7 @@ impl Trainer<'_> {
     ///
     /// # Errors
     /// When a state cannot be read or written, belongs to other data or encoders, or a loss is not a number.
-    pub fn train(
+    pub(crate) fn train(
         &self,
         batches: BatchSampler<'_>,
         held_out: &[Span],

@@ -10,7 +10,7 @@ use crate::data::features::Features;
 use crate::data::items::{Item, Items};
 
 /// Embeds texts as [texts, width].
-pub type TextEmbedder<'a> = dyn Fn(&[&str]) -> anyhow::Result<Tensor> + Sync + 'a;
+pub(crate) type TextEmbedder<'a> = dyn Fn(&[&str]) -> anyhow::Result<Tensor> + Sync + 'a;
 
 /// Everything that batches are made of.
 pub struct TrainingData<'a> {
@@ -53,7 +53,7 @@ impl<'a> FeatureMaps<'a> {
     ///
     /// # Errors
     /// When a map cannot be read, or the device's memory is full.
-    pub fn gather(&self, frames: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
+    pub(crate) fn gather(&self, frames: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
         match self {
             FeatureMaps::Memory(features) => {
                 let (frames, width): (Vec<usize>, _) = (frames.collect(), features.width());
@@ -113,7 +113,7 @@ impl EmbeddingTable {
     ///
     /// # Errors
     /// When there is no such row.
-    pub fn rows(&self, rows: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
+    pub(crate) fn rows(&self, rows: impl Iterator<Item = usize>, device: Device) -> anyhow::Result<Tensor> {
         if let Some(on_device) = &self.on_device {
             let rows: Vec<i64> = rows.map(|row| row as i64).collect();
             return Ok(on_device.f_index_select(0, &Tensor::from_slice(&rows).to_device(on_device.device()))?);
@@ -141,9 +141,9 @@ pub enum ConditioningTable {
 /// Pairs of texts to chain, drawn once, with their joint sentences' embeddings.
 pub struct ChainingPool {
     /// The numbers of A's and B's text.
-    pub pairs: Vec<(u32, u32)>,
+    pub(crate) pairs: Vec<(u32, u32)>,
     /// The embedding of "A. B." of each pair.
-    pub joint: EmbeddingTable,
+    pub(crate) joint: EmbeddingTable,
     /// The training spans under each text, by their numbers.
     spans_by_text: HashMap<u32, Vec<u32>>,
 }
@@ -169,7 +169,7 @@ impl ChainingPool {
     }
 
     /// An item of a span that bears `text`.
-    pub fn item(&self, items: &Items, text: u32, rng: &mut ChaCha8Rng) -> Item {
+    pub(crate) fn item(&self, items: &Items, text: u32, rng: &mut ChaCha8Rng) -> Item {
         let spans_by_text = &self.spans_by_text[&text];
         items.step_of(&items.training[spans_by_text[rng.random_range(0..spans_by_text.len())] as usize], rng)
     }
@@ -185,7 +185,7 @@ impl TrainingData<'_> {
     ///
     /// # Errors
     /// When the encoder fails.
-    pub fn embed_joint(&self, first: &[Item], second: &[Item]) -> anyhow::Result<Tensor> {
+    pub(crate) fn embed_joint(&self, first: &[Item], second: &[Item]) -> anyhow::Result<Tensor> {
         let texts: Vec<String> =
             first.iter().zip(second).map(|(a, b)| joint_text(self.items, (a.text, b.text))).collect();
         let texts: Vec<&str> = texts.iter().map(String::as_str).collect();

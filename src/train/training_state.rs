@@ -22,7 +22,7 @@ impl TrainingState<'_> {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&self, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
+    pub(crate) fn write(&self, step: u64, tensors: &Tensors) -> anyhow::Result<()> {
         let mut metadata = self.identity.clone();
         metadata.insert("step".into(), step.to_string());
         Ok(weights::write(self.path, tensors, &metadata)?)
@@ -32,7 +32,7 @@ impl TrainingState<'_> {
     ///
     /// # Errors
     /// When it cannot be read, or was made with something else; both values are named.
-    pub fn read(&self) -> anyhow::Result<Option<(u64, Tensors)>> {
+    pub(crate) fn read(&self) -> anyhow::Result<Option<(u64, Tensors)>> {
         if !self.path.is_file() {
             return Ok(None);
         }

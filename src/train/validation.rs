@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,7 @@ use super::preset::ValidationSpec;
 use crate::agent::{ExpertPolicy, Policy, RandomPolicy};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, Heading, Instance, Pose, Role, Room, Scene, SkillKind, Subtask, World};
+use crate::env::{Environment, HouseEnvironment};
 use crate::episode::rollout::{AfterEach, End, Rollout, Tick};
 use crate::house::grading::{Grader, Grading};
 use crate::house::{House, generate};
@@ -25,11 +27,11 @@ const FIRST_SEED: u64 = 1 << 40;
 /// A success rate, displayed with its 95 % Wilson interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rate {
+pub(crate) struct Rate {
     /// How often it worked.
-    pub successes: usize,
+    pub(crate) successes: usize,
     /// How often it was tried.
-    pub trials: usize,
+    pub(crate) trials: usize,
 }
 
 impl Rate {
@@ -50,26 +52,26 @@ impl std::fmt::Display for Rate {
 /// Success rates of a policy in houses that no training saw.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ValidationReport {
+pub(crate) struct ValidationReport {
     /// One-skill tasks that the policy solved.
-    pub agent: Rate,
+    pub(crate) agent: Rate,
     /// The same tasks, solved by chance.
-    pub random: Rate,
+    pub(crate) random: Rate,
     /// The policy's rate for each kind of skill.
-    pub by_skill: BTreeMap<String, Rate>,
+    pub(crate) by_skill: BTreeMap<String, Rate>,
     /// Of two objects in view, the instruction names one: how often the policy picks up that one first.
-    pub instructed_first: Rate,
+    pub(crate) instructed_first: Rate,
     /// How often it picks up the other one.
-    pub other_first: Rate,
+    pub(crate) other_first: Rate,
     /// From one and the same start: how often it picks up first the one and, with the instruction swapped, the other.
-    pub follows_both: Rate,
+    pub(crate) follows_both: Rate,
 }
 
 /// Plays the tasks and the swapped instructions of `spec`.
 ///
 /// # Errors
 /// When the policy fails.
-pub fn validate(
+pub(crate) fn validate(
     policy: &mut dyn Policy,
     spec: &ValidationSpec,
     logger: &mut dyn ProgressLogger,
@@ -83,10 +85,11 @@ pub fn validate(
         number += 1;
         let Some(task) = generate::task(&scene, &world, reference, 1, &mut rng) else { continue };
         let start = task.start.clone().unwrap_or(world);
-        let solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
-            let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
-            let house = House::new(scene.clone(), start.clone());
-            let mut rollout = Rollout::in_house(house, task.instruction.clone(), Some(grader), Some(task.horizon));
+        let house = House::new(scene.clone(), start);
+        let environment = HouseEnvironment::of_task(&task, house, Grading::Class);
+        let mut rollout = Rollout::new(environment, task.instruction.clone(), Some(task.horizon));
+        let mut solve = |policy: &mut dyn Policy| -> anyhow::Result<bool> {
+            rollout.restart()?;
             policy.reset(0, number);
             rollout.run(policy, &mut ())?;
             Ok(rollout.end() == Some(End::Success))
@@ -103,9 +106,14 @@ pub fn validate(
         let (_, scene, world) = unseen_house(spec.seed + 1, number);
         number += 1;
         let Some(case) = object_pair(&scene, &world, &mut rng) else { continue };
+        let house = House::new(case.scene.clone(), case.world.clone());
+        let mut rollout = Rollout::in_house(house, String::new(), None, None);
+        let start = rollout.env.snapshot().context("a house can go back to where it was")?;
         let mut right = [false; 2];
         for (instructed, right) in right.iter_mut().enumerate() {
-            let first = case.first_pickup(policy, instructed, &mut rng)?;
+            rollout.env.restore(&start)?;
+            rollout.set_steps(0);
+            let first = case.first_pickup(policy, instructed, &mut rollout, &mut rng)?;
             *right = first == Some(case.objects[instructed]);
             report.instructed_first.count(*right);
             report.other_first.count(first == Some(case.objects[1 - instructed]));
@@ -185,12 +193,12 @@ impl ObjectPair {
         &self,
         policy: &mut dyn Policy,
         instructed: usize,
+        rollout: &mut Rollout,
         rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<Option<Class>> {
         let (roles, subtasks) = pickup(self.objects[instructed]);
-        let instruction = phrases::sentence(&roles, &subtasks[0], rng);
-        let house = House::new(self.scene.clone(), self.world.clone());
-        let mut rollout = Rollout::in_house(house, instruction, None, Some(self.horizons[instructed]));
+        rollout.instruction = phrases::sentence(&roles, &subtasks[0], rng);
+        rollout.horizon = Some(self.horizons[instructed]);
         policy.reset(0, instructed as u64);
         let mut first = None;
         let mut until_pickup = AfterEach(|rollout: &mut Rollout, _: &Tick| {

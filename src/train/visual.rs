@@ -28,7 +28,7 @@ const MEASURED: usize = 256;
 ///
 /// # Errors
 /// When a state cannot be read or written, or a frame not be drawn.
-pub fn train(
+pub(crate) fn train(
     store: &nn::VarStore,
     encoder: &HouseEncoder,
     frame_store: &FrameStore,
@@ -137,7 +137,7 @@ fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> 
 
 /// A small frame store for tests.
 #[cfg(test)]
-pub mod testing {
+pub(crate) mod testing {
     use super::*;
     use crate::data::dataset;
     use crate::data::dataset::Dataset;
@@ -145,7 +145,7 @@ pub mod testing {
     use crate::house::testing::kitchen;
 
     /// Two turns around in the test kitchen.
-    pub fn frame_store() -> FrameStore {
+    pub(crate) fn frame_store() -> FrameStore {
         let folder = tempfile::tempdir().unwrap();
         let (scene, start) = kitchen();
         let mut writer = crate::data::dataset::DatasetWriter::new(folder.path()).unwrap();
@@ -163,7 +163,7 @@ pub mod testing {
     }
 
     /// RecordedScalars what is reported.
-    pub struct RecordedScalars(pub Vec<Scalars>);
+    pub(crate) struct RecordedScalars(pub(crate) Vec<Scalars>);
 
     impl ProgressLogger for RecordedScalars {
         fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {

@@ -5,7 +5,7 @@ use crate::domain::Class;
 
 impl App {
     /// Instructions that the typed text begins, the last used first: what was told before, then things in view.
-    pub fn completions(&self) -> Vec<String> {
+    pub(crate) fn completions(&self) -> Vec<String> {
         let typed = self.input.editor.text();
         let mut found: Vec<String> = Vec::new();
         let bare = |text: &str| text.trim_end_matches('.').to_lowercase();
@@ -27,7 +27,7 @@ impl App {
     }
 
     /// The names of the things that the frame shows, each once.
-    pub fn things_in_view(&self) -> Vec<&'static str> {
+    pub(crate) fn things_in_view(&self) -> Vec<&'static str> {
         let Some(now) = &self.session.now else { return Vec::new() };
         let classes = now.view.sightings.iter().filter_map(|seen| now.world.class_of(&now.scene, seen.instance));
         let mut names: Vec<&str> = classes.map(Class::spoken).collect();

@@ -27,25 +27,25 @@ struct File {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExplorerConfig {
     /// The colour scheme of the text.
-    pub scheme: Scheme,
+    pub(crate) scheme: Scheme,
     /// The mouse is heard from the start.
-    pub mouse: bool,
+    pub(crate) mouse: bool,
     /// Keys that mean something else.
-    pub keys: Vec<Remapped>,
+    pub(crate) keys: Vec<Remapped>,
 }
 
 /// A key and what it means now.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Remapped {
+pub(crate) struct Remapped {
     code: KeyCode,
     modifiers: KeyModifiers,
     /// What it does.
-    pub verb: Verb,
+    pub(crate) verb: Verb,
 }
 
 impl ExplorerConfig {
     /// The format version that is read.
-    pub const FORMAT: u32 = 1;
+    pub(crate) const FORMAT: u32 = 1;
 
     /// Reads a file's text.
     ///
@@ -65,7 +65,7 @@ impl ExplorerConfig {
     }
 
     /// What a key means by these settings.
-    pub fn verb(&self, key: KeyEvent) -> Option<Verb> {
+    pub(crate) fn verb(&self, key: KeyEvent) -> Option<Verb> {
         let shift = KeyModifiers::SHIFT;
         let is =
             |remapped: &&Remapped| remapped.code == key.code && remapped.modifiers - shift == key.modifiers - shift;

@@ -5,7 +5,7 @@ use ratatui_textarea::{CursorMove, TextArea};
 
 /// A line editor with a history.
 #[derive(Clone, Debug, Default)]
-pub struct Editor {
+pub(crate) struct Editor {
     area: TextArea<'static>,
     history: Vec<String>,
     /// Which entry of the history is shown; its length for the draft.
@@ -15,7 +15,7 @@ pub struct Editor {
 
 impl Editor {
     /// Begins with `text`, the cursor at its end.
-    pub fn open(&mut self, text: &str) {
+    pub(crate) fn open(&mut self, text: &str) {
         self.at = self.history.len();
         self.draft = text.to_string();
         self.show(text);
@@ -29,28 +29,28 @@ impl Editor {
     }
 
     /// What was typed.
-    pub fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         self.area.lines().first().map_or("", String::as_str)
     }
 
     /// What was given before, oldest first.
-    pub fn history(&self) -> &[String] {
+    pub(crate) fn history(&self) -> &[String] {
         &self.history
     }
 
     /// The widget's state.
-    pub fn area(&self) -> &TextArea<'static> {
+    pub(crate) fn area(&self) -> &TextArea<'static> {
         &self.area
     }
 
     /// A key that is text or moves the cursor.
-    pub fn key(&mut self, key: KeyEvent) {
+    pub(crate) fn key(&mut self, key: KeyEvent) {
         self.area.input(key);
         self.keep_one_line();
     }
 
     /// Pasted text; line breaks become spaces, other control characters go.
-    pub fn paste(&mut self, text: &str) {
+    pub(crate) fn paste(&mut self, text: &str) {
         let line: String = text
             .chars()
             .map(|c| if c.is_whitespace() { ' ' } else { c })
@@ -70,7 +70,7 @@ impl Editor {
     }
 
     /// Remembers an instruction that was given.
-    pub fn remember(&mut self, text: &str) {
+    pub(crate) fn remember(&mut self, text: &str) {
         if self.history.last().is_none_or(|last| last != text) {
             self.history.push(text.to_string());
         }
@@ -78,7 +78,7 @@ impl Editor {
     }
 
     /// Shows an earlier (-1) or later (+1) instruction.
-    pub fn travel(&mut self, by: isize) {
+    pub(crate) fn travel(&mut self, by: isize) {
         if self.at == self.history.len() {
             self.draft = self.text().to_string();
         }

@@ -14,15 +14,15 @@ const MOST: usize = 500;
 
 /// What earlier sessions left.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Remembered {
+pub(crate) struct Remembered {
     /// The instructions, oldest first.
-    pub instructions: Vec<String>,
+    pub(crate) instructions: Vec<String>,
     /// There was no earlier session.
-    pub is_first: bool,
+    pub(crate) is_first: bool,
 }
 
 /// Reads what earlier sessions left; a file that has grown long is cut. Lines that are no instructions are passed over.
-pub fn read(path: &Path) -> Remembered {
+pub(crate) fn read(path: &Path) -> Remembered {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) => return Remembered { is_first: error.kind() == io::ErrorKind::NotFound, ..Remembered::default() },
@@ -47,7 +47,7 @@ pub fn read(path: &Path) -> Remembered {
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn add(path: &Path, instruction: Option<&str>) -> io::Result<()> {
+pub(crate) fn add(path: &Path, instruction: Option<&str>) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }

@@ -13,7 +13,7 @@ use crate::explore::verb::{ExplorerPage, Verb};
 
 /// What the keys mean at the moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub(crate) enum Mode {
     /// A policy acts; keys watch and steer.
     Watch,
     /// A person acts; keys move.
@@ -27,15 +27,15 @@ pub enum Mode {
 }
 
 /// Keys that do the same, how the help names them, and what they do.
-pub struct Binding {
+pub(crate) struct Binding {
     /// Any of these.
-    pub codes: Vec<KeyCode>,
+    pub(crate) codes: Vec<KeyCode>,
     /// In the help; empty where the binding before says it too.
-    pub label: &'static str,
+    pub(crate) label: &'static str,
     /// One line for the help.
-    pub help: &'static str,
+    pub(crate) help: &'static str,
     /// What they do.
-    pub verb: Verb,
+    pub(crate) verb: Verb,
     scope: KeyScope,
 }
 
@@ -51,7 +51,7 @@ static BINDINGS: LazyLock<Vec<Binding>> = LazyLock::new(|| {
 });
 
 /// The keys that mean something in `mode` on `page`, in the order of the help: the page's first, then those of the mode.
-pub fn bindings(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &'static Binding> {
+pub(crate) fn bindings(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &'static Binding> {
     let scopes: Vec<KeyScope> = match mode {
         Mode::Watch if page == ExplorerPage::Main => vec![KeyScope::Watch, KeyScope::Common],
         Mode::Watch => vec![KeyScope::ExplorerPage(page), KeyScope::Lists, KeyScope::Watch, KeyScope::Common],
@@ -63,7 +63,7 @@ pub fn bindings(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &'static
 }
 
 /// What a key means in `mode` on `page`; `None` for nothing, or for text while typing.
-pub fn verb(mode: Mode, page: ExplorerPage, key: KeyEvent) -> Option<Verb> {
+pub(crate) fn verb(mode: Mode, page: ExplorerPage, key: KeyEvent) -> Option<Verb> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
         return match key.code {
             Char('c') => Some(Verb::Quit),

@@ -5,9 +5,9 @@ use ratatui::layout::Rect;
 use super::graphics::Protocol;
 
 /// The smallest screen that is drawn.
-pub const SMALLEST: (u16, u16) = (80, 24);
+pub(crate) const SMALLEST: (u16, u16) = (80, 24);
 /// Rows under the picture for the letters' meaning, where letters are the picture.
-pub const LEGEND: u16 = 3;
+pub(crate) const LEGEND: u16 = 3;
 
 /// The panels of the screen; each has its title in its first row.
 ///
@@ -24,42 +24,42 @@ pub const LEGEND: u16 = 3;
 /// status: keys, graphics
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ScreenLayout {
+pub(crate) struct ScreenLayout {
     /// The first row.
-    pub header: Rect,
+    pub(crate) header: Rect,
     /// What the agent sees.
-    pub sees: Rect,
+    pub(crate) sees: Rect,
     /// Hand and interactions.
-    pub reach: Rect,
+    pub(crate) reach: Rect,
     /// What the policy thinks.
-    pub distribution: Rect,
+    pub(crate) distribution: Rect,
     /// The subtasks, and what the current one waits for.
-    pub task: Rect,
+    pub(crate) task: Rect,
     /// The newest lines of the log.
-    pub log: Rect,
+    pub(crate) log: Rect,
     /// The floor plan.
-    pub map: Rect,
+    pub(crate) map: Rect,
     /// The steps of the branch in hand.
-    pub time: Rect,
+    pub(crate) time: Rect,
     /// What a page fills: everything between the header and the timeline.
-    pub page: Rect,
+    pub(crate) page: Rect,
     /// The instruction, or the line that is typed.
-    pub instruction: Rect,
+    pub(crate) instruction: Rect,
     /// The last row.
-    pub status: Rect,
+    pub(crate) status: Rect,
 }
 
 /// The parts of the page of branches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BranchesLayout {
+pub(crate) struct BranchesLayout {
     /// The tree of branches.
-    pub list: Rect,
+    pub(crate) list: Rect,
     /// Everything under it.
-    pub below: Rect,
+    pub(crate) below: Rect,
     /// The steps of two branches.
-    pub steps: Rect,
+    pub(crate) steps: Rect,
     /// Two pictures side by side.
-    pub frames: Rect,
+    pub(crate) frames: Rect,
 }
 
 /// What the panels on the right need: the map, a gap, and words.
@@ -67,7 +67,7 @@ const NARROWEST_RIGHT: u16 = 46;
 
 impl ScreenLayout {
     /// The layout of a screen; `None` when it is too small.
-    pub fn of(screen: Rect) -> Option<ScreenLayout> {
+    pub(crate) fn of(screen: Rect) -> Option<ScreenLayout> {
         if screen.width < SMALLEST.0 || screen.height < SMALLEST.1 {
             return None;
         }
@@ -101,7 +101,7 @@ impl ScreenLayout {
     }
 
     /// The cells that a square picture fills, in the middle of its panel.
-    pub fn picture(&self, protocol: Protocol, cell_pixels: (u16, u16)) -> Rect {
+    pub(crate) fn picture(&self, protocol: Protocol, cell_pixels: (u16, u16)) -> Rect {
         let legend = if protocol == Protocol::Ascii { LEGEND } else { 0 };
         let inner = Rect { y: self.sees.y + 1, height: self.sees.height.saturating_sub(1 + legend), ..self.sees };
         let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
@@ -113,7 +113,7 @@ impl ScreenLayout {
     }
 
     /// The parts of the page of branches: the list of so many branches, the steps side by side, and two square pictures.
-    pub fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> BranchesLayout {
+    pub(crate) fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> BranchesLayout {
         let page = self.page;
         let tall = (many as u16).saturating_add(2).clamp(4, page.height / 2);
         let list = Rect { height: tall, ..page };
@@ -129,7 +129,7 @@ impl ScreenLayout {
     }
 
     /// How many interactions the list shows at a time.
-    pub fn interactions(&self) -> usize {
+    pub(crate) fn interactions(&self) -> usize {
         let rows = usize::from(self.reach.height.saturating_sub(1));
         let columns = if self.reach.width >= 60 { 2 } else { 1 };
         (rows * columns).min(9)

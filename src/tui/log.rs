@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 /// How a line of the log is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
+pub(crate) enum Tone {
     /// It was done.
     Done,
     /// It was impossible.
@@ -19,15 +19,15 @@ pub enum Tone {
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogEntry {
+pub(crate) struct LogEntry {
     /// At which step.
-    pub step: Option<u32>,
+    pub(crate) step: Option<u32>,
     /// An action, or a sentence about what happened.
-    pub text: String,
+    pub(crate) text: String,
     /// What it came to.
-    pub outcome: String,
+    pub(crate) outcome: String,
     /// How it is meant.
-    pub tone: Tone,
+    pub(crate) tone: Tone,
 }
 
 /// Lines that the log keeps.
@@ -35,18 +35,18 @@ const MOST: usize = 500;
 
 /// What happened, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct EventLog {
+pub(crate) struct EventLog {
     entries: VecDeque<LogEntry>,
 }
 
 impl EventLog {
     /// The lines, oldest first.
-    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> {
+    pub(crate) fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> {
         self.entries.iter()
     }
 
     /// Adds a line, unless it is the last one again. The oldest makes room.
-    pub fn write(&mut self, entry: LogEntry) {
+    pub(crate) fn write(&mut self, entry: LogEntry) {
         if self.entries.back() == Some(&entry) {
             return;
         }
@@ -57,7 +57,7 @@ impl EventLog {
     }
 
     /// The last thing that was done at a step, with what it came to.
-    pub fn done_at(&self, step: u32) -> Option<&LogEntry> {
+    pub(crate) fn done_at(&self, step: u32) -> Option<&LogEntry> {
         self.entries.iter().rev().find(|entry| entry.step == Some(step) && !entry.outcome.is_empty())
     }
 }

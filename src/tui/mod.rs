@@ -6,13 +6,13 @@
 pub mod app;
 mod completion;
 pub mod config;
-pub mod editor;
+pub(crate) mod editor;
 pub mod graphics;
-pub mod history;
+pub(crate) mod history;
 mod key_name;
-pub mod keys;
+pub(crate) mod keys;
 pub mod layout;
-pub mod log;
+pub(crate) mod log;
 pub mod screen;
 pub mod terminal;
 #[cfg(test)]

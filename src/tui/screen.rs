@@ -32,25 +32,25 @@ use crate::explore::exploration::Exploration;
 use crate::explore::session::{RunMode, SessionCommand};
 
 /// What the screen is started with.
-pub struct ScreenOptions {
+pub(crate) struct ScreenOptions {
     /// How to show pictures; `None` to find out.
-    pub protocol: Option<Protocol>,
+    pub(crate) protocol: Option<Protocol>,
     /// Who decides at first.
-    pub policy: PolicyKind,
+    pub(crate) policy: PolicyKind,
     /// A person acts at first.
-    pub manual: bool,
+    pub(crate) manual: bool,
     /// The policy runs as soon as it is there.
-    pub runs: bool,
+    pub(crate) runs: bool,
     /// What a person has set.
-    pub config: ExplorerConfig,
+    pub(crate) config: ExplorerConfig,
     /// Where it is remembered what a terminal answered.
-    pub memory: Option<PathBuf>,
+    pub(crate) memory: Option<PathBuf>,
     /// Where instructions are kept for later sessions.
-    pub history: Option<PathBuf>,
+    pub(crate) history: Option<PathBuf>,
     /// The most that a step's picture may cost on the wire, in bytes.
-    pub bandwidth: Option<u64>,
+    pub(crate) bandwidth: Option<u64>,
     /// Where libtorch's messages go.
-    pub log: Option<std::fs::File>,
+    pub(crate) log: Option<std::fs::File>,
 }
 
 /// Messages that may wait for the screen; beyond that their senders wait.
@@ -64,7 +64,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// When there is no terminal, or the worker stopped.
-pub fn run(
+pub(crate) fn run(
     screen: ScreenOptions,
     open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
 ) -> anyhow::Result<ExitReason> {
@@ -280,7 +280,7 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
 ///
 /// # Errors
 /// When the terminal cannot be written.
-pub fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::Error> {
+pub(crate) fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::Error> {
     display.draw(|frame| frame.render_widget(app, frame.area())).map(drop)
 }
 

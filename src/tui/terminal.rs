@@ -25,14 +25,14 @@ static STDERR: Mutex<Option<OwnedFd>> = Mutex::new(None);
 static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 
 /// Owns the terminal until it is dropped.
-pub struct Guard(());
+pub(crate) struct Guard(());
 
 impl Guard {
     /// Takes the terminal; error messages go to `log`, if there is one.
     ///
     /// # Errors
     /// When standard output is no terminal.
-    pub fn take(log: Option<&File>) -> io::Result<Guard> {
+    pub(crate) fn take(log: Option<&File>) -> io::Result<Guard> {
         enable_raw_mode()?;
         OWNED.store(true, Ordering::SeqCst);
         let guard = Guard(());
@@ -60,18 +60,18 @@ const LEAVE_MOUSE: &[u8] = b"\x1b[?1006l\x1b[?1000l";
 ///
 /// # Errors
 /// When the terminal cannot be written.
-pub fn report_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
+pub(crate) fn report_mouse(out: &mut impl Write, on: bool) -> io::Result<()> {
     MOUSE.store(on, Ordering::SeqCst);
     out.write_all(if on { REPORT_MOUSE } else { LEAVE_MOUSE })
 }
 
 /// Notes that the terminal holds pictures, and the sequence by which it should forget them in the end.
-pub fn holds_pictures(forget: String) {
+pub(crate) fn holds_pictures(forget: String) {
     *FORGET.lock().unwrap_or_else(PoisonError::into_inner) = Some(forget);
 }
 
 /// Gives the terminal back, once. Errors are passed over: a terminal that is gone needs nothing.
-pub fn give_back() {
+pub(crate) fn give_back() {
     if !OWNED.swap(false, Ordering::SeqCst) {
         return;
     }
@@ -94,7 +94,7 @@ fn farewell(out: &mut impl Write, forget: &str, mouse: bool) -> io::Result<()> {
 
 /// From now on a panic gives the terminal back before it is reported. One on another thread than the screen's is kept as that
 /// thread's last words; the screen then ends by itself.
-pub fn catch_panics() {
+pub(crate) fn catch_panics() {
     let screen = std::thread::current().id();
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -109,12 +109,12 @@ pub fn catch_panics() {
 }
 
 /// Keeps why a thread ends.
-pub fn say_last_words(words: String) {
+pub(crate) fn say_last_words(words: String) {
     *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
 }
 
 /// Why a thread ended: its error, or its panic.
-pub fn last_words() -> Option<String> {
+pub(crate) fn last_words() -> Option<String> {
     LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 

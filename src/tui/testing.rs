@@ -11,11 +11,11 @@ use super::update::{Msg, update};
 use crate::agent::registry::PolicyKind;
 use crate::domain::Instance;
 use crate::explore::session::SessionEvent;
-pub use crate::explore::testing::{decided, exploration, snapshot, values};
+pub(crate) use crate::explore::testing::{decided, exploration, snapshot, values};
 use crate::house::testing::named;
 
 /// A screen of that size in which the agent has just begun.
-pub fn app(width: u16, height: u16, protocol: Protocol, ability: Ability) -> App {
+pub(crate) fn app(width: u16, height: u16, protocol: Protocol, ability: Ability) -> App {
     let graphics = Graphics { protocol, reason: "inside tmux".into(), cell_pixels: (8, 16), in_tmux: false };
     let mut app = App::new(Size { width, height }, graphics, ability, PolicyKind::Agent, false);
     let mut exploration = exploration();
@@ -30,7 +30,7 @@ pub fn app(width: u16, height: u16, protocol: Protocol, ability: Ability) -> App
 }
 
 /// The screen as text.
-pub fn screen(app: &mut App) -> String {
+pub(crate) fn screen(app: &mut App) -> String {
     if let Some(job) = app.job() {
         update(app, Msg::Picture(Picture::encode(&job)));
     }
@@ -40,7 +40,7 @@ pub fn screen(app: &mut App) -> String {
 }
 
 /// An instance of the kitchen by name.
-pub fn instance(app: &App, name: &str) -> Instance {
+pub(crate) fn instance(app: &App, name: &str) -> Instance {
     let now = app.session.now.as_ref().unwrap();
     named(&now.scene, &now.world, name)
 }

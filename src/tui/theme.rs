@@ -7,31 +7,31 @@ use serde::Deserialize;
 use termprofile::TermProfile;
 
 /// The styles of the screen, by meaning.
-pub struct Theme {
+pub(crate) struct Theme {
     /// Names of panels.
-    pub title: Style,
+    pub(crate) title: Style,
     /// Rules, units, hints.
-    pub quiet: Style,
+    pub(crate) quiet: Style,
     /// What cannot be chosen now.
-    pub masked: Style,
+    pub(crate) masked: Style,
     /// What is chosen, or the agent itself.
-    pub chosen: Style,
+    pub(crate) chosen: Style,
     /// A key to press.
-    pub key: Style,
+    pub(crate) key: Style,
     /// Bars of probabilities and scores.
-    pub bar: Style,
+    pub(crate) bar: Style,
     /// What was done or went well.
-    pub good: Style,
+    pub(crate) good: Style,
     /// What was impossible or went wrong.
-    pub bad: Style,
+    pub(crate) bad: Style,
     /// Worth noticing.
-    pub note: Style,
+    pub(crate) note: Style,
     /// What the agent is told.
-    pub instruction: Style,
+    pub(crate) instruction: Style,
 }
 
 /// The one theme.
-pub const THEME: Theme = Theme {
+pub(crate) const THEME: Theme = Theme {
     title: Style::new().fg(Color::Cyan).add_modifier(Modifier::BOLD),
     quiet: Style::new().fg(Color::DarkGray),
     masked: Style::new().fg(Color::DarkGray),
@@ -47,7 +47,7 @@ pub const THEME: Theme = Theme {
 /// Colours for different eyes and backgrounds. They bend the terminal's sixteen; pictures and the map keep their own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Scheme {
+pub(crate) enum Scheme {
     /// For dark backgrounds.
     #[default]
     Dark,
@@ -61,7 +61,7 @@ pub enum Scheme {
 
 impl Scheme {
     /// Brings a drawn screen into these colours.
-    pub fn paint(self, buf: &mut Buffer) {
+    pub(crate) fn paint(self, buf: &mut Buffer) {
         let bend: fn(Color) -> Color = match self {
             Scheme::Dark => return,
             Scheme::Light => |colour| match colour {
@@ -96,9 +96,9 @@ impl Scheme {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ability {
     /// How many colours it has.
-    pub colours: TermProfile,
+    pub(crate) colours: TermProfile,
     /// It shows characters beyond ASCII.
-    pub unicode: bool,
+    pub(crate) unicode: bool,
 }
 
 impl Ability {
@@ -106,12 +106,12 @@ impl Ability {
     pub const FULL: Ability = Ability { colours: TermProfile::TrueColor, unicode: true };
 
     /// Whether the map and the pictures may rely on colour.
-    pub fn shades(self) -> bool {
+    pub(crate) fn shades(self) -> bool {
         self.colours >= TermProfile::Ansi256 && self.unicode
     }
 
     /// Brings a drawn screen down to what the terminal can show.
-    pub fn adapt(self, buf: &mut Buffer) {
+    pub(crate) fn adapt(self, buf: &mut Buffer) {
         if self == Ability::FULL {
             return;
         }

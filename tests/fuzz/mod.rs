@@ -20,7 +20,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// A reader, in a folder with whatever else it needs.
-pub struct Target {
+pub(crate) struct Target {
     /// The format.
     name: &'static str,
     /// The file that is damaged.

@@ -36,7 +36,7 @@ const TEXTS: [&str; 10] = ["", " ", "\u{0}", "../../etc", "/", "Mug", "ä\u{301}
 const LONGEST: usize = 1 << 20;
 
 /// A damaged copy of an input; `other` is another one of the same kind.
-pub fn damaged(input: &[u8], other: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
+pub(crate) fn damaged(input: &[u8], other: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..rng.random_range(1..=4) {
         bytes = match rng.random_range(0..10) {

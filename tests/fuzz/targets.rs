@@ -41,7 +41,7 @@ use super::Target;
 use crate::scenarios::kitchen;
 
 /// Every format that the program reads.
-pub const ALL: &[Target] = &[
+pub(crate) const ALL: &[Target] = &[
     Target {
         name: "tasks",
         file: "tasks.json",

@@ -38,7 +38,7 @@ struct Step {
 }
 
 /// The kitchen.
-pub fn kitchen() -> (Arc<Scene>, World) {
+pub(crate) fn kitchen() -> (Arc<Scene>, World) {
     #[derive(Deserialize)]
     struct Kitchen {
         scene: Scene,

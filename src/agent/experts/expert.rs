@@ -11,18 +11,18 @@ use crate::house::grading::Grader;
 
 /// Acts as the expert would; in one episode at a time.
 #[derive(Default)]
-pub struct ExpertPolicy {
+pub(crate) struct ExpertPolicy {
     expert: Expert,
 }
 
 impl ExpertPolicy {
     /// An expert that turns as late as it may.
-    pub fn new() -> ExpertPolicy {
+    pub(crate) fn new() -> ExpertPolicy {
         ExpertPolicy::default()
     }
 
     /// An expert that turns at that time.
-    pub fn of(timing: TurnTiming) -> ExpertPolicy {
+    pub(crate) fn of(timing: TurnTiming) -> ExpertPolicy {
         ExpertPolicy { expert: Expert::of(timing) }
     }
 }

@@ -1,4 +1,4 @@
 //! Policies that read the task instead of the instruction.
 
-pub mod expert;
-pub mod scanning;
+pub(crate) mod expert;
+pub(crate) mod scanning;

@@ -13,7 +13,7 @@ use crate::house::expert::{Expert, TurnTiming};
 const TURNS: u32 = 3;
 
 /// The expert, who first turns around until it has seen what it is going for.
-pub struct ScanningExpert {
+pub(crate) struct ScanningExpert {
     timing: TurnTiming,
     expert: Expert,
     /// Everything that came into view in this episode.
@@ -24,7 +24,7 @@ pub struct ScanningExpert {
 
 impl ScanningExpert {
     /// A demonstrator at the start of an episode.
-    pub fn new(timing: TurnTiming) -> ScanningExpert {
+    pub(crate) fn new(timing: TurnTiming) -> ScanningExpert {
         ScanningExpert { timing, expert: Expert::of(timing), seen: BTreeSet::new(), search: None }
     }
 

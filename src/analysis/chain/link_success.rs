@@ -11,41 +11,41 @@ use crate::house::grading::{Grader, Grading};
 
 /// How often a link was done from one entry state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LinkRate {
+pub(crate) struct LinkRate {
     /// Times it was done.
-    pub done: u32,
+    pub(crate) done: u32,
     /// Of how many.
-    pub of: u32,
+    pub(crate) of: u32,
 }
 
 /// What is played to see which link breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Draws {
     /// Plays of each link from each entry.
-    pub times: u32,
+    pub(crate) times: u32,
     /// Only this link, from 0.
-    pub only: Option<usize>,
+    pub(crate) only: Option<usize>,
 }
 
 impl Draws {
     /// Whether a link is played.
-    pub fn include(self, link: usize) -> bool {
+    pub(crate) fn include(self, link: usize) -> bool {
         self.only.is_none_or(|only| only == link)
     }
 }
 
 /// Which link breaks: how often each is done from the expert's entry state and from the agent's own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LinkSuccess {
+pub(crate) struct LinkSuccess {
     /// From where the expert begins each link.
-    pub expert: Vec<LinkRate>,
+    pub(crate) expert: Vec<LinkRate>,
     /// From where the agent itself began it; empty where it never got there.
-    pub own: Vec<LinkRate>,
+    pub(crate) own: Vec<LinkRate>,
 }
 
 impl LinkSuccess {
     /// Takes over the rates of the links that another set of plays left out.
-    pub fn fill(&mut self, earlier: &LinkSuccess) {
+    pub(crate) fn fill(&mut self, earlier: &LinkSuccess) {
         let pairs = [(&mut self.expert, &earlier.expert), (&mut self.own, &earlier.own)];
         for (rates, before) in pairs {
             for (rate, before) in rates.iter_mut().zip(before).filter(|(rate, _)| rate.of == 0) {
@@ -55,13 +55,13 @@ impl LinkSuccess {
     }
 
     /// Whether every link was played.
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.expert.iter().all(|rate| rate.of > 0)
     }
 
     /// The link that breaks the chain, once every link was played: the one that is done least often from where the agent itself begins it (where it never
     /// gets there: from where the expert does).
-    pub fn weakest(&self) -> Option<usize> {
+    pub(crate) fn weakest(&self) -> Option<usize> {
         if !self.is_complete() {
             return None;
         }
@@ -77,7 +77,7 @@ impl LinkSuccess {
 ///
 /// # Errors
 /// When nobody grades the chain, the expert cannot follow it, or the policy fails.
-pub fn trials(
+pub(crate) fn trials(
     chain: &Chain,
     play: &ChainRun,
     policy: &mut dyn Policy,

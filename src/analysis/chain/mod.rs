@@ -4,9 +4,9 @@ mod link_success;
 mod play;
 mod split;
 
-pub use link_success::{Draws, LinkRate, LinkSuccess, trials};
-pub use play::{ChainRun, Handover, LinkOutcome};
-pub use split::split;
+pub(crate) use link_success::{Draws, LinkRate, LinkSuccess, trials};
+pub(crate) use play::{ChainRun, Handover, LinkOutcome};
+pub(crate) use split::split;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,19 +19,19 @@ use crate::house::grading::{Grader, Grading};
 
 /// A chain that can be followed from a state.
 #[derive(Clone, Debug)]
-pub struct Chain {
+pub(crate) struct Chain {
     /// Where.
-    pub scene: Arc<Scene>,
+    pub(crate) scene: Arc<Scene>,
     /// The state in which it begins.
-    pub start: World,
+    pub(crate) start: World,
     /// The instructions, in order.
-    pub links: Vec<String>,
+    pub(crate) links: Vec<String>,
     /// What grades each link, one subtask a link; without it links end after [`UNGRADED`] steps.
-    pub graded: Option<(Vec<Role>, Vec<Subtask>)>,
+    pub(crate) graded: Option<(Vec<Role>, Vec<Subtask>)>,
 }
 
 /// The steps that a link has which nobody grades.
-pub const UNGRADED: u32 = 20;
+pub(crate) const UNGRADED: u32 = 20;
 /// The most steps of a graded link: this many times the expert's, and some to turn around.
 const PATIENCE: u32 = 2;
 /// Steps that every link has beyond that.
@@ -39,7 +39,7 @@ const SLACK: u32 = 8;
 
 impl Chain {
     /// Whether both are the same instructions from the same state.
-    pub fn is_same(&self, other: &Chain) -> bool {
+    pub(crate) fn is_same(&self, other: &Chain) -> bool {
         self.links == other.links && self.start == other.start
     }
 
@@ -53,13 +53,13 @@ impl Chain {
     }
 
     /// All links as one instruction.
-    pub fn whole(&self) -> String {
+    pub(crate) fn whole(&self) -> String {
         self.links.join(" ")
     }
 
     /// The steps that the expert takes for each link, each from the expert's own end of the one before; with the state in which
     /// each begins. `None` where nobody grades the chain, or the expert fails.
-    pub fn expert(&self) -> Option<Vec<(u32, World, Grader)>> {
+    pub(crate) fn expert(&self) -> Option<Vec<(u32, World, Grader)>> {
         let mut rollout = Rollout::in_house(self.house(&self.start), self.whole(), Some(self.grader()?), Some(1000));
         let mut expert = ExpertPolicy::new();
         expert.reset(0, 0);
@@ -96,7 +96,7 @@ mod testing {
     use crate::house::testing::kitchen;
 
     /// To pick up the mug and put it in the sink.
-    pub fn chain() -> Chain {
+    pub(crate) fn chain() -> Chain {
         let (scene, start) = kitchen();
         let role = |name: &str| Role { class: Class::named(name).unwrap(), slice: false, bound: None, expert: None };
         let subtask = |skill, receptacle| Subtask { skill, object: 0, receptacle, closes: false, literal: None };

@@ -11,51 +11,51 @@ use crate::episode::rollout::{Observer, Rollout, Tick};
 
 /// How a link came out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LinkOutcome {
+pub(crate) struct LinkOutcome {
     /// It was reached: the links before it were done.
-    pub reached: bool,
+    pub(crate) reached: bool,
     /// It was done; `None` where nobody grades it.
-    pub done: Option<bool>,
+    pub(crate) done: Option<bool>,
     /// Its steps.
-    pub steps: u32,
+    pub(crate) steps: u32,
     /// The state in which it began.
-    pub entry: World,
+    pub(crate) entry: World,
     /// The state in which it ended.
-    pub exit: World,
+    pub(crate) exit: World,
     /// What chaining would learn where the next link takes over; nothing without critics.
-    pub handover: Option<Handover>,
+    pub(crate) handover: Option<Handover>,
 }
 
 /// The end of a link as equations 4 and 5 see it. Both end the link there, with what the next one makes of it as the reward.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Handover {
+pub(crate) struct Handover {
     /// V of the exit state under the next link's instruction.
-    pub worth: f32,
+    pub(crate) worth: f32,
     /// min Q of the link's last action under the next link's instruction: equation 4 draws it to the target.
-    pub next: f32,
+    pub(crate) next: f32,
     /// min Q of the link's last action under both instructions joined: equation 5 draws it to the target.
-    pub joined: f32,
+    pub(crate) joined: f32,
 }
 
 impl Handover {
     /// The reward: the worth within 0 to 1, where every return lies.
-    pub fn target(self) -> f32 {
+    pub(crate) fn target(self) -> f32 {
         self.worth.clamp(0.0, 1.0)
     }
 }
 
 /// A chain that was followed.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ChainRun {
+pub(crate) struct ChainRun {
     /// How each link came out, as far as it got.
-    pub outcomes: Vec<LinkOutcome>,
+    pub(crate) outcomes: Vec<LinkOutcome>,
     /// For every step, the value of each link: V under its instruction, or without critics the probability that its
     /// instruction gives to what was done.
-    pub link_values: Vec<Vec<f32>>,
+    pub(crate) link_values: Vec<Vec<f32>>,
     /// They are V.
-    pub by_value: bool,
+    pub(crate) by_value: bool,
     /// The link in force at every step.
-    pub in_force: Vec<usize>,
+    pub(crate) in_force: Vec<usize>,
 }
 
 impl Chain {
@@ -64,7 +64,7 @@ impl Chain {
     ///
     /// # Errors
     /// Whatever the policy reports.
-    pub fn play(
+    pub(crate) fn play(
         &self,
         policy: &mut dyn Policy,
         whole: bool,

@@ -3,7 +3,7 @@
 use crate::language::instruction;
 
 /// Splits a text into the links of a chain: at semicolons, line breaks, full stops and the word "then".
-pub fn split(text: &str) -> Vec<String> {
+pub(crate) fn split(text: &str) -> Vec<String> {
     let mut text = text.replace(['\n', '\r', '.', '!', '?'], ";");
     for joint in [", and then ", " and then ", ", then ", " then "] {
         text = text.replace(joint, ";");

@@ -24,7 +24,7 @@ const HEADROOM: i32 = 60;
 
 /// Gives a fixture its body, and cuts the surfaces that lie inside it to fit. The fixture comes with surfaces and facing;
 /// seats and toilets, which are used from any side, are turned as they were seen.
-pub fn furnish(fixture: &mut Fixture, found: &FoundFixture, agent_y: i32, cells: &[Cell]) {
+pub(crate) fn furnish(fixture: &mut Fixture, found: &FoundFixture, agent_y: i32, cells: &[Cell]) {
     let turnable = matches!(furniture::of(fixture.class).build, BodyKind::Seat | BodyKind::Toilet);
     let voted = fixture.facing;
     let facings = Heading::ALL.into_iter().filter(|&facing| facing == voted || turnable);

@@ -9,7 +9,7 @@ const WORTH: f32 = 0.02;
 
 /// The part of `outline` that is free of `blocked`, as few rectangles that overlap as they need to. Each covers `points`
 /// that the ones before it left; where nothing is blocked, it is `outline` itself.
-pub fn cover(outline: Rect, points: &[[i32; 2]], blocked: &[Rect]) -> Vec<Rect> {
+pub(crate) fn cover(outline: Rect, points: &[[i32; 2]], blocked: &[Rect]) -> Vec<Rect> {
     let blocked: Vec<Rect> = blocked.iter().copied().filter(|rect| overlap(rect, &outline)).collect();
     if blocked.is_empty() {
         return vec![outline];
@@ -43,7 +43,7 @@ pub fn cover(outline: Rect, points: &[[i32; 2]], blocked: &[Rect]) -> Vec<Rect> 
 }
 
 /// Whether two rectangles share more than an edge.
-pub fn overlap(a: &Rect, b: &Rect) -> bool {
+pub(crate) fn overlap(a: &Rect, b: &Rect) -> bool {
     (0..2).all(|axis| a.min[axis] < b.max[axis] && b.min[axis] < a.max[axis])
 }
 

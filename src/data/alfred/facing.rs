@@ -4,7 +4,7 @@ use super::fixtures::FoundFixture;
 use crate::domain::{Cell, Heading, Point};
 
 /// The front of a fixture: opposite to how most users faced it; where nobody used it, towards the nearest cells.
-pub fn facing(found: &FoundFixture, cells: &[Cell]) -> Heading {
+pub(crate) fn facing(found: &FoundFixture, cells: &[Cell]) -> Heading {
     let mut votes = [0usize; 4];
     let users = found.uses.iter().map(|used| used.pose);
     // The vetted pose looks straight at it; a walk that ended elsewhere says less.

@@ -23,7 +23,7 @@ const THINNEST: i32 = 20;
 
 /// A view of a fixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FixtureView {
+pub(crate) struct FixtureView {
     pose: Pose,
     open: bool,
     bounds: [u16; 4],
@@ -31,7 +31,7 @@ pub struct FixtureView {
 }
 
 /// The different views of a fixture, the most frequent first.
-pub fn views(uses: &[Use]) -> Vec<FixtureView> {
+pub(crate) fn views(uses: &[Use]) -> Vec<FixtureView> {
     let mut views: Vec<FixtureView> = Vec::new();
     for used in uses {
         let Some(bounds) = used.bounds else { continue };
@@ -51,23 +51,23 @@ pub fn views(uses: &[Use]) -> Vec<FixtureView> {
 }
 
 /// A fixture whose body is sought.
-pub struct Subject<'a> {
+pub(crate) struct Subject<'a> {
     scene: Scene,
     world: World,
     views: Vec<FixtureView>,
     /// What the body has to contain.
-    pub contents: Option<Cuboid>,
+    pub(crate) contents: Option<Cuboid>,
     /// Cells that it must leave free.
-    pub cells: &'a [Cell],
+    pub(crate) cells: &'a [Cell],
     /// Which sides may move: smallest x, y, z, then largest.
-    pub free: [bool; 6],
+    pub(crate) free: [bool; 6],
     /// Turns the outer box into the boxes of the body.
-    pub parts: &'a dyn Fn(Cuboid) -> Vec<Cuboid>,
+    pub(crate) parts: &'a dyn Fn(Cuboid) -> Vec<Cuboid>,
 }
 
 impl<'a> Subject<'a> {
     /// From a fixture as it is so far. Surfaces inside closed bodies do not count as seen.
-    pub fn new(
+    pub(crate) fn new(
         mut fixture: Fixture,
         build: BodyKind,
         uses: &[Use],
@@ -93,7 +93,7 @@ impl<'a> Subject<'a> {
     }
 
     /// The outer box that agrees best with all views, starting from `first`, and how badly it still does.
-    pub fn fit(&mut self, first: Cuboid) -> (Cuboid, f32) {
+    pub(crate) fn fit(&mut self, first: Cuboid) -> (Cuboid, f32) {
         if self.views.is_empty() {
             return (first, 0.0);
         }
@@ -142,7 +142,7 @@ impl<'a> Subject<'a> {
 }
 
 /// How badly two boxes agree: 0 when equal; the mean distance of edges keeps a slope where they do not meet.
-pub fn misfit(a: [f32; 4], b: [f32; 4]) -> f32 {
+pub(crate) fn misfit(a: [f32; 4], b: [f32; 4]) -> f32 {
     let area = |[left, top, right, bottom]: [f32; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
     let shared = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
     let union = (area(a) + area(b) - shared).max(1.0);
@@ -186,7 +186,7 @@ fn stands_in(cell: &Cell, outer: &Cuboid) -> bool {
 }
 
 /// Surfaces cut to what lies inside a body; one that would vanish becomes the body's own inside.
-pub fn within(surfaces: &mut [Surface], body: &Cuboid, inset: i32) {
+pub(crate) fn within(surfaces: &mut [Surface], body: &Cuboid, inset: i32) {
     let inside = body.footprint().grown(-inset.min(body_half(body)));
     for surface in surfaces {
         surface.height = surface.height.clamp(body.min.y + 5, (body.max.y - 5).max(body.min.y + 5));

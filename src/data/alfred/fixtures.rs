@@ -14,43 +14,43 @@ const SAME: f32 = 30.0;
 /// their place on the floor.
 const BASIN: f32 = 600.0;
 /// Ids are rounded to the centimetre on each axis; twice the rounding, in millimetres.
-pub const ROUNDING: f32 = 11.0;
+pub(crate) const ROUNDING: f32 = 11.0;
 
 /// A recorded use of a fixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Use {
+pub(crate) struct Use {
     /// The interaction.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// The agent's pose before it.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// Its box in the frame before it.
-    pub bounds: Option<[u16; 4]>,
+    pub(crate) bounds: Option<[u16; 4]>,
     /// Whether it stood open then.
-    pub open: bool,
+    pub(crate) open: bool,
 }
 
 /// A fixture as found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FoundFixture {
+pub(crate) struct FoundFixture {
     /// Its id.
-    pub name: Name,
+    pub(crate) name: Name,
     /// Its pivot.
-    pub pivot: Point,
+    pub(crate) pivot: Point,
     /// The vetted pose for using it, from the layout files.
-    pub vetted: Option<Pose>,
+    pub(crate) vetted: Option<Pose>,
     /// Poses that the expert walked to before using it.
-    pub walked_to: Vec<Pose>,
+    pub(crate) walked_to: Vec<Pose>,
     /// How the expert used it.
-    pub uses: Vec<Use>,
+    pub(crate) uses: Vec<Use>,
     /// The pivot is known to the millimetre, not only from the id.
     exact: bool,
 }
 
 /// All fixtures of a floor plan.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Inventory {
+pub(crate) struct Inventory {
     /// The fixtures, in the order of their names.
-    pub found: Vec<FoundFixture>,
+    pub(crate) found: Vec<FoundFixture>,
     numbers: BTreeMap<Name, u16>,
 }
 
@@ -64,7 +64,7 @@ fn is_basin(class: Class) -> bool {
 
 impl Inventory {
     /// Gathers the fixtures of one floor plan from its layout and all recordings of it.
-    pub fn gather(layout: &FloorPlanLayout, recordings: &[&Recording]) -> Inventory {
+    pub(crate) fn gather(layout: &FloorPlanLayout, recordings: &[&Recording]) -> Inventory {
         let mut pivots: BTreeMap<Name, Option<Point>> = BTreeMap::new();
         for &name in layout.stands.keys() {
             pivots.entry(name).or_default();
@@ -195,12 +195,12 @@ impl Inventory {
     }
 
     /// The number of the fixture of that name.
-    pub fn number(&self, name: Name) -> Option<u16> {
+    pub(crate) fn number(&self, name: Name) -> Option<u16> {
         self.numbers.get(&name).copied()
     }
 
     /// The number of the fixture of that class at that place.
-    pub fn at(&self, class: Class, point: Point) -> Option<u16> {
+    pub(crate) fn at(&self, class: Class, point: Point) -> Option<u16> {
         let same = |found: &FoundFixture| {
             let kind = found.name.class == class || (is_basin(class) && is_basin(found.name.class));
             kind && found.pivot.distance(point) < SAME
@@ -211,7 +211,7 @@ impl Inventory {
 
 impl Recording {
     /// The agent's pose before each step.
-    pub fn poses(&self) -> Vec<Pose> {
+    pub(crate) fn poses(&self) -> Vec<Pose> {
         let mut pose = self.setting.agent;
         let step = |step: &super::recording::RecordedStep| {
             let before = pose;
@@ -231,13 +231,13 @@ impl Recording {
 
 impl RecordedStart {
     /// The number of the movable object of that name. Of several at one place, the one nearest to `precise`.
-    pub fn object(&self, name: Name, precise: Option<Point>) -> Option<u16> {
+    pub(crate) fn object(&self, name: Name, precise: Option<Point>) -> Option<u16> {
         let wanted = precise.filter(|point| point.distance(name.at) <= ROUNDING).unwrap_or(name.at);
         self.object_at(name.class, wanted)
     }
 
     /// The number of the movable object of that class nearest to that place.
-    pub fn object_at(&self, class: Class, place: Point) -> Option<u16> {
+    pub(crate) fn object_at(&self, class: Class, place: Point) -> Option<u16> {
         let near = self.objects.iter().enumerate().filter(|(_, object)| object.class == class);
         let near = near.map(|(number, object)| (number, object.at.distance(place)));
         let nearest = near.filter(|(_, distance)| *distance <= ROUNDING).min_by(|a, b| a.1.total_cmp(&b.1));

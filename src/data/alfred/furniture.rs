@@ -4,7 +4,7 @@ use crate::domain::Class;
 
 /// From where a height is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MeasuredHeight {
+pub(crate) enum MeasuredHeight {
     /// Above the fixture's pivot, in millimetres.
     Pivot(i32),
     /// Above the floor, in millimetres.
@@ -13,7 +13,7 @@ pub enum MeasuredHeight {
 
 /// How a fixture's body is constructed from its surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BodyKind {
+pub(crate) enum BodyKind {
     /// From the floor to the surface: tables, counters, beds.
     Block,
     /// The top of a counter; what is below is not part of it.
@@ -34,21 +34,21 @@ pub enum BodyKind {
 
 /// Assumptions about a class of furniture. Lengths in millimetres; widths run along the front.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Furniture {
+pub(crate) struct Furniture {
     /// ALFRED's name of the class.
-    pub class: &'static str,
+    pub(crate) class: &'static str,
     /// The construction of its body.
-    pub build: BodyKind,
+    pub(crate) build: BodyKind,
     /// The heights of its surfaces.
-    pub supports: &'static [MeasuredHeight],
+    pub(crate) supports: &'static [MeasuredHeight],
     /// Width and depth of a surface.
-    pub area: [i32; 2],
+    pub(crate) area: [i32; 2],
     /// Width, height, depth of the body.
-    pub body: [i32; 3],
+    pub(crate) body: [i32; 3],
     /// The body's bottom.
-    pub bottom: MeasuredHeight,
+    pub(crate) bottom: MeasuredHeight,
     /// How far the body's middle lies behind the pivot.
-    pub behind: i32,
+    pub(crate) behind: i32,
 }
 
 use BodyKind::{Block, Board, Seat, Shell, Slab, Thing, Toilet, Tub};
@@ -108,14 +108,14 @@ const TABLE: &[Furniture] = &[
 ];
 
 /// What to assume of a class; of one that the table does not list, a small block.
-pub fn of(class: Class) -> &'static Furniture {
+pub(crate) fn of(class: Class) -> &'static Furniture {
     const UNKNOWN: Furniture = row("", Block, &[Pivot(0)], [300, 300], [400, 500, 400], Floor(0), 0);
     TABLE.iter().find(|row| row.class == class.name()).unwrap_or(&UNKNOWN)
 }
 
 impl MeasuredHeight {
     /// In the world's frame.
-    pub fn above(self, pivot: i32, floor: i32) -> i32 {
+    pub(crate) fn above(self, pivot: i32, floor: i32) -> i32 {
         match self {
             MeasuredHeight::Pivot(mm) => pivot + mm,
             MeasuredHeight::Floor(mm) => floor + mm,

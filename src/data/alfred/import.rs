@@ -20,7 +20,7 @@ use crate::house::validate;
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
     /// A folder with the authors' lists of the official task sets.
-    pub eval_lists: Option<PathBuf>,
+    pub(crate) eval_lists: Option<PathBuf>,
 }
 
 /// How far an import has come.
@@ -38,18 +38,18 @@ pub enum ImportProgress {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SetBuilt {
     /// As reports call it.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// How many tasks it has, or why it was left out.
-    pub tasks: Result<usize, String>,
+    pub(crate) tasks: Result<usize, String>,
 }
 
 /// The result of an import.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImportSummary {
     /// What was written.
-    pub manifest: DatasetManifest,
+    pub(crate) manifest: DatasetManifest,
     /// The official task sets.
-    pub sets: Vec<SetBuilt>,
+    pub(crate) sets: Vec<SetBuilt>,
 }
 
 struct SourceFile {

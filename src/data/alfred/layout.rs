@@ -13,9 +13,9 @@ use crate::domain::{Cell, Heading, Point};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FloorPlanLayout {
     /// Cells that the published list holds. The expert also walked on others.
-    pub cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     /// Fixtures with the vetted pose from which each is best seen.
-    pub stands: BTreeMap<Name, Pose>,
+    pub(crate) stands: BTreeMap<Name, Pose>,
 }
 
 impl FloorPlanLayout {
@@ -74,7 +74,7 @@ fn read_stands(path: &Path) -> anyhow::Result<BTreeMap<Name, Pose>> {
 }
 
 /// The cell at (x, z) in metres, if that is near the middle of one.
-pub fn cell_at(x: f64, z: f64) -> Option<Cell> {
+pub(crate) fn cell_at(x: f64, z: f64) -> Option<Cell> {
     if !(x.abs() <= FARTHEST && z.abs() <= FARTHEST) {
         return None;
     }
@@ -85,7 +85,7 @@ pub fn cell_at(x: f64, z: f64) -> Option<Cell> {
 }
 
 /// The heading of that many degrees clockwise from north, if it is a multiple of 90.
-pub fn heading_at(degrees: f64) -> Option<Heading> {
+pub(crate) fn heading_at(degrees: f64) -> Option<Heading> {
     let quarters = degrees / 90.0;
     let whole = quarters.round();
     ((quarters - whole).abs() < 0.02 && whole.abs() < 1000.0).then(|| Heading::from_quarters(whole as i32))

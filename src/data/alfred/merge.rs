@@ -2,30 +2,30 @@
 
 /// How the steps of a plan are renumbered.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GotoMerge {
+pub(crate) struct GotoMerge {
     gotos: Vec<usize>,
 }
 
 impl GotoMerge {
     /// From the numbers of the plan's GotoLocation steps.
-    pub fn new(mut gotos: Vec<usize>) -> GotoMerge {
+    pub(crate) fn new(mut gotos: Vec<usize>) -> GotoMerge {
         gotos.sort_unstable();
         GotoMerge { gotos }
     }
 
     /// Whether the step of that number is a GotoLocation.
-    pub fn is_goto(&self, step: usize) -> bool {
+    pub(crate) fn is_goto(&self, step: usize) -> bool {
         self.gotos.binary_search(&step).is_ok()
     }
 
     /// The merged number of the skill that the step of that number belongs to.
-    pub fn skill(&self, step: usize) -> usize {
+    pub(crate) fn skill(&self, step: usize) -> usize {
         let step = step + usize::from(self.is_goto(step));
         step - self.gotos.partition_point(|&goto| goto < step)
     }
 
     /// The sentences of the merged skills: those of the walks are dropped.
-    pub fn sentences(&self, steps: &[String]) -> Vec<String> {
+    pub(crate) fn sentences(&self, steps: &[String]) -> Vec<String> {
         let kept = steps.iter().enumerate().filter(|(step, _)| !self.is_goto(*step));
         kept.map(|(_, sentence)| sentence.trim().to_owned()).collect()
     }

@@ -32,7 +32,7 @@ struct ObjectView<'a> {
 }
 
 /// The meshes of a scene that recordings show often enough, by name.
-pub fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
+pub(crate) fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
     let mut sights: BTreeMap<&str, Vec<ObjectView<'_>>> = BTreeMap::new();
     for recording in recordings {
         for sight in first_touches(recording) {

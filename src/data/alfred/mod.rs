@@ -1,23 +1,23 @@
 //! The ALFRED importer: a checkout as published becomes a dataset folder.
 
-pub mod bodies;
-pub mod cover;
-pub mod facing;
-pub mod files;
-pub mod fit;
-pub mod fixtures;
-pub mod furniture;
+pub(crate) mod bodies;
+pub(crate) mod cover;
+pub(crate) mod facing;
+pub(crate) mod files;
+pub(crate) mod fit;
+pub(crate) mod fixtures;
+pub(crate) mod furniture;
 pub mod import;
 pub mod layout;
-pub mod merge;
-pub mod meshes;
-pub mod names;
-pub mod parents;
-pub mod recording;
+pub(crate) mod merge;
+pub(crate) mod meshes;
+pub(crate) mod names;
+pub(crate) mod parents;
+pub(crate) mod recording;
 pub mod scenes;
-pub mod support;
+pub(crate) mod support;
 pub mod tasks;
-pub mod trajectories;
-pub mod walls;
+pub(crate) mod trajectories;
+pub(crate) mod walls;
 
 pub use import::{ImportOptions, ImportProgress, ImportSummary, SetBuilt, import};

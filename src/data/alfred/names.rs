@@ -4,18 +4,18 @@ use crate::domain::{Class, Point};
 
 /// A thing as ALFRED names it: its class and where it stood at first, to the centimetre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Name {
+pub(crate) struct Name {
     /// The text before the first `|`: a sink's basin is a Sink, a slice of an apple an Apple.
-    pub class: Class,
+    pub(crate) class: Class,
     /// Where the thing stood at first; for a basin, where its sink or bathtub stands.
-    pub at: Point,
+    pub(crate) at: Point,
     /// Which part of it is meant.
-    pub part: NamedPart,
+    pub(crate) part: NamedPart,
 }
 
 /// Which part of a named thing is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum NamedPart {
+pub(crate) enum NamedPart {
     /// The thing itself.
     #[default]
     Whole,
@@ -26,14 +26,14 @@ pub enum NamedPart {
 }
 
 /// How far from the origin anything may be, in metres; beyond it a number is taken for a mistake.
-pub const FARTHEST: f64 = 100.0;
+pub(crate) const FARTHEST: f64 = 100.0;
 
 impl Name {
     /// Reads an object id.
     ///
     /// # Errors
     /// What is wrong with it, in words that quote it.
-    pub fn parse(text: &str) -> Result<Name, String> {
+    pub(crate) fn parse(text: &str) -> Result<Name, String> {
         let mut fields = text.split('|');
         let class = class_named(fields.next().unwrap_or_default())
             .ok_or_else(|| format!("{text:?} is of no known object class"))?;
@@ -54,7 +54,7 @@ impl Name {
     }
 
     /// The thing itself, where a slice of it is named.
-    pub fn whole(self) -> Name {
+    pub(crate) fn whole(self) -> Name {
         match self.part {
             NamedPart::Slice(_) => Name { part: NamedPart::Whole, ..self },
             NamedPart::Whole | NamedPart::Basin => self,
@@ -62,7 +62,7 @@ impl Name {
     }
 
     /// As ALFRED writes it.
-    pub fn text(self) -> String {
+    pub(crate) fn text(self) -> String {
         let metres = |mm: i32| format!("{:+06.2}", f64::from(mm) / 1000.0);
         let Point { x, y, z } = self.at;
         let part = match self.part {
@@ -75,7 +75,7 @@ impl Name {
 }
 
 /// The class of a type name; a basin counts as what it belongs to, and sliced things as the whole.
-pub fn class_named(name: &str) -> Option<Class> {
+pub(crate) fn class_named(name: &str) -> Option<Class> {
     let name = name.strip_suffix("Basin").or_else(|| name.strip_suffix("Sliced")).unwrap_or(name);
     Class::named(name).filter(|class| *class != Class::NONE)
 }

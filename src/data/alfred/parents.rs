@@ -14,7 +14,7 @@ const BELOW: i32 = 30;
 const RIM: i32 = 60;
 
 /// The initial parent of every object of a recording.
-pub fn parents(
+pub(crate) fn parents(
     recording: &Recording,
     inventory: &Inventory,
     recorded: &[StandingObject],

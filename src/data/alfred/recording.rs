@@ -15,60 +15,60 @@ pub struct RecordedStart {
     /// `FloorPlan7`.
     pub floor_plan: String,
     /// The kind of room.
-    pub room: Room,
+    pub(crate) room: Room,
     /// The agent's y in millimetres.
-    pub agent_y: i32,
+    pub(crate) agent_y: i32,
     /// Where the agent starts.
-    pub agent: Pose,
+    pub(crate) agent: Pose,
     /// Every movable object of a known class.
-    pub objects: Vec<Placed>,
+    pub(crate) objects: Vec<Placed>,
     /// Classes of lamps that shine.
-    pub lit: Vec<Class>,
+    pub(crate) lit: Vec<Class>,
 }
 
 /// A movable object at the start.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
+pub(crate) struct Placed {
     /// Its class.
-    pub class: Class,
+    pub(crate) class: Class,
     /// ALFRED's `objectName`: one mesh.
-    pub mesh: String,
+    pub(crate) mesh: String,
     /// Its pivot.
-    pub at: Point,
+    pub(crate) at: Point,
     /// Euler angles in tenths of a degree.
-    pub turn: [i16; 3],
+    pub(crate) turn: [i16; 3],
 }
 
 /// One action of the expert.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedStep {
     /// What was done.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// To what; the receptacle, for a Put.
-    pub target: Option<Name>,
+    pub(crate) target: Option<Name>,
     /// Which merged skill it belongs to.
     pub skill: usize,
     /// The target's box in the frame before it: left, top, right, bottom edges.
-    pub bounds: Option<[u16; 4]>,
+    pub(crate) bounds: Option<[u16; 4]>,
 }
 
 /// One merged skill as planned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {
     /// Its kind.
-    pub kind: SkillKind,
+    pub(crate) kind: SkillKind,
     /// The object (Pickup, Put, Slice, Toggle), or the fixture (Clean, Heat, Cool).
-    pub object: Name,
+    pub(crate) object: Name,
     /// For Put, the receptacle.
-    pub receptacle: Option<Name>,
+    pub(crate) receptacle: Option<Name>,
     /// For Clean, what is cleaned.
-    pub cleaned: Option<Name>,
+    pub(crate) cleaned: Option<Name>,
     /// The object's first place to the millimetre.
-    pub object_at: Option<(Class, Point)>,
+    pub(crate) object_at: Option<(Class, Point)>,
     /// Where the receptacle stands: the one put into, or the one that the object was in.
-    pub receptacle_at: Option<(Class, Point)>,
+    pub(crate) receptacle_at: Option<(Class, Point)>,
     /// The pose that was walked to.
-    pub walked_to: Option<Pose>,
+    pub(crate) walked_to: Option<Pose>,
 }
 
 /// A recorded trajectory.
@@ -81,7 +81,7 @@ pub struct Recording {
     /// Where it starts.
     pub setting: RecordedStart,
     /// ALFRED's goal.
-    pub goal: Goal,
+    pub(crate) goal: Goal,
     /// The merged skills.
     pub skills: Vec<Planned>,
     /// The actions, skill after skill.
@@ -95,7 +95,7 @@ impl Recording {
     ///
     /// # Errors
     /// The field that makes no sense, and why.
-    pub fn new(id: String, split: String, data: TrajData) -> Result<Recording, String> {
+    pub(crate) fn new(id: String, split: String, data: TrajData) -> Result<Recording, String> {
         let numbers = data.plan.high_pddl.iter().map(|high| high.high_idx);
         if let Some(number) = numbers.chain(data.plan.low_actions.iter().map(|low| low.high_idx)).find(|&n| n > 10_000)
         {
@@ -135,7 +135,7 @@ impl RecordedStart {
     ///
     /// # Errors
     /// The field that makes no sense, and why.
-    pub fn new(scene: &SceneData) -> Result<RecordedStart, String> {
+    pub(crate) fn new(scene: &SceneData) -> Result<RecordedStart, String> {
         let room = Room::of_floor_plan(scene.scene_num)
             .filter(|_| scene.floor_plan == format!("FloorPlan{}", scene.scene_num))
             .ok_or_else(|| format!("scene.floor_plan: {:?} is no floor plan of ALFRED", scene.floor_plan))?;

@@ -12,20 +12,20 @@ use crate::domain::{Cell, Fixture, Room, Scene};
 
 /// A floor plan and what is needed to resolve recordings against it.
 #[derive(Clone, Debug)]
-pub struct Built {
+pub(crate) struct Built {
     /// The scene.
-    pub scene: Scene,
+    pub(crate) scene: Scene,
     /// Names of its fixtures.
-    pub inventory: Inventory,
+    pub(crate) inventory: Inventory,
     /// Points that recordings assign to fixtures.
-    pub recorded: Vec<StandingObject>,
+    pub(crate) recorded: Vec<StandingObject>,
 }
 
 /// Builds one floor plan from its layout, its recordings, and further states of it.
 ///
 /// # Errors
 /// When there is no cell to stand on.
-pub fn build(
+pub(crate) fn build(
     name: &str,
     room: Room,
     layout: &FloorPlanLayout,

@@ -15,7 +15,7 @@ const LIMIT: f32 = 500.0;
 /// No fixture holds anything farther from its pivot than this, in millimetres.
 const WIDEST: f32 = 7000.0;
 /// Around the outermost contents.
-pub const MARGIN: i32 = 50;
+pub(crate) const MARGIN: i32 = 50;
 /// Half the side of the square around a cell's middle that no furniture fills.
 const WALKED: i32 = 150;
 /// Shelves of one receptacle are farther apart than this.
@@ -23,20 +23,20 @@ const STOREY: i32 = 120;
 
 /// A point on which something is known to stand, and the fixture that holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StandingObject {
+pub(crate) struct StandingObject {
     /// The support under the object.
-    pub at: Point,
+    pub(crate) at: Point,
     /// What stands there.
-    pub class: Class,
+    pub(crate) class: Class,
     /// The fixture.
-    pub fixture: u16,
+    pub(crate) fixture: u16,
     /// How far from here things still count as standing in the same fixture.
     limit: f32,
 }
 
 /// What is recorded to hold an object at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Holder {
+pub(crate) enum Holder {
     /// None: it was taken from a receptacle that was shut, so it lies on or beside it.
     None,
     /// A fixture.
@@ -46,13 +46,13 @@ pub enum Holder {
 }
 
 /// The point under an object: its pivot lowered by how high its class rests.
-pub fn foot(class: Class, at: Point) -> Point {
+pub(crate) fn foot(class: Class, at: Point) -> Point {
     Point { y: at.y - class.info().rest, ..at }
 }
 
 impl Recording {
     /// Which objects are recorded in which receptacle at the start: what each first Pickup says of an unmoved object.
-    pub fn recorded_holders(&self, inventory: &Inventory) -> Vec<(u16, Holder)> {
+    pub(crate) fn recorded_holders(&self, inventory: &Inventory) -> Vec<(u16, Holder)> {
         let mut moved = vec![false; self.setting.objects.len()];
         let mut holders = Vec::new();
         let mut opened: Vec<u16> = Vec::new();
@@ -95,7 +95,7 @@ impl Recording {
     }
 
     /// The number of the movable object of that name, with the plan's more exact place of it where there is one.
-    pub fn object(&self, name: super::names::Name, precise: Option<(Class, Point)>) -> Option<u16> {
+    pub(crate) fn object(&self, name: super::names::Name, precise: Option<(Class, Point)>) -> Option<u16> {
         let planned = || {
             let same = self.skills.iter().filter(|skill| skill.object.whole() == name);
             same.filter_map(|skill| skill.object_at).find(|(class, _)| *class == name.class)
@@ -106,7 +106,7 @@ impl Recording {
 }
 
 /// The points that the recordings themselves assign to fixtures.
-pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<StandingObject> {
+pub(crate) fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<StandingObject> {
     let mut standings = Vec::new();
     for recording in recordings {
         for (object, holder) in recording.recorded_holders(inventory) {
@@ -130,7 +130,7 @@ pub fn recorded(recordings: &[&Recording], inventory: &Inventory) -> Vec<Standin
 }
 
 /// The fixture of the nearest known point, if one is near enough.
-pub fn nearest(known: &[StandingObject], at: Point) -> Option<u16> {
+pub(crate) fn nearest(known: &[StandingObject], at: Point) -> Option<u16> {
     let distance = |standing: &StandingObject| {
         let floor = standing.at.floor_distance(at);
         let height = (standing.at.y - at.y) as f32 * HEIGHT_WEIGHT;
@@ -141,7 +141,7 @@ pub fn nearest(known: &[StandingObject], at: Point) -> Option<u16> {
 }
 
 /// Every point at which anything stood, assigned to fixtures: as recorded, else as its nearest recorded neighbour.
-pub fn assigned(settings: &[&RecordedStart], recorded: &[StandingObject]) -> Vec<StandingObject> {
+pub(crate) fn assigned(settings: &[&RecordedStart], recorded: &[StandingObject]) -> Vec<StandingObject> {
     let mut all = recorded.to_vec();
     for object in settings.iter().flat_map(|setting| &setting.objects) {
         let at = foot(object.class, object.at);
@@ -154,7 +154,7 @@ pub fn assigned(settings: &[&RecordedStart], recorded: &[StandingObject]) -> Vec
 
 /// The surfaces of one fixture, lowest first, from the points assigned to it; medians of its class where there are none.
 /// Nothing stands on what is `blocked`.
-pub fn surfaces(
+pub(crate) fn surfaces(
     inventory: &Inventory,
     number: u16,
     assigned: &[StandingObject],
@@ -192,7 +192,7 @@ pub fn surfaces(
 }
 
 /// Places that no furniture standing on the floor covers: around the middles of cells.
-pub fn walked(cells: &[Cell]) -> Vec<Rect> {
+pub(crate) fn walked(cells: &[Cell]) -> Vec<Rect> {
     let middle = |cell: &Cell| {
         let at = cell.centre(0);
         Rect { min: [at.x, at.z], max: [at.x, at.z] }.grown(WALKED)
@@ -201,7 +201,7 @@ pub fn walked(cells: &[Cell]) -> Vec<Rect> {
 }
 
 /// A rectangle of that width and depth whose middle lies `ahead` of the pivot in the direction of its front.
-pub fn ahead_of(pivot: Point, facing: Heading, [width, depth]: [i32; 2], ahead: i32) -> Rect {
+pub(crate) fn ahead_of(pivot: Point, facing: Heading, [width, depth]: [i32; 2], ahead: i32) -> Rect {
     let (dx, dz) = facing.step();
     let middle = [pivot.x + i32::from(dx) * ahead, pivot.z + i32::from(dz) * ahead];
     let half = if dx == 0 { [width / 2, depth / 2] } else { [depth / 2, width / 2] };
@@ -222,7 +222,7 @@ fn extent(points: &[Point]) -> Rect {
 }
 
 /// The middle value; 0 of nothing.
-pub fn median(values: impl Iterator<Item = i32>) -> i32 {
+pub(crate) fn median(values: impl Iterator<Item = i32>) -> i32 {
     let mut values: Vec<i32> = values.collect();
     values.sort_unstable();
     values.get(values.len() / 2).copied().unwrap_or_default()

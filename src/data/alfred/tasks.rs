@@ -17,11 +17,11 @@ use crate::house::{Outcome, Replay};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Official {
     /// What it is called in reports.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// Its file under `tasks/`, without the ending.
-    pub file: &'static str,
+    pub(crate) file: &'static str,
     /// The authors' file.
-    pub list: &'static str,
+    pub(crate) list: &'static str,
 }
 
 /// The paper's three task sets.
@@ -125,7 +125,7 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Officia
 ///
 /// # Errors
 /// Names the first entry that cannot be built.
-pub fn build<'a>(
+pub(crate) fn build<'a>(
     set: Official,
     entries: &[OfficialTask],
     trajectories: &BTreeMap<&str, &'a Trajectory>,
@@ -176,7 +176,12 @@ fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &OfficialTask)
 ///
 /// # Errors
 /// When there is no such span, or the actions before it are not possible.
-pub fn span_task(id: String, trajectory: &Trajectory, scene: &Scene, span: Range<usize>) -> Result<Task, String> {
+pub(crate) fn span_task(
+    id: String,
+    trajectory: &Trajectory,
+    scene: &Scene,
+    span: Range<usize>,
+) -> Result<Task, String> {
     if span.is_empty() || span.end > trajectory.skills.len() {
         return Err(format!("skills {span:?} do not exist; there are {}", trajectory.skills.len()));
     }

@@ -15,7 +15,7 @@ use crate::domain::{Action, ActionType, Role, Scene, SkillKind, Subtask, Traject
 ///
 /// # Errors
 /// When something it names does not exist; the text says which field.
-pub fn resolve(
+pub(crate) fn resolve(
     recording: &Recording,
     scene: &Scene,
     inventory: &Inventory,

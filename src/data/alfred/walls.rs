@@ -11,7 +11,7 @@ const THICKNESS: i32 = 60;
 const HEIGHT: i32 = 2600;
 
 /// Four walls around cells and furniture, from the floor up; taller where furniture is.
-pub fn around(cells: &[Cell], fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
+pub(crate) fn around(cells: &[Cell], fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
     let stands = cells.iter().map(|cell| {
         let middle = cell.centre(0);
         Rect { min: [middle.x, middle.z], max: [middle.x, middle.z] }.grown(STAND)
@@ -48,7 +48,7 @@ const SLIVER: i32 = 15;
 
 /// What carries the counters: boxes from the floor to each slab, with room left for everything that stands or is built in
 /// below.
-pub fn under_counters(fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
+pub(crate) fn under_counters(fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
     let mut all = Vec::new();
     for (number, counter) in fixtures.iter().enumerate().filter(|(_, fixture)| fixture.class.name() == "CounterTop") {
         let below = |slab: &Cuboid| {

@@ -6,6 +6,6 @@ mod record;
 mod taken_step;
 mod tree;
 
-pub use saved_state::{FRAMES, SavedState, look_back};
-pub use taken_step::TakenStep;
-pub use tree::{Branch, Growth, Place, Tree};
+pub(crate) use saved_state::{FRAMES, SavedState, look_back};
+pub(crate) use taken_step::TakenStep;
+pub(crate) use tree::{Growth, Tree};

@@ -6,7 +6,7 @@ use crate::episode::record::{Author, Episode};
 
 impl Tree {
     /// The start as a branch left it: since the tree began, a reset may have begun to grade what is told there.
-    pub fn beginning(&self, branch: usize) -> SavedState {
+    pub(crate) fn beginning(&self, branch: usize) -> SavedState {
         let mut start = self.start().clone();
         if let Some((next, Some(taken))) = self.story(branch).get(1)
             && start.grader.is_none()
@@ -19,7 +19,7 @@ impl Tree {
     }
 
     /// A branch as an episode of a run. Who chose is written where it changes, and at its first step.
-    pub fn episode(&self, branch: usize, task: &str) -> Episode {
+    pub(crate) fn episode(&self, branch: usize, task: &str) -> Episode {
         let story = self.story(branch);
         let start = self.beginning(branch);
         let mut told = start.instruction.as_str();

@@ -10,24 +10,24 @@ use crate::house::grading::Grader;
 
 /// A state with everything that decides what follows from it.
 #[derive(Clone, Debug)]
-pub struct SavedState {
+pub(crate) struct SavedState {
     /// The house.
-    pub world: Arc<World>,
+    pub(crate) world: Arc<World>,
     /// How far the task is.
-    pub grader: Option<Grader>,
+    pub(crate) grader: Option<Grader>,
     /// After how many steps the episode ends.
-    pub horizon: Option<u32>,
+    pub(crate) horizon: Option<u32>,
     /// What the agent is told.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// Who decides.
-    pub author: Author,
+    pub(crate) author: Author,
     /// What the policy carries.
-    pub carried: PolicyState,
+    pub(crate) carried: PolicyState,
 }
 
 impl SavedState {
     /// The present state of a rollout.
-    pub fn of(rollout: &Rollout, author: &Author, carried: PolicyState) -> SavedState {
+    pub(crate) fn of(rollout: &Rollout, author: &Author, carried: PolicyState) -> SavedState {
         SavedState {
             world: Arc::new(rollout.env.house.world().clone()),
             grader: rollout.env.grader.clone(),
@@ -39,7 +39,7 @@ impl SavedState {
     }
 
     /// Brings a rollout to this state, `steps` into the episode.
-    pub fn restore(&self, rollout: &mut Rollout, steps: u32) {
+    pub(crate) fn restore(&self, rollout: &mut Rollout, steps: u32) {
         rollout.instruction.clone_from(&self.instruction);
         rollout.horizon = self.horizon;
         rollout.env.house.restore((*self.world).clone());
@@ -49,11 +49,17 @@ impl SavedState {
 }
 
 /// Frames that a trained agent looks back on, the present one included.
-pub const FRAMES: usize = 5;
+pub(crate) const FRAMES: usize = 5;
 
 /// Lets a policy begin in the middle of an episode as if it had been there all along: it looks at the states before this one
 /// (`before`, the newest first), `now` steps into the episode.
-pub fn look_back(policy: &mut dyn Policy, author: &Author, rollout: &mut Rollout, before: &[SavedState], now: u32) {
+pub(crate) fn look_back(
+    policy: &mut dyn Policy,
+    author: &Author,
+    rollout: &mut Rollout,
+    before: &[SavedState],
+    now: u32,
+) {
     policy.reset(0, author.seed);
     policy.set_sampling(author.sampling);
     if before.is_empty() {

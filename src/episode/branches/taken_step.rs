@@ -7,17 +7,17 @@ use crate::episode::record::{Author, TraceStep};
 
 /// A step that was taken.
 #[derive(Clone, Debug)]
-pub struct TakenStep {
+pub(crate) struct TakenStep {
     /// What was decided, and the distribution behind it.
-    pub decision: Decision,
+    pub(crate) decision: Decision,
     /// What was recorded of it; `told` and `by` are left out, they follow from the neighbours.
-    pub step: TraceStep,
+    pub(crate) step: TraceStep,
     /// What the agent was told.
-    pub instruction: Arc<str>,
+    pub(crate) instruction: Arc<str>,
     /// Who chose.
-    pub author: Author,
+    pub(crate) author: Author,
     /// What the critics made of the state before it.
-    pub values: Option<Values>,
+    pub(crate) values: Option<Values>,
 }
 
 impl TakenStep {

@@ -5,7 +5,7 @@ use super::taken_step::TakenStep;
 use crate::agent::PolicyState;
 
 /// A state's place in the tree.
-pub type Place = usize;
+pub(crate) type Place = usize;
 
 struct Twig {
     parent: Option<Place>,
@@ -17,19 +17,19 @@ struct Twig {
 
 /// A way through the tree from its start.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Branch {
+pub(crate) struct Branch {
     /// What it is called.
-    pub name: String,
+    pub(crate) name: String,
     /// Its last state.
     tip: Place,
     /// The branch that it left, and after which step.
-    pub left: Option<(usize, u32)>,
+    pub(crate) left: Option<(usize, u32)>,
     /// Why, in words.
-    pub why: String,
+    pub(crate) why: String,
 }
 
 /// Everything that was tried from one start.
-pub struct Tree {
+pub(crate) struct Tree {
     twigs: Vec<Twig>,
     branches: Vec<Branch>,
     branch: usize,
@@ -45,7 +45,7 @@ const MOST: usize = 20_000;
 
 /// What growing came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Growth {
+pub(crate) enum Growth {
     /// The branch in hand grew.
     Longer,
     /// The step was there already.
@@ -56,93 +56,93 @@ pub enum Growth {
 
 impl Tree {
     /// Only the start.
-    pub fn new(start: SavedState) -> Tree {
+    pub(crate) fn new(start: SavedState) -> Tree {
         let twig = Twig { parent: None, step: 0, taken: None, moment: start, children: Vec::new() };
         let main = Branch { name: "main".into(), tip: 0, left: None, why: "the start".into() };
         Tree { twigs: vec![twig], branches: vec![main], branch: 0, line: vec![0], at: 0 }
     }
 
     /// The step in hand.
-    pub fn at(&self) -> u32 {
+    pub(crate) fn at(&self) -> u32 {
         self.at
     }
 
     /// The last step of the branch in hand.
-    pub fn last(&self) -> u32 {
+    pub(crate) fn last(&self) -> u32 {
         self.line.len() as u32 - 1
     }
 
     /// The state in hand.
-    pub fn saved_state(&self) -> &SavedState {
+    pub(crate) fn saved_state(&self) -> &SavedState {
         &self.twigs[self.line[self.at as usize]].moment
     }
 
     /// Replaces what the start is like, while nothing was tried from it.
-    pub fn begin_with(&mut self, start: SavedState) {
+    pub(crate) fn begin_with(&mut self, start: SavedState) {
         if self.twigs.len() == 1 {
             self.twigs[0].moment = start;
         }
     }
 
     /// The states up to the one in hand.
-    pub fn past(&self) -> impl DoubleEndedIterator<Item = &SavedState> + ExactSizeIterator {
+    pub(crate) fn past(&self) -> impl DoubleEndedIterator<Item = &SavedState> + ExactSizeIterator {
         self.line[..=self.at as usize].iter().map(|&place| &self.twigs[place].moment)
     }
 
     /// The steps of the branch in hand, from the first.
-    pub fn steps(&self) -> impl Iterator<Item = &TakenStep> {
+    pub(crate) fn steps(&self) -> impl Iterator<Item = &TakenStep> {
         self.line.iter().filter_map(|&place| self.twigs[place].taken.as_ref())
     }
 
     /// Whether it holds as many states as it can.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.twigs.len() >= MOST
     }
 
     /// The state at the start.
-    pub fn start(&self) -> &SavedState {
+    pub(crate) fn start(&self) -> &SavedState {
         &self.twigs[0].moment
     }
 
     /// The step that led to the state in hand.
-    pub fn last_taken(&self) -> Option<&TakenStep> {
+    pub(crate) fn last_taken(&self) -> Option<&TakenStep> {
         self.twigs[self.line[self.at as usize]].taken.as_ref()
     }
 
     /// The step that follows the state in hand on its branch.
-    pub fn next(&self) -> Option<&TakenStep> {
+    pub(crate) fn next(&self) -> Option<&TakenStep> {
         let place = *self.line.get(self.at as usize + 1)?;
         self.twigs[place].taken.as_ref()
     }
 
     /// Whether other branches leave the branch in hand after each of its steps, the start first.
-    pub fn forks(&self) -> impl Iterator<Item = bool> {
+    pub(crate) fn forks(&self) -> impl Iterator<Item = bool> {
         self.line.iter().map(|&place| self.twigs[place].children.len() > 1)
     }
 
     /// The states of a branch with the steps that led to them, from the start.
-    pub fn story(&self, branch: usize) -> Vec<(&SavedState, Option<&TakenStep>)> {
+    pub(crate) fn story(&self, branch: usize) -> Vec<(&SavedState, Option<&TakenStep>)> {
         let line = self.branches.get(branch).map_or_else(Vec::new, |branch| self.line_to(branch.tip));
         line.into_iter().map(|place| (&self.twigs[place].moment, self.twigs[place].taken.as_ref())).collect()
     }
 
     /// Every branch.
-    pub fn branches(&self) -> &[Branch] {
+    pub(crate) fn branches(&self) -> &[Branch] {
         &self.branches
     }
 
     /// The number of the branch in hand.
-    pub fn branch(&self) -> usize {
+    pub(crate) fn branch(&self) -> usize {
         self.branch
     }
 
     /// The last step of a branch.
-    pub fn length(&self, branch: usize) -> u32 {
+    pub(crate) fn length(&self, branch: usize) -> u32 {
         self.branches.get(branch).map_or(0, |branch| self.twigs[branch.tip].step)
     }
 
     /// How many subtasks were completed on a branch.
-    pub fn completed(&self, branch: usize) -> u32 {
+    pub(crate) fn completed(&self, branch: usize) -> u32 {
         let tip = self.branches.get(branch).map(|branch| branch.tip);
         let up = std::iter::successors(tip, |&place| self.twigs[place].parent);
         up.filter(|&place| self.twigs[place].taken.as_ref().is_some_and(|taken| taken.step.subtask.is_some())).count()
@@ -150,13 +150,13 @@ impl Tree {
     }
 
     /// Goes to a step of the branch in hand, or to its end.
-    pub fn seek(&mut self, step: u32) -> &SavedState {
+    pub(crate) fn seek(&mut self, step: u32) -> &SavedState {
         self.at = step.min(self.last());
         self.saved_state()
     }
 
     /// Takes another branch in hand, at the same step or its end.
-    pub fn switch(&mut self, branch: usize) -> bool {
+    pub(crate) fn switch(&mut self, branch: usize) -> bool {
         let Some(tip) = self.branches.get(branch).map(|branch| branch.tip) else { return false };
         self.branch = branch;
         self.line = self.line_to(tip);
@@ -165,7 +165,7 @@ impl Tree {
     }
 
     /// Gives a branch another name. One that is taken or empty is refused.
-    pub fn rename(&mut self, branch: usize, name: &str) -> bool {
+    pub(crate) fn rename(&mut self, branch: usize, name: &str) -> bool {
         let name = name.trim();
         let taken = self.branches.iter().enumerate().any(|(at, other)| at != branch && other.name == name);
         match self.branches.get_mut(branch) {
@@ -178,7 +178,7 @@ impl Tree {
     }
 
     /// Adds a step that was taken from the state in hand, and what came of it; goes there. `why` says what was new about it.
-    pub fn grow(
+    pub(crate) fn grow(
         &mut self,
         taken: TakenStep,
         moment: impl FnOnce() -> SavedState,
@@ -221,7 +221,7 @@ impl Tree {
     }
 
     /// How many steps two branches share from the start.
-    pub fn shared(&self, one: usize, other: usize) -> u32 {
+    pub(crate) fn shared(&self, one: usize, other: usize) -> u32 {
         let lines = [one, other].map(|at| self.branches.get(at).map_or_else(Vec::new, |b| self.line_to(b.tip)));
         let same = lines[0].iter().zip(&lines[1]).take_while(|(a, b)| a == b).count();
         same.saturating_sub(1) as u32

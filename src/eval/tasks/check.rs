@@ -13,11 +13,11 @@ use crate::episode::scenes::Scenes;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// The line of the file, from 1.
-    pub line: usize,
+    pub(crate) line: usize,
     /// The field, as in `tasks[1].roles[0].class`; empty for the whole file.
-    pub field: String,
+    pub(crate) field: String,
     /// What is wrong, and what was expected.
-    pub problem: String,
+    pub(crate) problem: String,
 }
 
 impl std::fmt::Display for Mistake {
@@ -117,7 +117,7 @@ fn meaning(path: &Path, document: &Value, found: &mut Vec<(String, String)>) {
 ///
 /// # Errors
 /// When there are any.
-pub fn none(mistakes: &[Mistake], path: &Path) -> anyhow::Result<()> {
+pub(crate) fn none(mistakes: &[Mistake], path: &Path) -> anyhow::Result<()> {
     let count = mistakes.len();
     (count == 0).then_some(()).with_context(|| format!("{}: {count} mistakes", path.display()))
 }

@@ -27,7 +27,7 @@ const ATTEMPTS_A_ROOM: u64 = 20;
 
 /// Where the instructions of sampled tasks come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phrasing {
+pub(crate) enum Phrasing {
     /// The program's own grammar.
     Grammar,
     /// What people wrote of the demonstrations.
@@ -36,9 +36,9 @@ pub enum Phrasing {
 
 impl Phrasing {
     /// The option's name of the program's own grammar.
-    pub const GRAMMAR: &str = "own";
+    pub(crate) const GRAMMAR: &str = "own";
     /// The option's name of what people wrote.
-    pub const ANNOTATORS: &str = "annotators";
+    pub(crate) const ANNOTATORS: &str = "annotators";
 }
 
 impl std::str::FromStr for Phrasing {
@@ -84,7 +84,7 @@ impl SampleSpec {
 ///
 /// # Errors
 /// When there are too few tasks of all these lengths together.
-pub fn balanced(
+pub(crate) fn balanced(
     spec: &SampleSpec,
     lengths: &[usize],
     sample: &dyn Fn(&SampleSpec) -> anyhow::Result<TaskSet>,
@@ -121,7 +121,7 @@ pub fn balanced(
 /// A dataset holds fewer spans than were asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{folder} holds {there} spans of {length} subtasks that fit; ask for at most that many tasks")]
-pub struct TooFew {
+pub(crate) struct TooFew {
     folder: String,
     there: usize,
     length: usize,
@@ -156,7 +156,7 @@ pub fn sample_generated(spec: &SampleSpec, done: &(dyn Fn() + Sync)) -> anyhow::
 ///
 /// # Errors
 /// When the dataset cannot be read, or holds too few such spans.
-pub fn sample_dataset(
+pub(crate) fn sample_dataset(
     spec: &SampleSpec,
     dataset: &Dataset,
     split: Option<&str>,
@@ -236,7 +236,7 @@ pub fn sample_dataset(
 ///
 /// # Errors
 /// When the scenes' folder cannot be found.
-pub fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &Path) -> anyhow::Result<TaskSet> {
+pub(crate) fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &Path) -> anyhow::Result<TaskSet> {
     let scenes = set.scenes.as_ref().map(|scenes| {
         let beside = file.parent().unwrap_or(Path::new("")).join(scenes);
         // A set of generated houses may name a folder that is not there.

@@ -10,8 +10,8 @@ mod state;
 mod step;
 mod time;
 
-pub use snapshot::{Snapshot, TaskProgress};
-pub use step::StepTaken;
+pub(crate) use snapshot::{Snapshot, TaskProgress};
+pub(crate) use step::StepTaken;
 
 use std::sync::Arc;
 
@@ -91,7 +91,7 @@ impl Exploration {
     }
 
     /// What the agent is told.
-    pub fn instruction(&self) -> &str {
+    pub(crate) fn instruction(&self) -> &str {
         &self.rollout.instruction
     }
 
@@ -101,12 +101,12 @@ impl Exploration {
     }
 
     /// House, grader and instruction in the present state.
-    pub fn rollout(&self) -> &Rollout {
+    pub(crate) fn rollout(&self) -> &Rollout {
         &self.rollout
     }
 
     /// Everything that was tried.
-    pub fn tree(&self) -> &Tree {
+    pub(crate) fn tree(&self) -> &Tree {
         &self.tree
     }
 }

@@ -20,7 +20,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When it cannot be opened; the present one stays.
-    pub fn seed(&mut self, seed: u64) -> anyhow::Result<()> {
+    pub(crate) fn seed(&mut self, seed: u64) -> anyhow::Result<()> {
         self.source.seek(seed);
         self.enter()
     }
@@ -45,7 +45,7 @@ impl Exploration {
     }
 
     /// The episode has no end but success.
-    pub fn unlimited(&mut self) {
+    pub(crate) fn unlimited(&mut self) {
         self.episode.limited = false;
         self.rollout.horizon = None;
         self.make_start();
@@ -55,7 +55,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When the text is empty, too long, or holds control characters.
-    pub fn instruct(&mut self, text: &str) -> anyhow::Result<&'static str> {
+    pub(crate) fn instruct(&mut self, text: &str) -> anyhow::Result<&'static str> {
         let text = instruction::parse(text)?;
         self.rollout.instruction = text;
         self.acting.decision = None;

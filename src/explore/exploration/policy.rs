@@ -25,7 +25,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When there is none such, or it cannot be loaded; the one before stays.
-    pub fn checkpoint(&mut self, wanted: &str) -> anyhow::Result<()> {
+    pub(crate) fn checkpoint(&mut self, wanted: &str) -> anyhow::Result<()> {
         let before = self.policies.chosen();
         self.policies.choose(wanted)?;
         let chosen = self.choose(PolicyKind::Agent);
@@ -36,7 +36,7 @@ impl Exploration {
     }
 
     /// The names of the checkpoints that may act.
-    pub fn checkpoints(&self) -> &[String] {
+    pub(crate) fn checkpoints(&self) -> &[String] {
         &self.checkpoints
     }
 
@@ -44,7 +44,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When it cannot be loaded.
-    pub fn another_policy(&self) -> anyhow::Result<Box<dyn Policy>> {
+    pub(crate) fn another_policy(&self) -> anyhow::Result<Box<dyn Policy>> {
         Ok(self.policies.make(self.acting.kind)?.policy)
     }
 
@@ -52,12 +52,12 @@ impl Exploration {
     ///
     /// # Errors
     /// When there is none, or it cannot be loaded.
-    pub fn rival(&self, wanted: &str) -> anyhow::Result<Loaded> {
+    pub(crate) fn rival(&self, wanted: &str) -> anyhow::Result<Loaded> {
         self.policies.named(wanted)
     }
 
     /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
-    pub fn reseed(&mut self, seed: u64, samples: bool) {
+    pub(crate) fn reseed(&mut self, seed: u64, samples: bool) {
         self.acting.author.seed = seed;
         self.acting.author.sampling = samples;
         self.look_back();
@@ -65,34 +65,34 @@ impl Exploration {
     }
 
     /// Lets that author's policy begin here: its chance, and whether it draws.
-    pub fn begin_as(&mut self, author: Author) {
+    pub(crate) fn begin_as(&mut self, author: Author) {
         self.acting.author = author;
         self.look_back();
         self.make_start();
     }
 
     /// What tells the policy that decides from others.
-    pub fn who(&self) -> PolicyIdentity {
+    pub(crate) fn who(&self) -> PolicyIdentity {
         PolicyIdentity { name: self.acting.author.policy.clone(), checkpoint: self.acting.author.checkpoint.clone() }
     }
 
     /// Who decides, and by which chance.
-    pub fn author(&self) -> &Author {
+    pub(crate) fn author(&self) -> &Author {
         &self.acting.author
     }
 
     /// The seed of the episode, by which it began.
-    pub fn episode_seed(&self) -> u64 {
+    pub(crate) fn episode_seed(&self) -> u64 {
         self.episode.seed
     }
 
     /// Which policy decides.
-    pub fn policy(&self) -> PolicyKind {
+    pub(crate) fn policy(&self) -> PolicyKind {
         self.acting.kind
     }
 
     /// Whether a policy is loaded.
-    pub fn has_policy(&self) -> bool {
+    pub(crate) fn has_policy(&self) -> bool {
         self.acting.policy.is_some()
     }
 }

@@ -13,7 +13,7 @@ use crate::language::{instruction, nouns, phrases};
 
 impl Exploration {
     /// What conditions ask of the present state.
-    pub fn facts(&mut self) -> Facts {
+    pub(crate) fn facts(&mut self) -> Facts {
         let classes = |exploration: &mut Exploration| {
             let seen = exploration.rollout.env.house.view().sightings.clone();
             let house = &exploration.rollout.env.house;
@@ -38,7 +38,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When the other text is no instruction, or the policy has no distribution.
-    pub fn contrast(&mut self, other: &str) -> anyhow::Result<Contrast> {
+    pub(crate) fn contrast(&mut self, other: &str) -> anyhow::Result<Contrast> {
         // The policy has looked at this state once, as always.
         self.decide()?;
         let policy = self.acting.policy.as_deref_mut().ok_or_else(|| anyhow::anyhow!("no policy is loaded"))?;
@@ -50,7 +50,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When there is neither text nor task.
-    pub fn chain(&self, text: &str) -> anyhow::Result<Chain> {
+    pub(crate) fn chain(&self, text: &str) -> anyhow::Result<Chain> {
         let house = &self.rollout.env.house;
         let left = self.rollout.env.grader.as_ref().map(|grader| {
             let mut roles = grader.roles().to_vec();

@@ -16,7 +16,7 @@ use crate::run_dir::default_path;
 
 impl Exploration {
     /// Everything that was tried as a run's tasks and episodes, a branch each.
-    pub fn explored(&self) -> SessionExport {
+    pub(crate) fn explored(&self) -> SessionExport {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
         SessionExport {
@@ -30,7 +30,7 @@ impl Exploration {
     ///
     /// # Errors
     /// Never for what the simulator itself did.
-    pub fn recording(&self) -> anyhow::Result<FrameSequence> {
+    pub(crate) fn recording(&self) -> anyhow::Result<FrameSequence> {
         let start = &self.tree.beginning(self.tree.branch());
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
         let setting = Setting { scene: self.rollout.env.house.scene().clone(), world: (*start.world).clone() };
@@ -41,7 +41,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When nobody grades the instruction, nothing is left to do, or the expert sees no way.
-    pub fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
+    pub(crate) fn as_task(&self) -> anyhow::Result<(Task, Arc<Scene>)> {
         let name = self.tree.branches().get(self.tree.branch()).map_or("", |branch| branch.name.as_str());
         let id = format!("{}-{name}-{}", self.rollout.env.house.scene().name, self.tree.at());
         let base = self.task_at(self.tree.saved_state(), &id);
@@ -62,7 +62,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When the folder holds something else, or cannot be written to.
-    pub fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
+    pub(crate) fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
         let path = path.unwrap_or_else(|| {
             let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
             default_path::default_path("explored", since, &|path| path.exists())
@@ -78,7 +78,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When nobody grades the instruction, or the file cannot be written.
-    pub fn keep_task(&self, path: &Path) -> anyhow::Result<String> {
+    pub(crate) fn keep_task(&self, path: &Path) -> anyhow::Result<String> {
         let (task, scene) = self.as_task()?;
         let steps = task.expert_steps;
         let (id, many) = session_export::add_task(path, task, &scene)?;
@@ -89,7 +89,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When the ending is unknown, or the file cannot be written.
-    pub fn export(&self, path: &Path) -> anyhow::Result<String> {
+    pub(crate) fn export(&self, path: &Path) -> anyhow::Result<String> {
         let size = export::write(&self.recording()?, self.tree().at(), path)?;
         Ok(format!("wrote {}, {:.1} kB", path.display(), size as f64 / 1000.0))
     }

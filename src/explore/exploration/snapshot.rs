@@ -17,58 +17,56 @@ use crate::house::view::{Candidate, Frame, View};
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// Counts the episodes of this session, from 1.
-    pub episode: u32,
+    pub(crate) episode: u32,
     /// The floor plan.
     pub scene: Arc<Scene>,
     /// The seed of the house, or of the episode's chance.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Everything that can change in the house.
     pub world: World,
     /// What the agent sees.
     pub frame: Arc<Frame>,
     /// Which instances it sees.
-    pub view: View,
+    pub(crate) view: View,
     /// What could be done now, by action and distance.
-    pub candidates: Vec<Candidate>,
+    pub(crate) candidates: Vec<Candidate>,
     /// What the agent is told.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// How many steps were taken.
-    pub step: u32,
+    pub(crate) step: u32,
     /// After how many it ends.
-    pub horizon: Option<u32>,
+    pub(crate) horizon: Option<u32>,
     /// How many the expert takes for the task.
-    pub expert_steps: Option<u32>,
+    pub(crate) expert_steps: Option<u32>,
     /// The task, where one applies.
-    pub progress: Option<TaskProgress>,
+    pub(crate) progress: Option<TaskProgress>,
     /// Why the episode is over, if it is.
-    pub end: Option<End>,
+    pub(crate) end: Option<End>,
     /// Where the agent has been.
-    pub path: Vec<Cell>,
+    pub(crate) path: Vec<Cell>,
     /// Which policy decides.
-    pub policy: PolicyKind,
+    pub(crate) policy: PolicyKind,
     /// The policy's own name; a checkpoint's.
-    pub acts: String,
+    pub(crate) acts: String,
     /// What was tried.
-    pub time: Arc<Timeline>,
+    pub(crate) time: Arc<Timeline>,
     /// The frames before this one that the agent sees too, newest first; only where they are asked for.
-    pub recent: Vec<Arc<Frame>>,
+    pub(crate) recent: Vec<Arc<Frame>>,
     /// What the sentence encoder makes of the instruction.
-    pub reading: Option<Reading>,
+    pub(crate) reading: Option<Reading>,
     /// Instructions that make sense in this house.
-    pub examples: Arc<Vec<String>>,
-    /// The checkpoints that may act.
-    pub checkpoints: Arc<Vec<String>>,
+    pub(crate) examples: Arc<Vec<String>>,
 }
 
 /// How far a task has come.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TaskProgress {
+pub(crate) struct TaskProgress {
     /// What each subtask asks, in words.
-    pub subtasks: Vec<String>,
+    pub(crate) subtasks: Vec<String>,
     /// The step at which each completed subtask was.
-    pub completed_at: Vec<u32>,
+    pub(crate) completed_at: Vec<u32>,
     /// What the current one waits for, in words.
-    pub waits_for: String,
+    pub(crate) waits_for: String,
 }
 
 impl Exploration {
@@ -111,12 +109,11 @@ impl Exploration {
             recent,
             reading: self.acting.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
             examples: self.episode.examples.clone(),
-            checkpoints: self.checkpoints.clone(),
         }
     }
 
     /// How far the task has come, where one applies.
-    pub fn progress(&self) -> Option<TaskProgress> {
+    pub(crate) fn progress(&self) -> Option<TaskProgress> {
         let (grader, house) = (self.rollout.env.grader.as_ref()?, &self.rollout.env.house);
         let steps = (1..=self.tree.at()).zip(self.tree.steps());
         Some(TaskProgress {
@@ -148,7 +145,7 @@ impl Exploration {
     }
 
     /// Whether snapshots hold the frames before the present one.
-    pub fn set_looking_back(&mut self, looks_back: bool) {
+    pub(crate) fn set_looking_back(&mut self, looks_back: bool) {
         self.frames.looks_back = looks_back;
     }
 }

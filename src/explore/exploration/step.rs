@@ -14,23 +14,23 @@ use crate::house::grading::describe;
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepTaken {
     /// Which step, from 1.
-    pub step: u32,
+    pub(crate) step: u32,
     /// What was done.
-    pub action: String,
+    pub(crate) action: String,
     /// What it came to.
-    pub outcome: Outcome,
+    pub(crate) outcome: Outcome,
     /// A person chose it.
-    pub by_hand: bool,
+    pub(crate) by_hand: bool,
     /// The subtask that it completed.
-    pub completed: Option<String>,
+    pub(crate) completed: Option<String>,
     /// The branch that it began, by name and why.
-    pub forked: Option<String>,
+    pub(crate) forked: Option<String>,
     /// What the policy weighed, where it chose.
-    pub distribution: Option<ActionDistribution>,
+    pub(crate) distribution: Option<ActionDistribution>,
     /// How far the task is after it, where one applies.
-    pub progress: Option<TaskProgress>,
+    pub(crate) progress: Option<TaskProgress>,
     /// Why the episode is over after it, if it is.
-    pub end: Option<End>,
+    pub(crate) end: Option<End>,
 }
 
 impl Exploration {
@@ -38,7 +38,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When the policy cannot go on, or none is loaded.
-    pub fn decide(&mut self) -> anyhow::Result<&(Decision, Option<Values>)> {
+    pub(crate) fn decide(&mut self) -> anyhow::Result<&(Decision, Option<Values>)> {
         let decided = match self.acting.decision.take() {
             Some(decided) => decided,
             None => {
@@ -65,7 +65,7 @@ impl Exploration {
     }
 
     /// Takes one step that a person chose. The policy sees that state too, so that it has seen every frame.
-    pub fn act(&mut self, action: Action) -> anyhow::Result<StepTaken> {
+    pub(crate) fn act(&mut self, action: Action) -> anyhow::Result<StepTaken> {
         let _ = self.decide();
         self.carry_out(Decision::of(action), Author::hand())
     }
@@ -132,7 +132,7 @@ impl Exploration {
     }
 
     /// An action with the name of its target.
-    pub fn words(&self, action: Action) -> String {
+    pub(crate) fn words(&self, action: Action) -> String {
         let house = &self.rollout.env.house;
         let class = action.target.and_then(|target| house.world().class_of(house.scene(), target));
         match class {

@@ -14,7 +14,7 @@ use crate::house::House;
 
 impl Exploration {
     /// Goes to a step of the branch in hand, or to its end.
-    pub fn seek(&mut self, step: u32) {
+    pub(crate) fn seek(&mut self, step: u32) {
         self.tree.seek(step);
         self.settle();
     }
@@ -23,7 +23,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When there is none of that number.
-    pub fn switch(&mut self, branch: usize) -> anyhow::Result<()> {
+    pub(crate) fn switch(&mut self, branch: usize) -> anyhow::Result<()> {
         anyhow::ensure!(self.tree.switch(branch), "there is no branch {}", branch + 1);
         self.settle();
         Ok(())
@@ -33,7 +33,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When there is none; says which there are.
-    pub fn branch(&self, wanted: &str) -> anyhow::Result<usize> {
+    pub(crate) fn branch(&self, wanted: &str) -> anyhow::Result<usize> {
         let branches = self.tree.branches();
         let numbered = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         let named = || branches.iter().position(|branch| branch.name == wanted);
@@ -47,18 +47,18 @@ impl Exploration {
     ///
     /// # Errors
     /// When the name is empty or taken.
-    pub fn rename(&mut self, branch: usize, name: &str) -> anyhow::Result<()> {
+    pub(crate) fn rename(&mut self, branch: usize, name: &str) -> anyhow::Result<()> {
         anyhow::ensure!(self.tree.rename(branch, name), "{name:?} is empty, or another branch's name");
         Ok(())
     }
 
     /// Where another branch and the one in hand part, and what they do from there.
-    pub fn divergence(&self, other: usize) -> Divergence {
+    pub(crate) fn divergence(&self, other: usize) -> Divergence {
         Divergence::of(&self.tree, self.tree.branch(), other)
     }
 
     /// The same, with what the agent sees on both: at the step in hand, or where they part if that lies ahead.
-    pub fn parted(&self, other: usize) -> Divergence {
+    pub(crate) fn parted(&self, other: usize) -> Divergence {
         let mut divergence = self.divergence(other);
         let stories = [self.tree.story(self.tree.branch()), self.tree.story(other)];
         let wanted = self.tree.at().max(divergence.shared + 1);
@@ -99,7 +99,7 @@ impl Exploration {
     }
 
     /// Back to the start, with the present instruction. What was tried stays.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         let instruction = self.rollout.instruction.clone();
         self.seek(0);
         let start = EpisodeStart {
@@ -122,7 +122,7 @@ impl Exploration {
     ///
     /// # Errors
     /// When a step does not come to what was recorded.
-    pub fn retrace(&mut self, episode: &Episode, author: &Author, thinks: bool) -> anyhow::Result<Option<u32>> {
+    pub(crate) fn retrace(&mut self, episode: &Episode, author: &Author, thinks: bool) -> anyhow::Result<Option<u32>> {
         // The task is graded whatever the agent is told of it, until that changes on the way.
         self.rollout.instruction.clone_from(&episode.instruction);
         self.rollout.horizon = self.rollout.horizon.map(|horizon| horizon + episode.prefix_steps);

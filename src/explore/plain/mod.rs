@@ -53,7 +53,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// When reading or writing fails.
-pub fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<()> {
+pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<()> {
     let (tell, events) = channel();
     let session = Session::on_request(exploration, Arc::new(move |event| drop(tell.send(event))));
     let mut plain = Plain {

@@ -9,7 +9,7 @@ use crate::explore::exploration::StepTaken;
 impl Session {
     /// The time between two steps of the run that is under way; `None` where none is. A counted number of steps is taken as
     /// fast as can be.
-    pub fn interval(&self) -> Option<Duration> {
+    pub(crate) fn interval(&self) -> Option<Duration> {
         self.run.mode.map(|mode| match mode {
             RunMode::Steps(_) => Duration::ZERO,
             RunMode::Replay | RunMode::Policy => self.run.rate.between_steps(),
@@ -17,7 +17,7 @@ impl Session {
     }
 
     /// Takes the next step of the run that is under way.
-    pub fn advance(&mut self) {
+    pub(crate) fn advance(&mut self) {
         match self.run.mode {
             None => {}
             Some(RunMode::Policy) => self.step(),

@@ -9,7 +9,7 @@ use crate::explore::timeline::{BranchPosition, Timeline};
 impl Session {
     /// Carries out a command. What comes of it is told as events: most before this returns, runs as [`Session::advance`] is
     /// called, chains and value maps from their own thread.
-    pub fn apply(&mut self, command: SessionCommand) {
+    pub(crate) fn apply(&mut self, command: SessionCommand) {
         match command {
             SessionCommand::Run { mode, until } => self.start(mode, until),
             SessionCommand::Pause => self.set_mode(None),

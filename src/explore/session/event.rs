@@ -14,7 +14,7 @@ use crate::explore::exploration::{Snapshot, StepTaken};
 use crate::explore::timeline::{BranchPosition, Divergence};
 
 /// Takes in what a session tells, from its own thread and from those that compute in the background.
-pub type EventSink = Arc<dyn Fn(SessionEvent) + Send + Sync>;
+pub(crate) type EventSink = Arc<dyn Fn(SessionEvent) + Send + Sync>;
 
 /// What a session tells whoever drives it.
 #[derive(Clone, Debug)]

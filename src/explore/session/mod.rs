@@ -11,7 +11,7 @@ mod run;
 mod step_rate;
 
 pub use command::{RunMode, SessionCommand};
-pub use event::{EventSink, SessionEvent};
+pub(crate) use event::{EventSink, SessionEvent};
 pub use step_rate::StepRate;
 
 use super::exploration::Exploration;
@@ -33,18 +33,18 @@ pub struct Session {
 
 impl Session {
     /// A session that tells every new state unasked, and what the policy would do in it.
-    pub fn live(exploration: Exploration, events: EventSink) -> Session {
+    pub(crate) fn live(exploration: Exploration, events: EventSink) -> Session {
         Session { live: true, ..Session::on_request(exploration, events) }
     }
 
     /// A session that shows and decides where it is asked to.
-    pub fn on_request(exploration: Exploration, events: EventSink) -> Session {
+    pub(crate) fn on_request(exploration: Exploration, events: EventSink) -> Session {
         let (run, jobs) = (Run::default(), Jobs::new(events.clone()));
         Session { exploration, live: false, run, jobs, compared: None, events }
     }
 
     /// Loads the policy where that was not done; a live session shows the house before.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         if self.live {
             self.show();
         }
@@ -57,7 +57,7 @@ impl Session {
     }
 
     /// Whether something is computed in the background.
-    pub fn is_working(&self) -> bool {
+    pub(crate) fn is_working(&self) -> bool {
         self.jobs.background.is_working()
     }
 

@@ -32,12 +32,12 @@ impl StepRate {
     }
 
     /// The next slower one.
-    pub fn slower(self) -> StepRate {
+    pub(crate) fn slower(self) -> StepRate {
         StepRate(self.0.saturating_sub(1))
     }
 
     /// As the header shows it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         Self::LEVELS[self.0].1
     }
 

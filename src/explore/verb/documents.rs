@@ -2,12 +2,16 @@
 
 use std::fmt::Write;
 
+#[cfg(test)]
 use super::ExplorerPage;
+#[cfg(test)]
 use super::entry::{DefaultKey, KeyArguments, KeyScope};
-use super::table::{VERBS, typed};
+#[cfg(test)]
+use super::table::VERBS;
+use super::table::typed;
 
 /// The verbs that can be typed as a section of a manual page.
-pub fn man_section() -> String {
+pub(crate) fn man_section() -> String {
     let mut section =
         ".SH EXPLORER VERBS\nTyped after : in the explorer, or a line each with \\-\\-plain.\n".to_string();
     for entry in typed() {
@@ -29,7 +33,8 @@ fn roff(text: &str) -> String {
 }
 
 /// All verbs and keys as a table in Markdown.
-pub fn markdown_table() -> String {
+#[cfg(test)]
+pub(crate) fn markdown_table() -> String {
     let mut table = "| Verb | Keys | What it does |\n|---|---|---|\n".to_string();
     for entry in VERBS {
         let name = match (entry.is_typed, entry.arguments) {
@@ -44,6 +49,7 @@ pub fn markdown_table() -> String {
 }
 
 /// Keys, with where they mean it and what they stand for.
+#[cfg(test)]
 fn keys(key: &DefaultKey) -> String {
     let names: Vec<String> = key.keys.iter().map(|name| format!("`{name}`")).collect();
     let notes: Vec<&str> = [scope(key.scope), arguments(key)].into_iter().flatten().collect();
@@ -51,6 +57,7 @@ fn keys(key: &DefaultKey) -> String {
     format!("{}{notes}", names.join(" "))
 }
 
+#[cfg(test)]
 fn arguments(key: &DefaultKey) -> Option<&'static str> {
     match key.arguments {
         KeyArguments::These("") | KeyArguments::Typed => None,
@@ -59,6 +66,7 @@ fn arguments(key: &DefaultKey) -> Option<&'static str> {
     }
 }
 
+#[cfg(test)]
 fn scope(scope: KeyScope) -> Option<&'static str> {
     match scope {
         KeyScope::Common => None,

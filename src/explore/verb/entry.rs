@@ -4,39 +4,39 @@ use super::line::VerbLine;
 use super::{ExplorerPage, Verb};
 
 /// A verb: how it is typed, what it does, and which keys do it.
-pub struct VerbEntry {
+pub(crate) struct VerbEntry {
     /// Its first word.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// Other first words that mean the same.
-    pub aliases: &'static [&'static str],
+    pub(crate) aliases: &'static [&'static str],
     /// What may follow.
-    pub arguments: &'static str,
+    pub(crate) arguments: &'static str,
     /// One line on what it does.
-    pub help: &'static str,
+    pub(crate) help: &'static str,
     /// It can be typed; other verbs have keys alone.
-    pub is_typed: bool,
+    pub(crate) is_typed: bool,
     /// The keys that do it, unless a person has set others.
-    pub keys: &'static [DefaultKey],
+    pub(crate) keys: &'static [DefaultKey],
     pub(super) read: Read,
 }
 
 /// Keys that do the same.
-pub struct DefaultKey {
+pub(crate) struct DefaultKey {
     /// Where they do.
-    pub scope: KeyScope,
+    pub(crate) scope: KeyScope,
     /// Any of these, by the names that a person's own settings use.
-    pub keys: &'static [&'static str],
+    pub(crate) keys: &'static [&'static str],
     /// How the help names them; empty where the key before speaks for them too.
-    pub label: &'static str,
+    pub(crate) label: &'static str,
     /// One line for the help.
-    pub help: &'static str,
+    pub(crate) help: &'static str,
     /// What follows the verb.
-    pub arguments: KeyArguments,
+    pub(crate) arguments: KeyArguments,
 }
 
 /// What follows the verb of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum KeyArguments {
+pub(crate) enum KeyArguments {
     /// Always the same.
     These(&'static str),
     /// What the person types then, on the line that opens.
@@ -45,7 +45,7 @@ pub enum KeyArguments {
 
 /// Where a key means something. The more special comes before the more common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum KeyScope {
+pub(crate) enum KeyScope {
     /// On that page, while a policy acts.
     ExplorerPage(ExplorerPage),
     /// On every page with a list: any but the main one.
@@ -109,7 +109,7 @@ impl DefaultKey {
     ///
     /// # Errors
     /// When their arguments are none that the verb takes.
-    pub fn verb(&self, entry: &VerbEntry) -> Result<Verb, String> {
+    pub(crate) fn verb(&self, entry: &VerbEntry) -> Result<Verb, String> {
         match self.arguments {
             KeyArguments::These(rest) => (entry.read)(&VerbLine { verb: entry.name, rest }),
             KeyArguments::Typed => Ok(Verb::Palette(format!("{} ", entry.name))),

@@ -7,7 +7,7 @@ use super::entry::VerbEntry;
 use super::table::typed;
 
 /// The typed verbs that fit what was typed so far, the best first: by their names, then by what they do.
-pub fn matching(line: &str) -> Vec<&'static VerbEntry> {
+pub(crate) fn matching(line: &str) -> Vec<&'static VerbEntry> {
     let word = line.split_whitespace().next().unwrap_or("");
     let atom = Atom::new(word, CaseMatching::Ignore, Normalization::Never, AtomKind::Fuzzy, false);
     let mut matcher = Matcher::new(Config::DEFAULT);

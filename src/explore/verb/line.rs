@@ -5,7 +5,7 @@ use crate::analysis::chain::Draws;
 use crate::explore::breakpoints::Condition;
 
 /// Draws of a link where nobody says how many.
-pub const DRAWS: u32 = 8;
+pub(crate) const DRAWS: u32 = 8;
 
 /// A verb and what follows it.
 pub(super) struct VerbLine<'a> {

@@ -1,16 +1,16 @@
 //! Everything a person can do in the explorer. [`table::VERBS`] is the one list of it.
 
 mod documents;
-pub mod entry;
+pub(crate) mod entry;
 mod fuzzy_match;
 mod line;
 mod parse;
-pub mod table;
+pub(crate) mod table;
 
-pub use documents::{man_section, markdown_table};
-pub use fuzzy_match::matching;
-pub use line::DRAWS;
-pub use parse::parse;
+pub(crate) use documents::man_section;
+pub(crate) use fuzzy_match::matching;
+pub(crate) use line::DRAWS;
+pub(crate) use parse::parse;
 
 use super::breakpoints::Condition;
 use super::session::SessionCommand;
@@ -18,7 +18,7 @@ use crate::domain::Heading;
 
 /// One thing that a person can do.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Verb {
+pub(crate) enum Verb {
     /// What the session does as it is asked.
     Ask(SessionCommand),
     /// Go on: replay the recording, or at its end let the policy act; or pause.
@@ -105,7 +105,7 @@ pub enum Verb {
 
 /// A page in place of the panels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ExplorerPage {
+pub(crate) enum ExplorerPage {
     /// The frame, interactions, distribution, task, log and map at once.
     Main,
     /// Everything that was tried, as a tree of branches.

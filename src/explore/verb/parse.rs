@@ -8,7 +8,7 @@ use super::table::typed;
 ///
 /// # Errors
 /// Says what is wrong with it.
-pub fn parse(line: &str) -> Result<Verb, String> {
+pub(crate) fn parse(line: &str) -> Result<Verb, String> {
     let line = line.trim();
     let (verb, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(verb, rest)| (verb, rest.trim()));
     let entry = typed().find(|entry| entry.name == verb || entry.aliases.contains(&verb));

@@ -10,7 +10,7 @@ use KeyScope::{Common, Help, Lists, Manual, Typing, Watch};
 
 /// Every verb, in the order in which palette and help list them.
 #[rustfmt::skip]
-pub const VERBS: &[VerbEntry] = &[
+pub(crate) const VERBS: &[VerbEntry] = &[
     verb("run", "", "go on (replay, then the policy), or pause", |_| Ok(Verb::ToggleRun))
         .on(&[key(Common, "space", &["space"], "go on, or pause", "")]),
     verb("continue", "", "let the policy act from here", |_| Ok(Verb::Continue)).or(&["c"])
@@ -189,7 +189,7 @@ pub const VERBS: &[VerbEntry] = &[
 ];
 
 /// The verbs that can be typed.
-pub fn typed() -> impl Iterator<Item = &'static VerbEntry> {
+pub(crate) fn typed() -> impl Iterator<Item = &'static VerbEntry> {
     VERBS.iter().filter(|entry| entry.is_typed)
 }
 

@@ -2,25 +2,12 @@
 
 use super::Expert;
 use super::no_way::NoWay;
-use crate::domain::Action;
 use crate::house::grading::Grader;
-use crate::house::outcome::Outcome;
 use crate::house::session::House;
-
-/// A step of the expert's: what it did, what that came to, and the subtask that it completed, by number.
-#[derive(Clone, Copy, Debug)]
-pub struct ExpertStep {
-    /// What it did.
-    pub action: Action,
-    /// What that came to.
-    pub outcome: Outcome,
-    /// The subtask that was completed by it, from 0.
-    pub completed: Option<usize>,
-}
 
 /// Why the expert did not finish.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unfinished {
+pub(crate) enum Unfinished {
     /// It knows no way.
     #[error(transparent)]
     NoWay(#[from] NoWay),
@@ -38,11 +25,11 @@ pub enum Unfinished {
 ///
 /// # Errors
 /// When it sees no way, or has not finished in time.
-pub fn demonstrate(
+pub(crate) fn demonstrate(
     house: &mut House,
     grader: &mut Grader,
     limit: usize,
-    visit: &mut dyn FnMut(&House, ExpertStep),
+    visit: &mut dyn FnMut(&House),
 ) -> Result<(), Unfinished> {
     let mut expert = Expert::new();
     let mut steps = 0;
@@ -54,9 +41,8 @@ pub fn demonstrate(
         let action = expert.next(house, grader)?;
         let outcome = house.step(action);
         steps += 1;
-        let current = grader.completed();
-        let completed = grader.observe(house.scene(), house.world(), action, outcome).then_some(current);
-        visit(house, ExpertStep { action, outcome, completed });
+        grader.observe(house.scene(), house.world(), action, outcome);
+        visit(house);
     }
     Ok(())
 }

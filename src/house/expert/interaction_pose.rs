@@ -27,15 +27,15 @@ const RIVAL: f32 = 4.0;
 
 /// A pose from which an aim may be carried out.
 #[derive(Clone, Copy, Debug)]
-pub struct InteractionPose {
+pub(crate) struct InteractionPose {
     /// Position of the aim among those asked for.
-    pub aim: usize,
+    pub(crate) aim: usize,
     /// The number of the pose's cell.
-    pub cell: usize,
+    pub(crate) cell: usize,
     /// Where to stand and look.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// Steps to it, plus what speaks against it in steps.
-    pub score: f32,
+    pub(crate) score: f32,
 }
 
 /// From which cells an aim's target was found to be hidden: it then is, whichever way one looks.
@@ -54,7 +54,7 @@ enum Visibility {
 }
 
 /// Draws what would be seen from poses, and remembers it while nothing but the agent moves.
-pub struct PoseSearch {
+pub(crate) struct PoseSearch {
     renderer: Renderer,
     world: World,
     views: HashMap<Pose, View>,
@@ -68,12 +68,12 @@ impl Default for PoseSearch {
 
 impl PoseSearch {
     /// A search that has drawn nothing.
-    pub fn new() -> PoseSearch {
+    pub(crate) fn new() -> PoseSearch {
         PoseSearch { renderer: Renderer::new(House::FRAME), world: World::default(), views: HashMap::new() }
     }
 
     /// Searches in `world`; views of another one are dropped. Where the agent stands does not matter.
-    pub fn set_world(&mut self, world: &World, same_scene: bool) {
+    pub(crate) fn set_world(&mut self, world: &World, same_scene: bool) {
         let known = &self.world;
         let same = known.objects == world.objects && known.fixtures == world.fixtures && known.held == world.held;
         if !(same && same_scene) {
@@ -110,7 +110,7 @@ impl PoseSearch {
     }
 
     /// The best pose for any of the aims, no further than `limit` steps away if one is given.
-    pub fn find(
+    pub(crate) fn find(
         &mut self,
         scene: &Scene,
         floor: &WalkableCells,

@@ -1,10 +1,10 @@
 //! The expert: shortest paths and interactions for any task in any scene, from any state.
 
-pub mod demonstrate;
-pub mod interaction_pose;
-pub mod no_way;
-pub mod paths;
-pub mod plan;
+pub(crate) mod demonstrate;
+pub(crate) mod interaction_pose;
+pub(crate) mod no_way;
+pub(crate) mod paths;
+pub(crate) mod plan;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::rules;
 use super::session::House;
 use super::view;
 use crate::domain::{Action, ActionType, Pose, Scene, World};
-pub use demonstrate::{ExpertStep, Unfinished, demonstrate};
+pub(crate) use demonstrate::demonstrate;
 use interaction_pose::{InteractionPose, PoseSearch, WELL_SEEN};
 use no_way::NoWay;
 use paths::{Paths, Turning, WalkableCells};
@@ -66,23 +66,23 @@ impl Expert {
     }
 
     /// An expert without a plan.
-    pub fn of(timing: TurnTiming) -> Expert {
+    pub(crate) fn of(timing: TurnTiming) -> Expert {
         Expert { timing, poses: PoseSearch::new(), scene: None, plan: VecDeque::new(), expected: None, last: None }
     }
 
     /// Drops the plan: a new episode starts.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.plan.clear();
         self.expected = None;
     }
 
     /// Its plan, to be restored later.
-    pub fn state(&self) -> ExpertState {
+    pub(crate) fn state(&self) -> ExpertState {
         ExpertState { steps: self.plan.clone(), expected: self.expected.clone(), last: self.last }
     }
 
     /// Continues with a plan that it had at another time in this scene.
-    pub fn restore(&mut self, state: ExpertState) {
+    pub(crate) fn restore(&mut self, state: ExpertState) {
         ExpertState { steps: self.plan, expected: self.expected, last: self.last } = state;
     }
 
@@ -116,7 +116,7 @@ impl Expert {
     }
 
     /// The interaction that the last choice was, or leads to.
-    pub fn aim(&self) -> Option<Action> {
+    pub(crate) fn aim(&self) -> Option<Action> {
         self.plan.back().copied().or(self.last)
     }
 

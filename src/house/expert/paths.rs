@@ -8,7 +8,7 @@ const NONE: u32 = u32::MAX;
 
 /// A scene's cells with their neighbours.
 #[derive(Clone, Debug)]
-pub struct WalkableCells {
+pub(crate) struct WalkableCells {
     cells: Vec<Cell>,
     /// For each cell and heading, the number of the cell ahead.
     ahead: Vec<[u32; 4]>,
@@ -16,21 +16,21 @@ pub struct WalkableCells {
 
 impl WalkableCells {
     /// The floor of a scene.
-    pub fn of(scene: &Scene) -> WalkableCells {
+    pub(crate) fn of(scene: &Scene) -> WalkableCells {
         let number = |cell: Cell| scene.cells.binary_search(&cell).map_or(NONE, |index| index as u32);
         let ahead = scene.cells.iter().map(|cell| Heading::ALL.map(|heading| number(cell.ahead(heading)))).collect();
         WalkableCells { cells: scene.cells.clone(), ahead }
     }
 
     /// The cells, sorted.
-    pub fn cells(&self) -> &[Cell] {
+    pub(crate) fn cells(&self) -> &[Cell] {
         &self.cells
     }
 }
 
 /// Which of several equally short ways is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turning {
+pub(crate) enum Turning {
     /// The one that walks ahead for longest before it turns.
     Late,
     /// The one that turns soonest.
@@ -39,7 +39,7 @@ pub enum Turning {
 
 /// The shortest ways from one pose to every other.
 #[derive(Clone, Debug)]
-pub struct Paths {
+pub(crate) struct Paths {
     start: Pose,
     /// Steps to each state; a state is four times the cell's number plus the heading's quarters.
     steps: Vec<u32>,
@@ -50,7 +50,7 @@ pub struct Paths {
 impl Paths {
     /// A shortest way from `start` to every state; none when it is not on the floor. What is explored first comes first on
     /// the way.
-    pub fn from(floor: &WalkableCells, start: Pose, turning: Turning) -> Paths {
+    pub(crate) fn from(floor: &WalkableCells, start: Pose, turning: Turning) -> Paths {
         let states = 4 * floor.cells.len();
         let mut paths = Paths { start, steps: vec![NONE; states], from: vec![(NONE, ActionType::MoveAhead); states] };
         let Ok(cell) = floor.cells.binary_search(&start.cell) else { return paths };
@@ -81,17 +81,17 @@ impl Paths {
     }
 
     /// Where they all begin.
-    pub fn start(&self) -> Pose {
+    pub(crate) fn start(&self) -> Pose {
         self.start
     }
 
     /// Moves and turns to the cell of that number, facing so; `None` when there is no way.
-    pub fn steps(&self, cell: usize, heading: Heading) -> Option<u32> {
+    pub(crate) fn steps(&self, cell: usize, heading: Heading) -> Option<u32> {
         self.steps.get(4 * cell + heading.quarters() as usize).copied().filter(|&steps| steps != NONE)
     }
 
     /// The actions to a pose at the cell of that number: moves and turns, then looks.
-    pub fn to(&self, cell: usize, pose: Pose) -> Vec<ActionType> {
+    pub(crate) fn to(&self, cell: usize, pose: Pose) -> Vec<ActionType> {
         let mut actions = Vec::new();
         let mut state = 4 * cell + pose.heading.quarters() as usize;
         while let Some(&(before, kind)) = self.from.get(state).filter(|(before, _)| *before != NONE) {

@@ -14,15 +14,15 @@ use crate::domain::{Action, ActionType, Scene, World};
 
 /// An interaction that would bring a subtask forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Aim {
+pub(crate) struct Aim {
     /// The interaction.
-    pub kind: ActionType,
+    pub(crate) kind: ActionType,
     /// What it acts on.
-    pub target: Instance,
+    pub(crate) target: Instance,
     /// What comes next, and should be in view already.
-    pub then: Option<Instance>,
+    pub(crate) then: Option<Instance>,
     /// About how many interactions follow.
-    pub toll: u32,
+    pub(crate) toll: u32,
 }
 
 impl Aim {
@@ -33,18 +33,18 @@ impl Aim {
 
 /// What the expert means to do now.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Intent {
+pub(crate) struct Intent {
     /// Any one of these will do. Empty: the subtask is met by any step.
-    pub aims: Vec<Aim>,
+    pub(crate) aims: Vec<Aim>,
     /// What must not be closed or switched off meanwhile.
-    pub keep: Vec<Instance>,
+    pub(crate) keep: Vec<Instance>,
 }
 
 /// What brings the grader's current subtask forward.
 ///
 /// # Errors
 /// When nothing does.
-pub fn intent(scene: &Scene, world: &World, grader: &Grader) -> Result<Intent, NoWay> {
+pub(crate) fn intent(scene: &Scene, world: &World, grader: &Grader) -> Result<Intent, NoWay> {
     let subtask = grader.subtask().ok_or(NoWay::Finished)?;
     if grader.is_cut_short() {
         return Err(NoWay::CutShort);
@@ -55,7 +55,7 @@ pub fn intent(scene: &Scene, world: &World, grader: &Grader) -> Result<Intent, N
 }
 
 /// The doors that stand open and the taps and ovens that run for nothing: what a tidy expert shuts where it stands.
-pub fn left_open(scene: &Scene, world: &World, intent: &Intent) -> Vec<Aim> {
+pub(crate) fn left_open(scene: &Scene, world: &World, intent: &Intent) -> Vec<Aim> {
     let fixtures = (0..scene.fixtures.len() as u16).map(Instance::Fixture);
     let left = fixtures.filter(|fixture| !intent.keep.contains(fixture));
     left.filter_map(|fixture| {

@@ -5,18 +5,18 @@ use crate::domain::scene::{Fixture, Surface};
 use crate::domain::{Class, Heading, Point};
 
 /// Room between the edge of a surface and the pivots of what stands on it, in millimetres.
-pub const INSET: i32 = 70;
+pub(crate) const INSET: i32 = 70;
 
 /// The fixtures of a scene under construction.
 #[derive(Debug, Default)]
-pub struct Builder {
+pub(crate) struct Builder {
     /// In the order in which they were added.
-    pub fixtures: Vec<Fixture>,
+    pub(crate) fixtures: Vec<Fixture>,
 }
 
 impl Builder {
     /// Adds a fixture and returns its number. An unknown class name adds nothing that anyone could use: a test forbids it.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         class: &str,
         pivot: Point,
@@ -33,17 +33,17 @@ impl Builder {
 }
 
 /// A surface of one rectangle at a world height.
-pub fn surface(height: i32, area: Rect) -> Surface {
+pub(crate) fn surface(height: i32, area: Rect) -> Surface {
     Surface { height, areas: vec![area] }
 }
 
 /// The part of a box's top on which pivots may be.
-pub fn top(body: &Cuboid) -> Surface {
+pub(crate) fn top(body: &Cuboid) -> Surface {
     surface(body.max.y, inset(body.footprint(), INSET))
 }
 
 /// A rectangle with every edge moved in, but never past its middle.
-pub fn inset(rect: Rect, by: i32) -> Rect {
+pub(crate) fn inset(rect: Rect, by: i32) -> Rect {
     let mut inner = rect;
     for axis in 0..2 {
         let by = by.min((rect.max[axis] - rect.min[axis]) / 2);

@@ -11,11 +11,11 @@ use crate::domain::{Class, Scene, World};
 
 /// Roles and subtasks under construction.
 #[derive(Clone, Debug, Default)]
-pub struct SkillChain {
+pub(crate) struct SkillChain {
     /// The parts.
-    pub roles: Vec<Role>,
+    pub(crate) roles: Vec<Role>,
     /// The steps; `closes` is not known yet.
-    pub subtasks: Vec<Subtask>,
+    pub(crate) subtasks: Vec<Subtask>,
 }
 
 /// ALFRED's task types, with the lamp alone and slicing alone.
@@ -41,7 +41,7 @@ const KINDS: [TaskKind; 8] = [
 ];
 
 /// What there is to make chains of.
-pub struct Stock<'a> {
+pub(crate) struct Stock<'a> {
     scene: &'a Scene,
     world: &'a World,
     /// Movable classes that an action may name, each once.
@@ -52,7 +52,7 @@ pub struct Stock<'a> {
 
 impl<'a> Stock<'a> {
     /// What a house holds.
-    pub fn of(scene: &'a Scene, world: &'a World) -> Stock<'a> {
+    pub(crate) fn of(scene: &'a Scene, world: &'a World) -> Stock<'a> {
         let unique = |mut classes: Vec<Class>| {
             classes.sort_unstable();
             classes.dedup();
@@ -98,7 +98,7 @@ impl<'a> Stock<'a> {
     }
 
     /// An instance of a class that may be in the hand at the start; never one that lies in or holds something.
-    pub fn take(&self, class: Class, rng: &mut ChaCha8Rng) -> Option<u16> {
+    pub(crate) fn take(&self, class: Class, rng: &mut ChaCha8Rng) -> Option<u16> {
         let fitting: Vec<u16> = (0u16..)
             .zip(&self.world.objects)
             .filter(|(index, object)| {
@@ -138,7 +138,7 @@ impl SkillChain {
     }
 
     /// A chain of exactly `length` skills, if this draw gives one. With `in_hand`, the first pickup is done already.
-    pub fn draw(stock: &Stock<'_>, length: usize, in_hand: bool, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
+    pub(crate) fn draw(stock: &Stock<'_>, length: usize, in_hand: bool, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
         let mut chain = SkillChain::default();
         let wanted = length + usize::from(in_hand);
         while chain.subtasks.len() < wanted {
@@ -162,7 +162,7 @@ impl SkillChain {
     }
 
     /// A chain of one skill; whatever it needs in the hand is there at the start.
-    pub fn single(stock: &Stock<'_>, skill: SkillKind, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
+    pub(crate) fn single(stock: &Stock<'_>, skill: SkillKind, rng: &mut ChaCha8Rng) -> Option<SkillChain> {
         let lit_alone = rng.random_bool(0.5);
         let mut chain = match skill {
             SkillKind::Pickup | SkillKind::Put => SkillChain::default().with(stock, TaskKind::Place, false, rng)?,

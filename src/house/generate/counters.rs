@@ -50,7 +50,7 @@ struct CounterDimensions {
 }
 
 /// Builds a kitchen's counters, fridge, sink, stove, microwave and coffee machine; `false` when no wall is long enough.
-pub fn kitchen(floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+pub(crate) fn kitchen(floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     let count = floor.walls.len();
     let mut order: Vec<usize> = (0..count).collect();
     order.shuffle(rng);
@@ -243,7 +243,7 @@ fn below(
 }
 
 /// A drawer in the front of a carcass of that depth.
-pub fn drawer(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], depth: i32) {
+pub(crate) fn drawer(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], depth: i32) {
     let body = site.cuboid(u, y, [depth - 320, depth]);
     // Its contents lie in the part that comes out of the carcass when it opens.
     let ground = surface(site.floor + y[0] + 20, site.rect([u[0] + 60, u[1] - 60], [depth - 120, depth - 60]));
@@ -252,7 +252,7 @@ pub fn drawer(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], depth: i3
 }
 
 /// A cabinet with a door in front.
-pub fn cabinet(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], v: [i32; 2]) {
+pub(crate) fn cabinet(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], v: [i32; 2]) {
     let body = site.cuboid(u, y, v);
     let (back, front) = (v[0] + 80.max((v[1] - v[0]) / 3), v[1] - 90);
     let ground = surface(site.floor + y[0] + 20, site.rect([u[0] + 80, u[1] - 80], [back.min(front), front]));
@@ -293,7 +293,7 @@ fn appliance(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, unit: Unit, wi
 }
 
 /// A bathroom's vanity: a counter with one or two basins.
-pub fn vanity(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32, depth: i32, height: i32) {
+pub(crate) fn vanity(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32, depth: i32, height: i32) {
     let mut units = Vec::new();
     let mut left = width;
     let basins = if width >= 1600 { 2 } else { 1 };

@@ -35,7 +35,7 @@ struct Space {
 }
 
 /// Makes the room's objects; adds their shapes to the scene.
-pub fn fill(plan: &RoomPlan, floor: &RoomFloor, scene: &mut Scene, rng: &mut ChaCha8Rng) -> Vec<Object> {
+pub(crate) fn fill(plan: &RoomPlan, floor: &RoomFloor, scene: &mut Scene, rng: &mut ChaCha8Rng) -> Vec<Object> {
     let mut wanted: Vec<Class> = Vec::new();
     for (&class, &[chance, mean]) in &plan.objects {
         if rng.random_bool(chance) {
@@ -96,7 +96,7 @@ fn stays_on_floor(class: Class) -> bool {
 }
 
 /// Things that only hang.
-pub fn hangs(class: Class) -> bool {
+pub(crate) fn hangs(class: Class) -> bool {
     rooms().shapes.get(&class).is_some_and(|form| form.hangs)
 }
 

@@ -13,23 +13,23 @@ const CLEARANCE: i32 = 220;
 /// How far in front of a piece somebody stands to use it, in millimetres.
 const USE: i32 = 520;
 /// World height of the floor in millimetres: 900 below an agent at 901.
-pub const FLOOR: i32 = 1;
+pub(crate) const FLOOR: i32 = 1;
 const CEILING: i32 = 2600;
 
 /// A straight piece of wall.
 #[derive(Clone, Copy, Debug)]
-pub struct Wall {
+pub(crate) struct Wall {
     /// Its frame; u runs along the wall.
-    pub site: Site,
+    pub(crate) site: Site,
     /// How long it is.
-    pub length: i32,
+    pub(crate) length: i32,
 }
 
 /// The floor of a room.
 #[derive(Clone, Debug)]
-pub struct RoomFloor {
+pub(crate) struct RoomFloor {
     /// The walls, anticlockwise.
-    pub walls: Vec<Wall>,
+    pub(crate) walls: Vec<Wall>,
     bounds: Rect,
     notch: Option<Rect>,
     solids: Vec<Rect>,
@@ -38,18 +38,18 @@ pub struct RoomFloor {
 }
 
 /// A number from a range, in steps of `step` from its start.
-pub fn pick(rng: &mut ChaCha8Rng, range: Range, step: i32) -> i32 {
+pub(crate) fn pick(rng: &mut ChaCha8Rng, range: Range, step: i32) -> i32 {
     range[0] + step * rng.random_range(0..=((range[1] - range[0]) / step).max(0))
 }
 
 /// Whether two rectangles share more than an edge.
-pub fn overlap(a: &Rect, b: &Rect) -> bool {
+pub(crate) fn overlap(a: &Rect, b: &Rect) -> bool {
     (0..2).all(|axis| a.min[axis] < b.max[axis] && b.min[axis] < a.max[axis])
 }
 
 impl RoomFloor {
     /// An empty room: a rectangle, or an L.
-    pub fn new(plan: &RoomPlan, rng: &mut ChaCha8Rng) -> RoomFloor {
+    pub(crate) fn new(plan: &RoomPlan, rng: &mut ChaCha8Rng) -> RoomFloor {
         let (mut width, mut depth) = (pick(rng, plan.width, Cell::SIDE), pick(rng, plan.depth, Cell::SIDE));
         if rng.random_bool(0.5) {
             std::mem::swap(&mut width, &mut depth);
@@ -73,12 +73,12 @@ impl RoomFloor {
     }
 
     /// The cells where somebody can stand, sorted; all connected.
-    pub fn cells(&self) -> &[Cell] {
+    pub(crate) fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
     /// The bodies of the walls.
-    pub fn wall_bodies(&self) -> Vec<Cuboid> {
+    pub(crate) fn wall_bodies(&self) -> Vec<Cuboid> {
         let count = self.walls.len();
         let body = |(index, wall): (usize, &Wall)| {
             // Round the corners of the room; a corner that points into it needs nothing.
@@ -92,12 +92,12 @@ impl RoomFloor {
     }
 
     /// The outline of the room without its notch.
-    pub fn bounds(&self) -> Rect {
+    pub(crate) fn bounds(&self) -> Rect {
         self.bounds
     }
 
     /// Whether a rectangle is inside the room and clear of what stands there.
-    pub fn is_free(&self, rect: &Rect) -> bool {
+    pub(crate) fn is_free(&self, rect: &Rect) -> bool {
         let inside =
             (0..2).all(|axis| rect.min[axis] >= self.bounds.min[axis] && rect.max[axis] <= self.bounds.max[axis]);
         inside
@@ -106,12 +106,12 @@ impl RoomFloor {
     }
 
     /// Whether a rectangle covers a place that somebody stands on to use a piece.
-    pub fn is_apron(&self, rect: &Rect) -> bool {
+    pub(crate) fn is_apron(&self, rect: &Rect) -> bool {
         self.aprons.iter().any(|apron| overlap(rect, apron))
     }
 
     /// Keeps a strip of floor free for people, if it is free and somebody can stand on it.
-    pub fn reserve(&mut self, front: Rect) -> bool {
+    pub(crate) fn reserve(&mut self, front: Rect) -> bool {
         let usable = !self.solids.iter().any(|solid| overlap(&front, solid)) && stands(&self.cells, &front);
         if usable {
             self.aprons.push(front);
@@ -121,7 +121,7 @@ impl RoomFloor {
 
     /// Builds on the floor if there is room: `footprint` is free and in front of no other piece, every piece can still be
     /// stood before, and the cells stay connected. `front` is where people stand: the strip before these edges.
-    pub fn build(&mut self, footprint: &Rect, fronts: &[Rect]) -> bool {
+    pub(crate) fn build(&mut self, footprint: &Rect, fronts: &[Rect]) -> bool {
         if !self.is_free(footprint) || self.is_apron(footprint) {
             return false;
         }
@@ -178,12 +178,12 @@ fn stands(cells: &[Cell], front: &Rect) -> bool {
 }
 
 /// The strip of floor before a piece of that width and depth.
-pub fn before(site: &Site, width: i32, depth: i32) -> Rect {
+pub(crate) fn before(site: &Site, width: i32, depth: i32) -> Rect {
     site.rect([0, width], [depth, depth + USE])
 }
 
 /// The cells of a sorted list that can be walked to from `start`, sorted.
-pub fn flood(cells: &[Cell], start: Cell) -> Vec<Cell> {
+pub(crate) fn flood(cells: &[Cell], start: Cell) -> Vec<Cell> {
     let mut seen = vec![false; cells.len()];
     let mut found = Vec::new();
     let mut queue = vec![start];

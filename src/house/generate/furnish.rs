@@ -16,7 +16,7 @@ use crate::domain::{Cell, Heading, Point};
 const TRIES: usize = 24;
 
 /// Puts the room's furniture on the floor; `false` when a piece that every such room has found no place.
-pub fn furnish(plan: &RoomPlan, floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
+pub(crate) fn furnish(plan: &RoomPlan, floor: &mut RoomFloor, out: &mut Builder, rng: &mut ChaCha8Rng) -> bool {
     for piece in &plan.pieces {
         if !rng.random_bool(piece.chance) {
             continue;

@@ -10,21 +10,21 @@ use crate::domain::scene::Surface;
 
 /// How large a piece is, in millimetres, and what its front and top have.
 #[derive(Clone, Copy, Debug)]
-pub struct PieceDimensions {
+pub(crate) struct PieceDimensions {
     /// Along the wall.
-    pub width: i32,
+    pub(crate) width: i32,
     /// Out of the wall.
-    pub depth: i32,
+    pub(crate) depth: i32,
     /// Of its top, or of its seat.
-    pub height: i32,
+    pub(crate) height: i32,
     /// How many drawers its front has.
-    pub drawers: i32,
+    pub(crate) drawers: i32,
     /// A desk lamp stands on it.
-    pub lamp: bool,
+    pub(crate) lamp: bool,
 }
 
 /// Builds a piece that stands on the floor.
-pub fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
+pub(crate) fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
     match kind {
         "Vanity" => vanity(out, rng, site, build.width, build.depth, build.height),
         "Bed" => bed(out, site, build),
@@ -173,7 +173,7 @@ fn cart(out: &mut Builder, site: Site, build: PieceDimensions) {
 }
 
 /// Something that hangs on the wall around u = 0: a holder of towels or of paper.
-pub fn hang(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site) {
+pub(crate) fn hang(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site) {
     let (half, y, deep) = match kind {
         "ToiletPaperHanger" => (70, pick(rng, [650, 900], 25), 90),
         "HandTowelHolder" => (140, pick(rng, [1450, 1600], 25), 70),

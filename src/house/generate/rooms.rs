@@ -9,46 +9,46 @@ use crate::domain::class::Shape;
 use crate::domain::{Class, Room};
 
 /// A range of millimetres or of counts, ends included.
-pub type Range = [i32; 2];
+pub(crate) type Range = [i32; 2];
 
 /// What a kind of room holds. Lengths in millimetres.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RoomPlan {
+pub(crate) struct RoomPlan {
     /// The room's extent along x.
-    pub width: Range,
+    pub(crate) width: Range,
     /// The room's extent along z.
-    pub depth: Range,
+    pub(crate) depth: Range,
     /// The chance that a corner is cut out of it.
-    pub notch: f64,
+    pub(crate) notch: f64,
     /// Its furniture, in the order in which it is placed.
-    pub pieces: Vec<FurniturePiece>,
+    pub(crate) pieces: Vec<FurniturePiece>,
     /// For each movable class: the chance that the room holds any, and the mean count when it does.
-    pub objects: BTreeMap<Class, [f64; 2]>,
+    pub(crate) objects: BTreeMap<Class, [f64; 2]>,
 }
 
 /// A kind of furniture. Lengths in millimetres.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct FurniturePiece {
+pub(crate) struct FurniturePiece {
     /// A class, or a built-in group (`Run`, `Vanity`, `Shelves`, `Wardrobe`).
-    pub kind: String,
+    pub(crate) kind: String,
     /// The chance that the room has any.
-    pub chance: f64,
+    pub(crate) chance: f64,
     /// How many, when it has any.
-    pub count: Range,
+    pub(crate) count: Range,
     /// Along the wall.
-    pub width: Range,
+    pub(crate) width: Range,
     /// Out of the wall.
-    pub depth: Range,
+    pub(crate) depth: Range,
     /// Of its top, or of its seat.
-    pub height: Range,
+    pub(crate) height: Range,
     /// How many drawers its front has.
-    pub drawers: Range,
+    pub(crate) drawers: Range,
     /// The chance of a desk lamp on it.
-    pub lamp: f64,
+    pub(crate) lamp: f64,
     /// It stands in the middle of the room.
-    pub middle: bool,
+    pub(crate) middle: bool,
 }
 
 impl Default for FurniturePiece {
@@ -71,31 +71,31 @@ impl Default for FurniturePiece {
 /// The shape of a generated object. Lengths in millimetres.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GeneratedShape {
+pub(crate) struct GeneratedShape {
     /// Which primitive.
     pub shape: Shape,
     /// Width, height, depth.
-    pub size: [i32; 3],
+    pub(crate) size: [i32; 3],
     /// Its pivot is at its upper edge.
     #[serde(default)]
-    pub hangs: bool,
+    pub(crate) hangs: bool,
 }
 
 /// The whole file.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rooms {
+pub(crate) struct Rooms {
     kitchen: RoomPlan,
     living_room: RoomPlan,
     bedroom: RoomPlan,
     bathroom: RoomPlan,
     /// Shapes that differ from the object table's.
-    pub shapes: BTreeMap<Class, GeneratedShape>,
+    pub(crate) shapes: BTreeMap<Class, GeneratedShape>,
 }
 
 impl Rooms {
     /// The plan of a kind of room.
-    pub fn plan(&self, room: Room) -> &RoomPlan {
+    pub(crate) fn plan(&self, room: Room) -> &RoomPlan {
         match room {
             Room::Kitchen => &self.kitchen,
             Room::LivingRoom => &self.living_room,
@@ -106,7 +106,7 @@ impl Rooms {
 }
 
 /// The table that is part of the program.
-pub fn rooms() -> &'static Rooms {
+pub(crate) fn rooms() -> &'static Rooms {
     static ROOMS: OnceLock<Rooms> = OnceLock::new();
     // A test parses the table, so the default cannot be reached in a build that passed.
     ROOMS.get_or_init(|| toml::from_str(include_str!("../../../assets/rooms.toml")).unwrap_or_default())

@@ -5,18 +5,18 @@ use crate::domain::{Heading, Point};
 
 /// Where a piece stands: its back corner on the floor plan and where its front looks. Lengths in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Site {
+pub(crate) struct Site {
     /// (x, z) of u = 0, v = 0.
-    pub origin: [i32; 2],
+    pub(crate) origin: [i32; 2],
     /// The direction of v.
-    pub facing: Heading,
+    pub(crate) facing: Heading,
     /// World height of y = 0.
-    pub floor: i32,
+    pub(crate) floor: i32,
 }
 
 impl Site {
     /// (x, z) of a point of the frame.
-    pub fn at(&self, u: i32, v: i32) -> [i32; 2] {
+    pub(crate) fn at(&self, u: i32, v: i32) -> [i32; 2] {
         let (vx, vz) = self.facing.step();
         let (ux, uz) = self.facing.right().step();
         let axis = |origin: i32, along: i16, out: i16| origin + u * i32::from(along) + v * i32::from(out);
@@ -24,23 +24,23 @@ impl Site {
     }
 
     /// A world point.
-    pub fn point(&self, u: i32, y: i32, v: i32) -> Point {
+    pub(crate) fn point(&self, u: i32, y: i32, v: i32) -> Point {
         let [x, z] = self.at(u, v);
         Point::new(x, self.floor + y, z)
     }
 
     /// A world box from ranges of u, y and v.
-    pub fn cuboid(&self, u: [i32; 2], y: [i32; 2], v: [i32; 2]) -> Cuboid {
+    pub(crate) fn cuboid(&self, u: [i32; 2], y: [i32; 2], v: [i32; 2]) -> Cuboid {
         Cuboid::between(self.point(u[0], y[0], v[0]), self.point(u[1], y[1], v[1]))
     }
 
     /// A rectangle on the floor plan from ranges of u and v.
-    pub fn rect(&self, u: [i32; 2], v: [i32; 2]) -> Rect {
+    pub(crate) fn rect(&self, u: [i32; 2], v: [i32; 2]) -> Rect {
         self.cuboid(u, [0, 0], v).footprint()
     }
 
     /// The frame moved within itself.
-    pub fn moved(&self, u: i32, v: i32) -> Site {
+    pub(crate) fn moved(&self, u: i32, v: i32) -> Site {
         Site { origin: self.at(u, v), ..*self }
     }
 }

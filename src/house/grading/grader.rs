@@ -120,12 +120,12 @@ impl Grader {
     }
 
     /// How many subtasks are done.
-    pub fn completed(&self) -> usize {
+    pub(crate) fn completed(&self) -> usize {
         self.completed
     }
 
     /// How many there are.
-    pub fn total(&self) -> usize {
+    pub(crate) fn total(&self) -> usize {
         self.subtasks.len()
     }
 
@@ -135,42 +135,37 @@ impl Grader {
     }
 
     /// The subtasks, in order.
-    pub fn subtasks(&self) -> &[Subtask] {
+    pub(crate) fn subtasks(&self) -> &[Subtask] {
         &self.subtasks
     }
 
     /// The subtask that is to be done now; `None` when all are done.
-    pub fn subtask(&self) -> Option<&Subtask> {
+    pub(crate) fn subtask(&self) -> Option<&Subtask> {
         self.subtasks.get(self.completed)
     }
 
     /// The task's roles; subtasks name them by position.
-    pub fn roles(&self) -> &[Role] {
+    pub(crate) fn roles(&self) -> &[Role] {
         &self.roles
     }
 
     /// The instance that plays a role, once one does.
-    pub fn binding(&self, role: u8) -> Option<Instance> {
+    pub(crate) fn binding(&self, role: u8) -> Option<Instance> {
         self.bindings.get(usize::from(role)).copied().flatten()
     }
 
-    /// By class, or strictly.
-    pub fn grading(&self) -> Grading {
-        self.grading
-    }
-
     /// Strict: the whole goal was met before the last subtask was done; nothing more is credited.
-    pub fn is_cut_short(&self) -> bool {
+    pub(crate) fn is_cut_short(&self) -> bool {
         self.finished && !self.is_done()
     }
 
     /// Whether only the close is missing from the current subtask.
-    pub fn is_half_done(&self) -> bool {
+    pub(crate) fn is_half_done(&self) -> bool {
         self.pending.is_some()
     }
 
     /// What the first half of the current subtask left to be closed.
-    pub fn to_close(&self) -> Option<Instance> {
+    pub(crate) fn to_close(&self) -> Option<Instance> {
         self.pending.and_then(|pending| pending.shut)
     }
 

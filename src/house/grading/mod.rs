@@ -14,7 +14,7 @@ use crate::domain::{Action, Scene, World};
 
 use grader::{Before, GradedStep, SubtaskVerdict};
 pub use grader::{Grader, Grading};
-pub use words::describe;
+pub(crate) use words::describe;
 
 impl Grader {
     /// Looks at the world after a step; `true` when a subtask was completed by it. At most one a step.
@@ -76,7 +76,7 @@ impl Grader {
 
     /// Whether an instance may play a role: the bound one, or any other of the class that plays no other role. With strict
     /// grading, the expert's own.
-    pub fn fits(&self, scene: &Scene, world: &World, role: u8, instance: Instance) -> bool {
+    pub(crate) fn fits(&self, scene: &Scene, world: &World, role: u8, instance: Instance) -> bool {
         role_fit::fits(self, scene, world, role, instance)
     }
 

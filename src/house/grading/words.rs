@@ -24,7 +24,7 @@ fn place(roles: &[Role], role: Option<u8>) -> String {
 }
 
 /// A subtask in words: "put the apple in the fridge".
-pub fn describe(roles: &[Role], subtask: &Subtask) -> String {
+pub(crate) fn describe(roles: &[Role], subtask: &Subtask) -> String {
     let object = thing(roles, subtask.object);
     match subtask.skill {
         SkillKind::Pickup => format!("pick up {object}"),

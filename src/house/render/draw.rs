@@ -13,7 +13,7 @@ const TONES: u16 = 20;
 const MOST_SIDES: usize = 20;
 
 /// Draws one frame's bodies.
-pub struct Brush<'a> {
+pub(crate) struct Brush<'a> {
     raster: &'a mut Raster,
     camera: Camera,
     /// Towards the light, in the camera's frame, and the scene's upward direction.
@@ -28,7 +28,7 @@ pub struct Brush<'a> {
 
 impl<'a> Brush<'a> {
     /// A brush for one frame.
-    pub fn new(raster: &'a mut Raster, camera: Camera) -> Brush<'a> {
+    pub(crate) fn new(raster: &'a mut Raster, camera: Camera) -> Brush<'a> {
         let middle = raster.size() as f32 / 2.0;
         let light = camera.turn() * Vec3::new(0.35, 0.8, -0.5).normalize();
         Brush {
@@ -43,7 +43,7 @@ impl<'a> Brush<'a> {
     }
 
     /// Whether a ball is partly in view.
-    pub fn sees(&self, centre: Vec3, radius: f32) -> bool {
+    pub(crate) fn sees(&self, centre: Vec3, radius: f32) -> bool {
         // The side planes of the pyramid of sight lean outwards by 30 degrees: cosine and sine of that.
         const COS: f32 = 0.866_025_4;
         let local = self.camera.local(centre);
@@ -52,20 +52,20 @@ impl<'a> Brush<'a> {
     }
 
     /// From here on, bodies around `centre` come forward by so many metres where they meet others; their outlines stay.
-    pub fn bring_forward(&mut self, centre: Vec3, metres: f32) {
+    pub(crate) fn bring_forward(&mut self, centre: Vec3, metres: f32) {
         let depth = self.camera.local(centre).z.max(0.3);
         self.forward = depth / (depth - metres.min(0.7 * depth));
     }
 
     /// Draws a body as part of instance `id`.
-    pub fn solid(&mut self, solid: &Solid, id: u16) {
+    pub(crate) fn solid(&mut self, solid: &Solid, id: u16) {
         let centre = self.camera.local(solid.centre);
         let axes = self.camera.turn() * solid.axes;
         self.local(solid, centre, axes, id);
     }
 
     /// Draws a body whose middle and axes are given in the camera's frame.
-    pub fn local(&mut self, solid: &Solid, centre: Vec3, axes: Mat3, id: u16) {
+    pub(crate) fn local(&mut self, solid: &Solid, centre: Vec3, axes: Mat3, id: u16) {
         match solid.kind {
             SolidKind::Box { missing } => self.cuboid(solid, centre, axes, missing, id),
             SolidKind::Lathe(lathe) => self.lathe(solid, centre, axes, lathe, id),
@@ -271,12 +271,12 @@ impl<'a> Brush<'a> {
 }
 
 /// How much of the light is left at a distance.
-pub fn dimming(depth: f32) -> f32 {
+pub(crate) fn dimming(depth: f32) -> f32 {
     (1.04 - 0.05 * depth).clamp(0.6, 1.0)
 }
 
 /// A shaded colour as bytes.
-pub fn pack(colour: RgbF32, shade: f32) -> u32 {
+pub(crate) fn pack(colour: RgbF32, shade: f32) -> u32 {
     let [r, g, b] = colour.map(|part| (part * shade * 255.0).clamp(0.0, 255.0) as u32);
     r | g << 8 | b << 16
 }

@@ -16,18 +16,18 @@ const SLAB: i32 = 80;
 const THIN: i32 = 2;
 
 /// Whether things may be built into it: it gives way to drawers, cabinets and basins.
-pub fn gives_way(fixture: &Fixture) -> bool {
+pub(crate) fn gives_way(fixture: &Fixture) -> bool {
     let solid = matches!(fixture.class.name(), "CounterTop" | "Dresser");
     solid && fixture.body.iter().any(|part| part.max.y - part.min.y >= SLAB)
 }
 
 /// Whether it may be built into another.
-pub fn is_built_in(fixture: &Fixture) -> bool {
+pub(crate) fn is_built_in(fixture: &Fixture) -> bool {
     fixture.class.info().openable || matches!(fixture.class.name(), "Sink" | "Bathtub")
 }
 
 /// The bodies of a fixture. `states` are those of all fixtures of the scene.
-pub fn build(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Solid> {
+pub(crate) fn build(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Solid> {
     let mut out = Vec::new();
     let Some(fixture) = scene.fixture(index) else { return out };
     let state = states.get(usize::from(index)).copied().unwrap_or_default();
@@ -160,7 +160,7 @@ fn pieces(scene: &Scene, index: u16, states: &[FixtureState]) -> Vec<Cuboid> {
 }
 
 /// Whether two boxes share more than a sliver.
-pub fn meet(a: &Cuboid, b: &Cuboid) -> bool {
+pub(crate) fn meet(a: &Cuboid, b: &Cuboid) -> bool {
     let (a, b): ([[i32; 3]; 2], [[i32; 3]; 2]) = ([a.min.into(), a.max.into()], [b.min.into(), b.max.into()]);
     (0..3).all(|axis| a[1][axis].min(b[1][axis]) - a[0][axis].max(b[0][axis]) > THIN)
 }
@@ -189,13 +189,13 @@ fn without(cuboid: Cuboid, hole: &Cuboid) -> Vec<Cuboid> {
 }
 
 /// A number that stays with a name (FNV-1a, finished so that all bits depend on all of it).
-pub fn seed_of(name: &str) -> u32 {
+pub(crate) fn seed_of(name: &str) -> u32 {
     let hash = name.bytes().fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
     mix(hash)
 }
 
 /// Spreads a number's bits.
-pub fn mix(mut hash: u32) -> u32 {
+pub(crate) fn mix(mut hash: u32) -> u32 {
     hash = (hash ^ hash >> 16).wrapping_mul(0x7feb_352d);
     hash = (hash ^ hash >> 15).wrapping_mul(0x846c_a68b);
     hash ^ hash >> 16

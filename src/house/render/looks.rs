@@ -100,41 +100,41 @@ struct LookPart {
 
 /// The look of a class, or of one box of its body.
 #[derive(Debug)]
-pub struct Look {
+pub(crate) struct Look {
     class: Class,
     piece: Option<usize>,
     /// Every box of a body of several looks like this.
-    pub each: bool,
+    pub(crate) each: bool,
     palette: Vec<RgbF32>,
     inner: Option<RgbF32>,
     /// The colour inside, where it was cut.
-    pub flesh: Option<RgbF32>,
+    pub(crate) flesh: Option<RgbF32>,
     /// The colour of flat pieces of a body of many boxes: counter tops.
-    pub slab: Option<RgbF32>,
+    pub(crate) slab: Option<RgbF32>,
     parts: Vec<LookPart>,
 }
 
 /// What a look depends on besides the class.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Variant {
+pub(crate) struct Variant {
     /// Tells instances apart: the same number gives the same shade.
-    pub seed: u32,
+    pub(crate) seed: u32,
     /// Its door, drawer or lid stands open.
-    pub open: bool,
+    pub(crate) open: bool,
     /// It is switched on.
-    pub on: bool,
+    pub(crate) on: bool,
 }
 
 /// A box of space to be filled: its middle, its half axes (columns), and the height of the lowest surface in metres of the
 /// scene.
 #[derive(Clone, Copy, Debug)]
-pub struct FilledBox {
+pub(crate) struct FilledBox {
     /// The middle.
-    pub centre: Vec3,
+    pub(crate) centre: Vec3,
     /// The half axes.
-    pub axes: Mat3,
+    pub(crate) axes: Mat3,
     /// Where the lowest surface is, for furniture that has one.
-    pub surface: Option<f32>,
+    pub(crate) surface: Option<f32>,
 }
 
 /// A colour written as `#rrggbb`, or `None`.
@@ -212,17 +212,17 @@ fn table() -> &'static [Look] {
 
 impl Look {
     /// The look of a class as a whole.
-    pub fn of(class: Class) -> Option<&'static Look> {
+    pub(crate) fn of(class: Class) -> Option<&'static Look> {
         table().iter().find(|look| look.class == class && look.piece.is_none())
     }
 
     /// The look of one box of a body of several.
-    pub fn of_piece(class: Class, piece: usize) -> Option<&'static Look> {
+    pub(crate) fn of_piece(class: Class, piece: usize) -> Option<&'static Look> {
         table().iter().find(|look| look.class == class && look.piece == Some(piece))
     }
 
     /// The main colour of an instance: one of the palette, a little lighter or darker.
-    pub fn main(&self, seed: u32) -> RgbF32 {
+    pub(crate) fn main(&self, seed: u32) -> RgbF32 {
         let colour = self.palette[seed as usize % self.palette.len()];
         let shift = |bits: u32, span: f32| 1.0 + span * ((seed >> bits & 15) as f32 / 7.5 - 1.0);
         let bright = shift(8, 0.06);
@@ -231,12 +231,12 @@ impl Look {
     }
 
     /// The colour of insides.
-    pub fn inner(&self, seed: u32) -> RgbF32 {
+    pub(crate) fn inner(&self, seed: u32) -> RgbF32 {
         self.inner.unwrap_or_else(|| self.main(seed).map(|part| 0.6 * part))
     }
 
     /// Fills a box with the bodies of this look.
-    pub fn fill(&self, place: &FilledBox, variant: Variant, out: &mut Vec<Solid>) {
+    pub(crate) fn fill(&self, place: &FilledBox, variant: Variant, out: &mut Vec<Solid>) {
         let (main, inner) = (self.main(variant.seed), self.inner(variant.seed));
         for part in &self.parts {
             let shown = match part.when {

@@ -1,13 +1,13 @@
 //! Draws what the agent sees: colour, depth and instances in one pass, on one core.
 
-pub mod draw;
-pub mod furniture;
-pub mod looks;
-pub mod objects;
-pub mod raster;
-pub mod resolve;
-pub mod scene_bodies;
-pub mod solid;
+pub(crate) mod draw;
+pub(crate) mod furniture;
+pub(crate) mod looks;
+pub(crate) mod objects;
+pub(crate) mod raster;
+pub(crate) mod resolve;
+pub(crate) mod scene_bodies;
+pub(crate) mod solid;
 
 use draw::Brush;
 use raster::Raster;
@@ -40,7 +40,7 @@ impl Renderer {
     }
 
     /// The frame that was drawn last.
-    pub fn frame(&self) -> &Frame {
+    pub(crate) fn frame(&self) -> &Frame {
         &self.frame
     }
 
@@ -53,7 +53,7 @@ impl Renderer {
     }
 
     /// What would be seen in the drawn frame, without colouring it.
-    pub fn look(&mut self, scene: &Scene, world: &World) -> View {
+    pub(crate) fn look(&mut self, scene: &Scene, world: &World) -> View {
         self.cover(scene, world);
         let (size, materials) = (self.raster.size(), self.raster.materials());
         let id = |shows: f32| materials[raster::unmark(shows)].id;

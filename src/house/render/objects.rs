@@ -12,7 +12,7 @@ use crate::house::doors;
 use crate::house::extent::Extent;
 
 /// The bodies of a movable object where it lies. `index` is its number in the world.
-pub fn build(scene: &Scene, index: u16, object: &Object) -> Vec<Solid> {
+pub(crate) fn build(scene: &Scene, index: u16, object: &Object) -> Vec<Solid> {
     let mut out = Vec::new();
     let Some(look) = Look::of(object.class) else { return out };
     let extent = Extent::of_object(scene, object);
@@ -49,7 +49,7 @@ fn slice(look: &Look, extent: &Extent, seed: u32, out: &mut Vec<Solid>) {
 }
 
 /// The bodies of what is in the hand, in the camera's frame: small, in the lower right corner.
-pub fn held(solids: &[Solid], size: f32) -> impl Iterator<Item = (Vec3, Mat3)> {
+pub(crate) fn held(solids: &[Solid], size: f32) -> impl Iterator<Item = (Vec3, Mat3)> {
     const REACH: f32 = 0.6;
     const SIDE: f32 = 0.09;
     let middle = solids.iter().map(|solid| solid.centre).sum::<Vec3>() / solids.len().max(1) as f32;

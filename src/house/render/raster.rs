@@ -7,31 +7,31 @@
 use glam::{Vec2, Vec3, Vec4};
 
 /// Pixels that are treated at once.
-pub const GROUP: usize = 4;
+pub(crate) const GROUP: usize = 4;
 const LANES: Vec4 = Vec4::new(0.0, 1.0, 2.0, 3.0);
 
 /// What a pixel shows: a finished colour and the number of an instance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Material {
+pub(crate) struct Material {
     /// Red, green, blue, unused; lowest byte first.
-    pub rgb: u32,
+    pub(crate) rgb: u32,
     /// The instance: see [`crate::house::view::code`].
-    pub id: u16,
+    pub(crate) id: u16,
 }
 
 /// Inverse depth as a linear function of the column and the row of a pixel's middle.
 #[derive(Clone, Copy, Debug)]
-pub struct Plane {
+pub(crate) struct Plane {
     /// Change per column.
-    pub dx: f32,
+    pub(crate) dx: f32,
     /// Change per row.
-    pub dy: f32,
+    pub(crate) dy: f32,
     /// At the image's upper left corner.
-    pub base: f32,
+    pub(crate) base: f32,
 }
 
 /// Per-pixel nearest surfaces of one frame.
-pub struct Raster {
+pub(crate) struct Raster {
     size: usize,
     groups: usize,
     near: Vec<Vec4>,
@@ -42,18 +42,18 @@ pub struct Raster {
 }
 
 /// A material's number as it is kept in a pixel: the bits of a number from 1 to 2.
-pub fn mark(material: u16) -> f32 {
+pub(crate) fn mark(material: u16) -> f32 {
     f32::from_bits(0x3f80_0000 | u32::from(material))
 }
 
 /// The material's number that is kept in a pixel.
-pub fn unmark(mark: f32) -> usize {
+pub(crate) fn unmark(mark: f32) -> usize {
     (mark.to_bits() & 0xffff) as usize
 }
 
 impl Raster {
     /// An empty square buffer with `size` pixels a side.
-    pub fn new(size: usize) -> Raster {
+    pub(crate) fn new(size: usize) -> Raster {
         let groups = size.div_ceil(GROUP);
         Raster {
             size,
@@ -67,17 +67,17 @@ impl Raster {
     }
 
     /// Pixels a side.
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.size
     }
 
     /// Forgets all materials; the pixels have to be set row by row with [`Raster::row_mut`].
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.materials.clear();
     }
 
     /// The number of a new material. After 65,536 in one frame the last one is used again.
-    pub fn material(&mut self, material: Material) -> u16 {
+    pub(crate) fn material(&mut self, material: Material) -> u16 {
         if self.materials.len() <= usize::from(u16::MAX) {
             self.materials.push(material);
         }
@@ -85,24 +85,24 @@ impl Raster {
     }
 
     /// The materials of this frame.
-    pub fn materials(&self) -> &[Material] {
+    pub(crate) fn materials(&self) -> &[Material] {
         &self.materials
     }
 
     /// A row of inverse depths and marks of materials, padding included.
-    pub fn row(&self, row: usize) -> (&[Vec4], &[Vec4]) {
+    pub(crate) fn row(&self, row: usize) -> (&[Vec4], &[Vec4]) {
         let range = row * self.groups..(row + 1) * self.groups;
         (&self.near[range.clone()], &self.shows[range])
     }
 
     /// A row to be set.
-    pub fn row_mut(&mut self, row: usize) -> (&mut [Vec4], &mut [Vec4]) {
+    pub(crate) fn row_mut(&mut self, row: usize) -> (&mut [Vec4], &mut [Vec4]) {
         let range = row * self.groups..(row + 1) * self.groups;
         (&mut self.near[range.clone()], &mut self.shows[range])
     }
 
     /// Fills a convex polygon (pixel coordinates, any winding) that lies in `plane`.
-    pub fn polygon(&mut self, corners: &[Vec2], plane: &Plane, material: u16) {
+    pub(crate) fn polygon(&mut self, corners: &[Vec2], plane: &Plane, material: u16) {
         let (mut min, mut max) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         for &corner in corners {
             min = min.min(corner);
@@ -169,7 +169,7 @@ impl Raster {
     /// Fills an ellipsoid's outline. In the frame where it is the unit sphere, a ray through column x and row y is
     /// `ray[0] + ray[1] x + ray[2] y` and its middle is `centre`; `bounds` are its left, top, right and bottom. The surface is
     /// drawn in tones by its direction along `light`: `tones` are the darkest material and how many there are from it on.
-    pub fn ellipsoid(&mut self, ray: [Vec3; 3], centre: Vec3, bounds: [f32; 4], light: Vec3, tones: [u16; 2]) {
+    pub(crate) fn ellipsoid(&mut self, ray: [Vec3; 3], centre: Vec3, bounds: [f32; 4], light: Vec3, tones: [u16; 2]) {
         let outside = centre.length_squared() - 1.0;
         if outside <= 0.0 {
             return;

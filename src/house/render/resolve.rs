@@ -27,7 +27,7 @@ fn ground(room: Room) -> FloorPattern {
 }
 
 /// Sets every pixel to the floor, the ceiling, or nothing. Heights are in metres of the scene.
-pub fn backdrop(raster: &mut Raster, camera: &Camera, room: Room, floor: f32, ceiling: Option<f32>) {
+pub(crate) fn backdrop(raster: &mut Raster, camera: &Camera, room: Room, floor: f32, ceiling: Option<f32>) {
     let size = raster.size();
     let middle = size as f32 / 2.0;
     let slope = Camera::SLOPE / middle;
@@ -90,7 +90,7 @@ pub fn backdrop(raster: &mut Raster, camera: &Camera, room: Room, floor: f32, ce
 }
 
 /// Writes the finished frame.
-pub fn resolve(raster: &Raster, frame: &mut Frame) {
+pub(crate) fn resolve(raster: &Raster, frame: &mut Frame) {
     let size = raster.size();
     let materials = raster.materials();
     let rows = frame.rgb.chunks_exact_mut(3 * size).zip(frame.depth.chunks_exact_mut(size));

@@ -18,15 +18,15 @@ const SMALL: f32 = 0.3;
 
 /// An instance's bodies and a ball around them.
 #[derive(Clone, Debug, Default)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// The bodies.
-    pub solids: Vec<Solid>,
+    pub(crate) solids: Vec<Solid>,
     /// The middle of the ball, in metres.
-    pub centre: Vec3,
+    pub(crate) centre: Vec3,
     /// Its radius.
-    pub radius: f32,
+    pub(crate) radius: f32,
     /// How far it comes forward where it meets others, in metres.
-    pub forward: f32,
+    pub(crate) forward: f32,
 }
 
 impl Figure {
@@ -56,16 +56,16 @@ impl Figure {
 
 /// The bodies of a scene and of the world in it.
 #[derive(Default)]
-pub struct SceneBodies {
+pub(crate) struct SceneBodies {
     known: Option<SceneGeometry>,
     states: Vec<FixtureState>,
     objects: Vec<Object>,
     /// The walls.
-    pub walls: Figure,
+    pub(crate) walls: Figure,
     /// One for each fixture.
-    pub fixtures: Vec<Figure>,
+    pub(crate) fixtures: Vec<Figure>,
     /// One for each movable object.
-    pub things: Vec<Figure>,
+    pub(crate) things: Vec<Figure>,
 }
 
 /// The parts of a scene that its bodies follow from.
@@ -90,7 +90,7 @@ impl SceneGeometry {
 
 impl SceneBodies {
     /// Brings the bodies up to date. The result depends on the scene and the world only.
-    pub fn update(&mut self, scene: &Scene, world: &World) {
+    pub(crate) fn update(&mut self, scene: &Scene, world: &World) {
         if !self.known.as_ref().is_some_and(|known| known.is(scene)) {
             *self = SceneBodies {
                 known: Some(SceneGeometry {

@@ -6,20 +6,20 @@ use crate::domain::class::Shape;
 use crate::house::extent::Extent;
 
 /// A colour before lighting: red, green, blue from 0 to 1.
-pub type RgbF32 = [f32; 3];
+pub(crate) type RgbF32 = [f32; 3];
 
 /// The outline that a round body turns about its y axis: rings of (height, radius) from bottom to top, each from -1 or 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lathe {
+pub(crate) struct Lathe {
     /// The rings.
-    pub rings: &'static [[f32; 2]],
+    pub(crate) rings: &'static [[f32; 2]],
     /// The top is open and one looks inside.
-    pub hollow: bool,
+    pub(crate) hollow: bool,
 }
 
 /// The body's surface in its own frame, from -1 to 1 along each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SolidKind {
+pub(crate) enum SolidKind {
     /// A box; the bits of `missing` leave out faces (-x, +x, -y, +y, -z, +z from the lowest), and then one looks inside.
     Box {
         /// Which faces are left out.
@@ -33,27 +33,27 @@ pub enum SolidKind {
 
 /// A body in space. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solid {
+pub(crate) struct Solid {
     /// The surface that is stretched along the axes.
-    pub kind: SolidKind,
+    pub(crate) kind: SolidKind,
     /// Its middle.
-    pub centre: Vec3,
+    pub(crate) centre: Vec3,
     /// Columns: its half axes, at right angles to each other.
-    pub axes: Mat3,
+    pub(crate) axes: Mat3,
     /// The colour outside.
-    pub colour: RgbF32,
+    pub(crate) colour: RgbF32,
     /// The colour inside, where one can look inside.
-    pub inner: RgbF32,
+    pub(crate) inner: RgbF32,
     /// It shines: no shading.
-    pub glows: bool,
+    pub(crate) glows: bool,
 }
 
 /// A plain upright cylinder.
-pub const CYLINDER: Lathe = Lathe { rings: &[[-1.0, 1.0], [1.0, 1.0]], hollow: false };
+pub(crate) const CYLINDER: Lathe = Lathe { rings: &[[-1.0, 1.0], [1.0, 1.0]], hollow: false };
 
 impl Solid {
     /// A closed body of the given extent in one colour.
-    pub fn filling(extent: &Extent, colour: RgbF32) -> Solid {
+    pub(crate) fn filling(extent: &Extent, colour: RgbF32) -> Solid {
         let kind = match extent.shape {
             Shape::Box => SolidKind::Box { missing: 0 },
             Shape::Cylinder => SolidKind::Lathe(CYLINDER),
@@ -63,7 +63,7 @@ impl Solid {
     }
 
     /// The radius of a ball around the middle that holds it.
-    pub fn radius(&self) -> f32 {
+    pub(crate) fn radius(&self) -> f32 {
         let squared = |axis: Vec3| axis.length_squared();
         (squared(self.axes.x_axis) + squared(self.axes.y_axis) + squared(self.axes.z_axis)).sqrt()
     }

@@ -16,10 +16,10 @@ use super::story::Story;
 use crate::domain::skill::SkillKind;
 
 /// No summary has more words.
-pub const LONGEST: usize = 29;
+pub(crate) const LONGEST: usize = 29;
 
 /// Sums up by rules.
-pub struct Rules;
+pub(crate) struct Rules;
 
 impl Summarizer for Rules {
     fn source(&self) -> &'static str {
@@ -36,7 +36,7 @@ impl Summarizer for Rules {
 }
 
 /// A passage in a sentence. The same passage always gives the same one.
-pub fn summary(passage: &Passage<'_>) -> String {
+pub(crate) fn summary(passage: &Passage<'_>) -> String {
     let digest = u64::from_str_radix(&passage.digest(), 16).unwrap_or_default();
     // Each manner is shorter than the one before.
     let mut sentence = String::new();

@@ -14,7 +14,7 @@ use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 
 /// How a text lies about its point.
 #[derive(Clone, Copy, Debug)]
-pub enum Anchor {
+pub(crate) enum Anchor {
     /// The text begins at the point.
     Start,
     /// The text is centred on the point.
@@ -47,22 +47,22 @@ pub struct Drawing {
 
 impl Drawing {
     /// An empty drawing; the title is for those who cannot see it.
-    pub fn new(width: f64, height: f64, title: &str) -> Drawing {
+    pub(crate) fn new(width: f64, height: f64, title: &str) -> Drawing {
         Drawing { size: (width, height), title: title.to_owned(), elements: Vec::new() }
     }
 
     /// Adds a line through points.
-    pub fn line(&mut self, points: &[(f64, f64)], colour: RgbColour, width: f64) {
+    pub(crate) fn line(&mut self, points: &[(f64, f64)], colour: RgbColour, width: f64) {
         self.elements.push(Element::Line { points: points.to_vec(), colour, width });
     }
 
     /// Adds a dot, which marks a point of a line.
-    pub fn dot(&mut self, at: (f64, f64), colour: RgbColour) {
+    pub(crate) fn dot(&mut self, at: (f64, f64), colour: RgbColour) {
         self.elements.push(Element::Dot { at, colour });
     }
 
     /// Adds a text in one line, its baseline at `at`.
-    pub fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: RgbColour) {
+    pub(crate) fn text(&mut self, at: (f64, f64), text: &str, anchor: Anchor, colour: RgbColour) {
         self.elements.push(Element::Text { at, text: text.to_owned(), anchor, colour });
     }
 
@@ -108,7 +108,7 @@ impl Drawing {
     ///
     /// # Errors
     /// When the folder cannot be written to.
-    pub fn write(&self, folder: &Path, file_stem: &str) -> anyhow::Result<()> {
+    pub(crate) fn write(&self, folder: &Path, file_stem: &str) -> anyhow::Result<()> {
         atomic_file::write(&folder.join(format!("{file_stem}.svg")), self.svg().as_bytes())?;
         atomic_file::write(&folder.join(format!("{file_stem}.png")), &self.png()?)
     }
@@ -153,7 +153,7 @@ impl From<Anchor> for Alignment {
 }
 
 /// Text as it stands in SVG and HTML.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

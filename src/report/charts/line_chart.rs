@@ -6,33 +6,33 @@ use crate::report::stats::Interval;
 
 /// Lines in a plane with labelled axes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct LineChart {
+pub(crate) struct LineChart {
     /// The heading above the plane.
-    pub title: String,
+    pub(crate) title: String,
     /// What the horizontal axis measures, below the plane.
-    pub x_label: String,
+    pub(crate) x_label: String,
     /// The lines, in the order of their colours.
-    pub series: Vec<Series>,
+    pub(crate) series: Vec<Series>,
     /// The ends of the vertical axis; where there are none, those of the points.
-    pub y_range: Option<(f64, f64)>,
+    pub(crate) y_range: Option<(f64, f64)>,
 }
 
 /// One line of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// What it is of; written into the chart where it is not empty.
-    pub name: String,
+    pub(crate) name: String,
     /// Its points, from left to right; those that are no numbers are passed over.
-    pub points: Vec<(f64, f64)>,
+    pub(crate) points: Vec<(f64, f64)>,
     /// The interval of each point, where there are any; such points are marked.
-    pub intervals: Vec<Interval>,
+    pub(crate) intervals: Vec<Interval>,
 }
 
 /// Told apart by people who see few colours, too (Okabe and Ito, 2008).
-pub const COLOURS: [RgbColour; 7] =
+pub(crate) const COLOURS: [RgbColour; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [90, 90, 90]];
 /// The colour of titles and labels.
-pub const INK: RgbColour = [34, 34, 34];
+pub(crate) const INK: RgbColour = [34, 34, 34];
 const FAINT: RgbColour = [221, 221, 221];
 /// What lies around the plane: left, above, right, below.
 const MARGINS: [f64; 4] = [64.0, 34.0, 18.0, 40.0];
@@ -41,14 +41,14 @@ const INSET: f64 = 8.0;
 
 impl LineChart {
     /// The chart as a drawing of its own.
-    pub fn drawing(&self, width: f64, height: f64) -> Drawing {
+    pub(crate) fn drawing(&self, width: f64, height: f64) -> Drawing {
         let mut drawing = Drawing::new(width, height, &self.title);
         self.draw(&mut drawing, (0.0, 0.0), (width, height));
         drawing
     }
 
     /// Draws the chart with its upper left corner at `corner`.
-    pub fn draw(&self, drawing: &mut Drawing, corner: (f64, f64), size: (f64, f64)) {
+    pub(crate) fn draw(&self, drawing: &mut Drawing, corner: (f64, f64), size: (f64, f64)) {
         let [before, above, after, below] = MARGINS;
         let (left, top) = (corner.0 + before, corner.1 + above);
         let (right, bottom) = (corner.0 + size.0 - after, corner.1 + size.1 - below);

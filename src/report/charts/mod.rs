@@ -1,6 +1,6 @@
 //! Charts as vectors or pixels.
 
-pub mod drawing;
-pub mod line_chart;
-pub mod progress_by_length;
+pub(crate) mod drawing;
+pub(crate) mod line_chart;
+pub(crate) mod progress_by_length;
 pub mod training_curves;

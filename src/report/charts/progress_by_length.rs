@@ -5,10 +5,10 @@ use super::line_chart::{LineChart, Series};
 use crate::report::summary::RunSummary;
 
 /// The name of the plot's files, without their ending.
-pub const FILE_STEM: &str = "progress_by_length";
+pub(crate) const FILE_STEM: &str = "progress_by_length";
 
 /// Progress by the number of subtasks, a line a run.
-pub fn draw(summaries: &[&RunSummary]) -> Drawing {
+pub(crate) fn draw(summaries: &[&RunSummary]) -> Drawing {
     let line = |summary: &&RunSummary| Series {
         name: format!("{} ({})", summary.policy, summary.episodes),
         points: summary.progress_by_length.iter().map(|(&length, &share)| (f64::from(length), share)).collect(),

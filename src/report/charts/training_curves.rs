@@ -16,7 +16,7 @@ const COLUMNS: usize = 3;
 const LINE: f64 = 16.0;
 
 /// The scalars of a training by stage and name, each a number at some steps.
-pub type Curves = BTreeMap<String, BTreeMap<u64, f64>>;
+pub(crate) type Curves = BTreeMap<String, BTreeMap<u64, f64>>;
 
 /// Reads a checkpoint folder's `training/progress.jsonl`. Of a step that was taken twice, by a training that was resumed, the
 /// later one counts. A last line that was cut short is passed over.

@@ -1,7 +1,7 @@
 //! Runs compared with a first one.
 
-pub mod markdown;
-pub mod paired;
+pub(crate) mod markdown;
+pub(crate) mod paired;
 
 use std::collections::BTreeMap;
 
@@ -21,45 +21,45 @@ use crate::run_dir::reader::RecordedRun;
 pub struct Comparison {
     /// Version of the format of a comparison.
     #[schemars(extend("const" = Comparison::FORMAT))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// Each run by itself, in the order given.
-    pub runs: Vec<RunFigures>,
+    pub(crate) runs: Vec<RunFigures>,
     /// Every further run against the first.
-    pub pairs: Vec<PairedComparison>,
+    pub(crate) pairs: Vec<PairedComparison>,
 }
 
 /// The figures of one run, from its summary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RunFigures {
+pub(crate) struct RunFigures {
     /// The run's folder, or its folders with commas between.
-    pub run: String,
+    pub(crate) run: String,
     /// The name of the task set that it played.
-    pub task_set: String,
+    pub(crate) task_set: String,
     /// The name of the policy that acted.
-    pub policy: String,
+    pub(crate) policy: String,
     /// Episodes in the tasks' own words from their starts.
-    pub episodes: usize,
+    pub(crate) episodes: usize,
     /// Episodes that ended with an error.
-    pub errors: usize,
+    pub(crate) errors: usize,
     /// The share of episodes in which every subtask was completed.
-    pub success: f64,
+    pub(crate) success: f64,
     /// The 95 % Wilson interval of `success`, lower end first.
-    pub success_interval: Interval,
+    pub(crate) success_interval: Interval,
     /// Completed subtasks of an episode.
-    pub completed_subtasks: Mean,
+    pub(crate) completed_subtasks: Mean,
     /// The same by folder, where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub completed_subtasks_by_folder: Vec<f64>,
+    pub(crate) completed_subtasks_by_folder: Vec<f64>,
     /// Mean of completed subtasks as a share of an episode's subtasks.
-    pub progress: f64,
+    pub(crate) progress: f64,
     /// The same by the number of subtasks.
-    pub progress_by_length: BTreeMap<u32, f64>,
+    pub(crate) progress_by_length: BTreeMap<u32, f64>,
 }
 
 impl Comparison {
     /// The format version this program writes.
-    pub const FORMAT: u32 = 4;
+    pub(crate) const FORMAT: u32 = 4;
 
     /// Compares every further run with the first; with it comes each run's summary.
     ///
@@ -95,7 +95,7 @@ impl Comparison {
     }
 
     /// The most episodes in which a run fell behind the first.
-    pub fn regressions(&self) -> usize {
+    pub(crate) fn regressions(&self) -> usize {
         self.pairs.iter().map(|pair| pair.regressions.len()).max().unwrap_or(0)
     }
 }

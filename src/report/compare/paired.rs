@@ -14,65 +14,65 @@ use crate::run_dir::reader::RecordedRun;
 /// A difference of two means, second less first, and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PairedDifference {
+pub(crate) struct PairedDifference {
     /// The mean over the first run's paired episodes.
-    pub first: f64,
+    pub(crate) first: f64,
     /// The mean over the second run's paired episodes.
-    pub second: f64,
+    pub(crate) second: f64,
     /// `second` less `first`.
-    pub difference: f64,
+    pub(crate) difference: f64,
     /// The 95 % interval of the difference: paired bootstrap over tasks.
-    pub interval: Interval,
+    pub(crate) interval: Interval,
 }
 
 /// An episode in which one run succeeded and the other did not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct OutcomeChange {
+pub(crate) struct OutcomeChange {
     /// The id of the task.
-    pub task: String,
+    pub(crate) task: String,
     /// The episode's seed.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// What the agent was told in the second run.
-    pub instruction: String,
+    pub(crate) instruction: String,
     /// Completed subtasks in the first run and in the second, and of how many.
-    pub completed: [u32; 3],
+    pub(crate) completed: [u32; 3],
     /// The command that opens the first run's episode.
-    pub open_first: String,
+    pub(crate) open_first: String,
     /// The command that opens the second run's episode.
-    pub open_second: String,
+    pub(crate) open_second: String,
 }
 
 /// Two runs compared episode by episode: same task, same seed, same start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PairedComparison {
+pub(crate) struct PairedComparison {
     /// The first run's folder.
-    pub first: String,
+    pub(crate) first: String,
     /// The second run's folder.
-    pub second: String,
+    pub(crate) second: String,
     /// Pairs of episodes: same task, seed and start, with the task's own instruction.
-    pub pairs: usize,
+    pub(crate) pairs: usize,
     /// Episodes of either run without a counterpart.
-    pub unpaired: usize,
+    pub(crate) unpaired: usize,
     /// Of those, episodes whose counterpart began in another state.
-    pub start_mismatches: usize,
+    pub(crate) start_mismatches: usize,
     /// The share of successes.
-    pub success: PairedDifference,
+    pub(crate) success: PairedDifference,
     /// Completed subtasks of an episode.
-    pub completed_subtasks: PairedDifference,
+    pub(crate) completed_subtasks: PairedDifference,
     /// Completed subtasks as a share of those that were asked.
-    pub progress: PairedDifference,
+    pub(crate) progress: PairedDifference,
     /// McNemar's discordant pairs: tasks that the first run solved more often, and those that the second did.
-    pub discordant_tasks: [usize; 2],
+    pub(crate) discordant_tasks: [usize; 2],
     /// Two-sided exact McNemar test of equal success, a task a pair: several seeds of a task are alike.
-    pub mcnemar_p: f64,
+    pub(crate) mcnemar_p: f64,
     /// Only the first run succeeded.
-    pub regressions: Vec<OutcomeChange>,
+    pub(crate) regressions: Vec<OutcomeChange>,
     /// Only the second run succeeded.
-    pub fixes: Vec<OutcomeChange>,
+    pub(crate) fixes: Vec<OutcomeChange>,
     /// How the intervals and the test were made.
-    pub methods: String,
+    pub(crate) methods: String,
 }
 
 impl PairedComparison {
@@ -80,7 +80,7 @@ impl PairedComparison {
     ///
     /// # Errors
     /// When they have no episode in common.
-    pub fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<PairedComparison> {
+    pub(crate) fn of(first: &RecordedRun, second: &RecordedRun) -> anyhow::Result<PairedComparison> {
         let mut others: BTreeMap<EpisodeKey, &Episode> = second
             .episodes
             .iter()

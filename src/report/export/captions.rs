@@ -4,14 +4,14 @@ use embedded_graphics::mono_font::MonoFont;
 use embedded_graphics::mono_font::iso_8859_1::FONT_6X10;
 
 /// The font of captions.
-pub const FONT: MonoFont<'_> = FONT_6X10;
+pub(crate) const FONT: MonoFont<'_> = FONT_6X10;
 /// The height of a line, in pixels.
-pub const LINE: usize = 10;
+pub(crate) const LINE: usize = 10;
 /// The width of a letter, in pixels.
 const ADVANCE: usize = 6;
 
 /// Breaks text into lines of at most `width` pixels, at spaces where it can.
-pub fn wrap(text: &str, width: usize) -> Vec<String> {
+pub(crate) fn wrap(text: &str, width: usize) -> Vec<String> {
     let most = (width / ADVANCE).max(1);
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

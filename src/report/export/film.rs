@@ -20,7 +20,7 @@ const SHOWN: (u16, u16) = (25, 200);
 ///
 /// # Errors
 /// Never in practice: it is written to memory.
-pub fn draw(recording: &FrameSequence) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn draw(recording: &FrameSequence) -> anyhow::Result<Vec<u8>> {
     let mut camera = recording.camera();
     let mut data = Vec::new();
     let side = crate::house::House::FRAME;

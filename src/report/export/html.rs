@@ -29,7 +29,7 @@ struct ReplayStep<'a> {
 ///
 /// # Errors
 /// Never in practice: it is written to memory.
-pub fn write(recording: &FrameSequence) -> anyhow::Result<String> {
+pub(crate) fn write(recording: &FrameSequence) -> anyhow::Result<String> {
     let mut camera = recording.camera();
     let mut steps = Vec::with_capacity(recording.shots.len());
     for shot in &recording.shots {

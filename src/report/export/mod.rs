@@ -19,7 +19,7 @@ use crate::episode::frames::FrameSequence;
 ///
 /// # Errors
 /// When the ending is none of these, or the file cannot be written.
-pub fn write(recording: &FrameSequence, at: u32, path: &Path) -> anyhow::Result<u64> {
+pub(crate) fn write(recording: &FrameSequence, at: u32, path: &Path) -> anyhow::Result<u64> {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().to_lowercase());
     let bytes = if name.ends_with(".strip.png") {
         strip::draw(recording).png()?

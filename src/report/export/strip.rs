@@ -20,14 +20,14 @@ const SIDE: usize = 150;
 ///
 /// # Errors
 /// When there is no such step.
-pub fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Pixmap> {
+pub(crate) fn frame(recording: &FrameSequence, at: u32) -> anyhow::Result<Pixmap> {
     let shot = recording.shots.get(at as usize).with_context(|| format!("there is no step {at}"))?;
     let frame = recording.camera().draw(shot);
     Ok(Pixmap { width: frame.width, height: frame.height, rgb: frame.rgb })
 }
 
 /// The first frame, those at which a subtask was done, and the last one, each over its words.
-pub fn draw(recording: &FrameSequence) -> Pixmap {
+pub(crate) fn draw(recording: &FrameSequence) -> Pixmap {
     let shots = chosen(recording);
     let words: Vec<Vec<String>> = shots.iter().map(|shot| wrap(&caption(shot), SIDE)).collect();
     let lines = words.iter().map(Vec::len).max().unwrap_or(1);

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::episode::frames::FrameSequence;
 
 /// The transcript: what was told, and a line a step.
-pub fn write(recording: &FrameSequence) -> String {
+pub(crate) fn write(recording: &FrameSequence) -> String {
     let mut text = format!("{}\n{}\n", recording.told(), recording.title);
     for (number, subtask) in (1..).zip(&recording.subtasks) {
         let _ = writeln!(text, "subtask {number}: {subtask}");

@@ -39,9 +39,9 @@ pub enum ExpertKind {
 
 impl ExpertKind {
     /// The scanning expert's name on the command line.
-    pub const SCANNING: &str = "scanning-expert";
+    pub(crate) const SCANNING: &str = "scanning-expert";
     /// The privileged expert's name on the command line.
-    pub const PRIVILEGED: &str = "expert";
+    pub(crate) const PRIVILEGED: &str = "expert";
 
     fn policy(self, turn_timing: TurnTiming) -> Box<dyn Policy> {
         match self {
@@ -98,18 +98,18 @@ pub(crate) fn phrasings(
 
 /// A task that is about to be demonstrated.
 pub(crate) struct Demonstration<'a> {
-    pub task: &'a Task,
+    pub(crate) task: &'a Task,
     pub setting: Setting,
     /// The trajectory's id.
-    pub id: String,
+    pub(crate) id: String,
     /// The first is the instruction that a learner gets.
-    pub annotations: Vec<Annotation>,
-    pub settings: DemonstrationSettings,
+    pub(crate) annotations: Vec<Annotation>,
+    pub(crate) settings: DemonstrationSettings,
 }
 
 impl Demonstration<'_> {
     /// Plays a task to its end; `None` when the demonstrator sees no way or takes too long.
-    pub fn play(
+    pub(crate) fn play(
         self,
         mut learner: Option<&mut LearnedPolicy>,
         rng: &mut ChaCha8Rng,

@@ -46,9 +46,9 @@ pub struct Collection {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collected {
     /// How many demonstrations were kept.
-    pub trajectories: usize,
+    pub(crate) trajectories: usize,
     /// Whether it was stopped before its end.
-    pub stopped: bool,
+    pub(crate) stopped: bool,
 }
 
 /// Generated houses, at most: where fewer tasks than wished for can be demonstrated it must end some time.

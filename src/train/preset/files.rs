@@ -39,7 +39,7 @@ impl Preset {
     ///
     /// # Errors
     /// When there is no such preset or size, or it is malformed; the field is named.
-    pub fn sized(name: &str, size: Option<&str>) -> anyhow::Result<Preset> {
+    pub(crate) fn sized(name: &str, size: Option<&str>) -> anyhow::Result<Preset> {
         let mut table = Preset::table(name).with_context(|| format!("the preset {name}"))?;
         if let Some(size) = size {
             let values = Preset::size(size).with_context(|| format!("the size {size}"))?;

@@ -18,26 +18,26 @@ use crate::nets::visual::VisualSpec;
 #[serde(deny_unknown_fields)]
 pub struct Preset {
     /// Version of this format.
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The method's name in cards and reports.
     pub name: String,
     /// Drives initialisation, dropout and the order of the data.
     pub seed: u64,
     /// One trajectory in that many is held out.
-    pub hold_out: usize,
+    pub(crate) hold_out: usize,
     /// Steps between two saved states.
-    pub save_every: u64,
+    pub(crate) save_every: u64,
     /// Steps between two lines of training/progress.jsonl.
-    pub report_every: u64,
+    pub(crate) report_every: u64,
     /// Which spans are learned from, under which texts.
-    pub data: DataSelection,
+    pub(crate) data: DataSelection,
     /// Which network turns frames into feature maps.
     #[serde(default)]
-    pub visual_backbone: VisualBackbone,
+    pub(crate) visual_backbone: VisualBackbone,
     /// The size of the House encoder; ResNet-18 has one size.
     pub visual_encoder: VisualSpec,
     /// The House encoder's training.
-    pub visual_encoder_training: VisualEncoderTraining,
+    pub(crate) visual_encoder_training: VisualEncoderTraining,
     /// The size of the policy network.
     pub policy: PolicySpec,
     /// The size of the critic; absent for behaviour cloning.
@@ -53,18 +53,18 @@ pub struct Preset {
     pub training: Optimisation,
     /// How wide the numbers are that networks compute with while they learn.
     #[serde(default)]
-    pub precision: Precision,
+    pub(crate) precision: Precision,
     /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.
     #[serde(default)]
-    pub logit_adjustment: f32,
+    pub(crate) logit_adjustment: f32,
     /// How the trained policy is measured.
-    pub validation: ValidationSpec,
+    pub(crate) validation: ValidationSpec,
 }
 
 /// The network that turns frames into feature maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum VisualBackbone {
+pub(crate) enum VisualBackbone {
     /// The House encoder, which is trained on drawn frames.
     #[default]
     House,
@@ -75,28 +75,28 @@ pub enum VisualBackbone {
 /// How the House encoder is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct VisualEncoderTraining {
+pub(crate) struct VisualEncoderTraining {
     /// Steps, batch size, learning rate and optimiser.
-    pub optimisation: Optimisation,
+    pub(crate) optimisation: Optimisation,
     /// The weight of a positive cell label in the binary cross-entropy; that of a negative one is 1.
-    pub positive_weight: f64,
+    pub(crate) positive_weight: f64,
 }
 
 /// How a trained policy is measured, in houses that no training saw.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ValidationSpec {
+pub(crate) struct ValidationSpec {
     /// How many one-skill tasks are played.
-    pub tasks: usize,
+    pub(crate) tasks: usize,
     /// Cases in which the instruction is swapped for another object in view.
-    pub swaps: usize,
+    pub(crate) swaps: usize,
     /// Drives the choice of houses and tasks.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 impl Preset {
     /// The format version this program reads and writes.
-    pub const FORMAT: u32 = 2;
+    pub(crate) const FORMAT: u32 = 2;
 
     /// Errors name the field and no line: a line of the joined table would be none of the file's.
     fn parse(table: toml::Table) -> anyhow::Result<Preset> {
@@ -191,7 +191,7 @@ impl Preset {
     }
 
     /// The method as `config.json` names it: `bc`, `iql`, `sprint`, `am` or `et`.
-    pub fn method(&self) -> &'static str {
+    pub(crate) fn method(&self) -> &'static str {
         match (&self.iql, &self.chaining, &self.policy.goal_channels) {
             (_, _, Some(_)) => "am",
             (None, ..) if self.policy.attention.is_some() => "et",

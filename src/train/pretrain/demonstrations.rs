@@ -11,15 +11,15 @@ use crate::train::frame_store::FrameStore;
 
 /// The datasets of a pretraining.
 pub(super) struct Demonstrations {
-    pub datasets: Vec<Dataset>,
+    pub(crate) datasets: Vec<Dataset>,
     /// A digest for each dataset.
-    pub digests: Vec<String>,
+    pub(crate) digests: Vec<String>,
     /// The trajectories of all datasets.
-    pub frame_store: FrameStore,
+    pub(crate) frame_store: FrameStore,
 }
 
 impl Demonstrations {
-    pub fn open(spec: &Pretraining) -> anyhow::Result<Demonstrations> {
+    pub(crate) fn open(spec: &Pretraining) -> anyhow::Result<Demonstrations> {
         let datasets = spec.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let frame_store = FrameStore::open(&datasets)?;
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
@@ -27,12 +27,12 @@ impl Demonstrations {
     }
 
     /// The digest of all datasets together.
-    pub fn digest(&self) -> String {
+    pub(crate) fn digest(&self) -> String {
         self.digests.join("-")
     }
 
     /// The items to learn from, with their texts, and those that are held out.
-    pub fn items(&self, spec: &Pretraining) -> anyhow::Result<Items> {
+    pub(crate) fn items(&self, spec: &Pretraining) -> anyhow::Result<Items> {
         let source = ItemSource {
             trajectories: &self.frame_store.trajectories,
             apart: &self.frame_store.kept_apart(spec.preset.hold_out),

@@ -16,7 +16,7 @@ use std::sync::atomic::AtomicBool;
 use self::demonstrations::Demonstrations;
 use self::initial_networks::initial_networks;
 use self::policy::Inputs;
-pub use self::spec::Pretraining;
+pub(crate) use self::spec::Pretraining;
 use self::text_embeddings::embed_texts;
 use super::feature_cache;
 use super::in_training_eval::InTrainingEval;
@@ -25,7 +25,7 @@ use super::tensorboard::TensorBoard;
 
 /// How a training ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trained {
+pub(crate) enum Trained {
     /// All steps were taken.
     Finished,
     /// It was stopped, and can be resumed.
@@ -38,7 +38,7 @@ impl Pretraining {
     ///
     /// # Errors
     /// When data or an earlier state cannot be read, the folder not be written, or `out` holds something else already.
-    pub fn run(&self, logger: &mut dyn ProgressLogger, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
+    pub(crate) fn run(&self, logger: &mut dyn ProgressLogger, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
         // What can be refused is refused before the folder is touched.
         let has_state = out_folder::has_state(self)?;
         let demonstrations = Demonstrations::open(self)?;

@@ -20,13 +20,13 @@ use crate::train::training_state::TrainingState;
 
 /// What the earlier stages gave.
 pub(super) struct Inputs<'a> {
-    pub demonstrations: &'a Demonstrations,
-    pub networks: &'a Networks,
-    pub features: &'a Features,
-    pub items: &'a Items,
-    pub texts: Texts,
+    pub(crate) demonstrations: &'a Demonstrations,
+    pub(crate) networks: &'a Networks,
+    pub(crate) features: &'a Features,
+    pub(crate) items: &'a Items,
+    pub(crate) texts: Texts,
     /// The tasks that the agent plays on the way.
-    pub evaluation: Option<Evaluation>,
+    pub(crate) evaluation: Option<Evaluation>,
 }
 
 /// Trains policy and critic; false when it was stopped.

@@ -12,29 +12,29 @@ use crate::train::in_training_eval::InTrainingEval;
 use crate::train::preset::{Preset, VisualBackbone};
 
 /// What to train, on what, into where.
-pub struct Pretraining {
+pub(crate) struct Pretraining {
     /// The hyper-parameters.
-    pub preset: Preset,
+    pub(crate) preset: Preset,
     /// The datasets' folders; each keeps its own feature cache.
-    pub data: Vec<PathBuf>,
+    pub(crate) data: Vec<PathBuf>,
     /// The checkpoint's folder.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Go on with the training that was begun in `out`.
-    pub resume: bool,
+    pub(crate) resume: bool,
     /// A checkpoint whose visual encoder is used instead of training one.
-    pub visual_from: Option<PathBuf>,
+    pub(crate) visual_from: Option<PathBuf>,
     /// A checkpoint whose policy is the start, instead of a fresh one.
-    pub policy_from: Option<PathBuf>,
+    pub(crate) policy_from: Option<PathBuf>,
     /// A checkpoint whose critic is the start, instead of a fresh one.
-    pub critic_from: Option<PathBuf>,
+    pub(crate) critic_from: Option<PathBuf>,
     /// Tasks that the agent plays while it trains.
-    pub in_training_eval: Option<InTrainingEval>,
+    pub(crate) in_training_eval: Option<InTrainingEval>,
     /// Embeds the instructions.
-    pub embedder: SharedEmbedder,
+    pub(crate) embedder: SharedEmbedder,
     /// The name of the sentence encoder's folder.
-    pub sentence_encoder: String,
+    pub(crate) sentence_encoder: String,
     /// Where to compute.
-    pub device: Device,
+    pub(crate) device: Device,
 }
 
 impl Pretraining {

@@ -16,11 +16,11 @@ const CHUNK: usize = 256;
 
 /// What items are conditioned on, by their texts.
 pub(super) struct Texts {
-    pub conditioning: ConditioningTable,
+    pub(crate) conditioning: ConditioningTable,
     /// Pairs of texts to chain, where they are drawn beforehand.
-    pub pool: Option<ChainingPool>,
+    pub(crate) pool: Option<ChainingPool>,
     /// The words that the agent knows, where it reads words.
-    pub vocabulary: Option<Vocabulary>,
+    pub(crate) vocabulary: Option<Vocabulary>,
 }
 
 /// Embeds every text of the items; nothing when it was stopped.

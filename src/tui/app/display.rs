@@ -25,35 +25,35 @@ pub struct Graphics {
 /// What is known of the terminal.
 pub struct TerminalState {
     /// Its size in character cells.
-    pub size: Size,
+    pub(crate) size: Size,
     /// What it can show.
-    pub ability: Ability,
+    pub(crate) ability: Ability,
     /// How it shows pictures.
-    pub graphics: Graphics,
+    pub(crate) graphics: Graphics,
     /// Its mouse is heard.
-    pub mouse: bool,
+    pub(crate) mouse: bool,
 }
 
 /// The frame as it is shown.
 #[derive(Default)]
 pub struct FrameState {
     /// The frame, encoded.
-    pub picture: Option<Picture>,
+    pub(crate) picture: Option<Picture>,
     /// The letters of the scene's classes.
-    pub letters: Arc<Letters>,
+    pub(crate) letters: Arc<Letters>,
     /// The classes of the instances in the frame.
-    pub names: Arc<Names>,
+    pub(crate) names: Arc<Names>,
 }
 
 /// What pictures cost on the wire, in bytes.
 #[derive(Default)]
 pub struct Traffic {
     /// The most that a step may cost.
-    pub limit: Option<u64>,
+    pub(crate) limit: Option<u64>,
     /// How coarse pictures are to keep to that.
-    pub coarseness: u8,
+    pub(crate) coarseness: u8,
     /// What the newest step cost.
-    pub of_step: Option<u64>,
+    pub(crate) of_step: Option<u64>,
     /// What a second cost, over the last while.
-    pub of_second: Option<u64>,
+    pub(crate) of_second: Option<u64>,
 }

@@ -4,24 +4,24 @@ use crate::tui::editor::Editor;
 use crate::tui::keys::Mode;
 
 /// What keys mean at the moment, and what was typed.
-pub struct InputState {
+pub(crate) struct InputState {
     /// What keys mean.
-    pub mode: Mode,
+    pub(crate) mode: Mode,
     /// What keys meant before typing or help.
-    pub under: Mode,
+    pub(crate) under: Mode,
     /// The instruction line while somebody types.
-    pub editor: Editor,
+    pub(crate) editor: Editor,
     /// The line of a verb while somebody types.
-    pub palette: Editor,
+    pub(crate) palette: Editor,
     /// The verb of the palette's list that is selected.
-    pub selected_verb: usize,
+    pub(crate) selected_verb: usize,
     /// Nobody has explored here before: the last row says how to begin.
-    pub newcomer: bool,
+    pub(crate) newcomer: bool,
 }
 
 impl InputState {
     /// A policy acts at first, or a person.
-    pub fn new(manual: bool) -> InputState {
+    pub(crate) fn new(manual: bool) -> InputState {
         let mode = if manual { Mode::Manual } else { Mode::Watch };
         InputState {
             mode,
@@ -34,12 +34,12 @@ impl InputState {
     }
 
     /// Whether a person acts.
-    pub fn by_hand(&self) -> bool {
+    pub(crate) fn by_hand(&self) -> bool {
         self.mode == Mode::Manual || (self.mode != Mode::Watch && self.under == Mode::Manual)
     }
 
     /// Opens a line or list over the screen; what keys meant before comes back when it closes.
-    pub fn open(&mut self, mode: Mode) {
+    pub(crate) fn open(&mut self, mode: Mode) {
         if matches!(self.mode, Mode::Watch | Mode::Manual) {
             self.under = self.mode;
         }
@@ -47,7 +47,7 @@ impl InputState {
     }
 
     /// Closes what was opened.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.mode = self.under;
     }
 }

@@ -6,11 +6,11 @@ mod pages;
 mod session_state;
 
 pub use display::{FrameState, Graphics, TerminalState, Traffic};
-pub use input::InputState;
-pub use pages::{
+pub(crate) use input::InputState;
+pub(crate) use pages::{
     BranchesPageState, ChainPageState, ComparePageState, MainPageState, MindPageState, ValueMapState, WorldPageState,
 };
-pub use session_state::SessionState;
+pub(crate) use session_state::SessionState;
 
 use ratatui::layout::{Rect, Size};
 
@@ -32,37 +32,37 @@ const NAMED: u16 = 60;
 /// Everything that the screen shows.
 pub struct App {
     /// The terminal: size, colours, pictures, mouse.
-    pub terminal: TerminalState,
+    pub(crate) terminal: TerminalState,
     /// What a person has set.
-    pub config: ExplorerConfig,
+    pub(crate) config: ExplorerConfig,
     /// What keys mean, and what was typed.
-    pub input: InputState,
+    pub(crate) input: InputState,
     /// What was last told of the session.
-    pub session: SessionState,
+    pub(crate) session: SessionState,
     /// The page that is shown.
-    pub page: ExplorerPage,
+    pub(crate) page: ExplorerPage,
     /// The main page.
-    pub main: MainPageState,
+    pub(crate) main: MainPageState,
     /// The page of branches.
-    pub branches: BranchesPageState,
+    pub(crate) branches: BranchesPageState,
     /// The page of the policy's choices.
-    pub mind: MindPageState,
+    pub(crate) mind: MindPageState,
     /// The page of the house.
-    pub world: WorldPageState,
+    pub(crate) world: WorldPageState,
     /// The page of two instructions.
-    pub compare: ComparePageState,
+    pub(crate) compare: ComparePageState,
     /// The page of a chain.
-    pub chain: ChainPageState,
+    pub(crate) chain: ChainPageState,
     /// The values on the map.
-    pub value_map: ValueMapState,
+    pub(crate) value_map: ValueMapState,
     /// The frame as it was encoded last.
-    pub frame: FrameState,
+    pub(crate) frame: FrameState,
     /// What pictures cost.
-    pub traffic: Traffic,
+    pub(crate) traffic: Traffic,
     /// What happened, for the log panel.
-    pub log: EventLog,
+    pub(crate) log: EventLog,
     /// What was noted since the last key.
-    pub notice: Option<LogEntry>,
+    pub(crate) notice: Option<LogEntry>,
 }
 
 impl App {
@@ -89,7 +89,7 @@ impl App {
     }
 
     /// Forgets what belonged to the house before.
-    pub fn enter_episode(&mut self) {
+    pub(crate) fn enter_episode(&mut self) {
         self.branches.divergence = None;
         self.compare = ComparePageState { selected: self.compare.selected, ..ComparePageState::default() };
         self.chain = ChainPageState { selected: self.chain.selected, ..ChainPageState::default() };
@@ -97,7 +97,7 @@ impl App {
     }
 
     /// The line of the present page's list that is selected.
-    pub fn selected(&self) -> usize {
+    pub(crate) fn selected(&self) -> usize {
         match self.page {
             ExplorerPage::Main => 0,
             ExplorerPage::Branches => self.branches.selected,
@@ -109,7 +109,7 @@ impl App {
     }
 
     /// Selects a line of the present page's list.
-    pub fn select(&mut self, line: usize) {
+    pub(crate) fn select(&mut self, line: usize) {
         match self.page {
             ExplorerPage::Main => {}
             ExplorerPage::Branches => self.branches.selected = line,
@@ -121,12 +121,12 @@ impl App {
     }
 
     /// Where everything is.
-    pub fn layout(&self) -> Option<ScreenLayout> {
+    pub(crate) fn layout(&self) -> Option<ScreenLayout> {
         ScreenLayout::of(Rect::from((ratatui::layout::Position::ORIGIN, self.terminal.size)))
     }
 
     /// The character cells that the picture fills, where the page has one.
-    pub fn picture_area(&self) -> Option<Rect> {
+    pub(crate) fn picture_area(&self) -> Option<Rect> {
         let layout = self.layout()?;
         match self.page {
             ExplorerPage::Main => {
@@ -141,20 +141,20 @@ impl App {
     }
 
     /// The interactions on the present page, numbered from 1.
-    pub fn page_of_candidates(&self) -> &[Candidate] {
+    pub(crate) fn page_of_candidates(&self) -> &[Candidate] {
         let Some(now) = &self.session.now else { return &[] };
         let size = self.layout().map_or(9, |layout| layout.interactions()).max(1);
         now.candidates.chunks(size).nth(self.main.interactions).unwrap_or(&[])
     }
 
     /// How many pages of interactions there are.
-    pub fn pages(&self) -> usize {
+    pub(crate) fn pages(&self) -> usize {
         let size = self.layout().map_or(9, |layout| layout.interactions()).max(1);
         self.session.now.as_ref().map_or(0, |now| now.candidates.len().div_ceil(size))
     }
 
     /// How many rows the list of the present page has.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         let Some(now) = &self.session.now else { return 0 };
         match self.page {
             ExplorerPage::Branches => now.time.branches.len(),
@@ -167,7 +167,7 @@ impl App {
     }
 
     /// The frame to be encoded, as things stand.
-    pub fn job(&self) -> Option<Job> {
+    pub(crate) fn job(&self) -> Option<Job> {
         let now = self.session.now.as_ref()?;
         let cells = self.picture_area()?.as_size();
         let pair = self.branches.divergence.as_ref().and_then(|divergence| divergence.frames.as_ref());
@@ -218,7 +218,7 @@ impl App {
     }
 
     /// Adds a line to the log, and shows it on pages without one until the next key.
-    pub fn note(&mut self, tone: Tone, text: impl Into<String>) {
+    pub(crate) fn note(&mut self, tone: Tone, text: impl Into<String>) {
         let step = self.session.now.as_ref().map(|now| now.step);
         let entry = LogEntry { step, text: text.into(), outcome: String::new(), tone };
         self.notice = Some(entry.clone());

@@ -11,70 +11,70 @@ use crate::explore::timeline::Divergence;
 use crate::tui::graphics::overlay::Overlay;
 
 /// The main page: all panels.
-pub struct MainPageState {
+pub(crate) struct MainPageState {
     /// What the frame's panel shows.
-    pub overlay: Overlay,
+    pub(crate) overlay: Overlay,
     /// Numbers are drawn into the picture.
-    pub numbers: bool,
+    pub(crate) numbers: bool,
     /// Which page of the interactions is shown, from 0.
-    pub interactions: usize,
+    pub(crate) interactions: usize,
 }
 
 /// The page of branches.
 #[derive(Default)]
-pub struct BranchesPageState {
+pub(crate) struct BranchesPageState {
     /// The branch that is selected.
-    pub selected: usize,
+    pub(crate) selected: usize,
     /// How it and the one in hand part, where that was asked for.
-    pub divergence: Option<Divergence>,
+    pub(crate) divergence: Option<Divergence>,
 }
 
 /// The page of the policy's choices.
-pub struct MindPageState {
+pub(crate) struct MindPageState {
     /// The first choice that is wanted in sight.
-    pub selected: usize,
+    pub(crate) selected: usize,
     /// How they are sorted.
-    pub sort: Sort,
+    pub(crate) sort: Sort,
 }
 
 /// The page of the house.
 #[derive(Default)]
-pub struct WorldPageState {
+pub(crate) struct WorldPageState {
     /// The thing that is selected.
-    pub selected: usize,
+    pub(crate) selected: usize,
 }
 
 /// The page of two instructions.
 #[derive(Default)]
-pub struct ComparePageState {
+pub(crate) struct ComparePageState {
     /// The first choice that is wanted in sight.
-    pub selected: usize,
+    pub(crate) selected: usize,
     /// Two instructions in one state.
-    pub contrast: Option<Contrast>,
+    pub(crate) contrast: Option<Contrast>,
     /// In which state that was: the branch and the step.
-    pub state: Option<(usize, u32)>,
+    pub(crate) state: Option<(usize, u32)>,
 }
 
 /// The page of a chain.
 #[derive(Default)]
-pub struct ChainPageState {
+pub(crate) struct ChainPageState {
     /// The link that is selected.
-    pub selected: usize,
+    pub(crate) selected: usize,
     /// The chain that is followed.
-    pub own: Option<ChainReport>,
+    pub(crate) own: Option<ChainReport>,
     /// The same chain followed by another policy.
-    pub rival: Option<ChainReport>,
+    pub(crate) rival: Option<ChainReport>,
 }
 
 /// The values of the cells, on the maps of two pages.
 #[derive(Default)]
-pub struct ValueMapState {
+pub(crate) struct ValueMapState {
     /// They are painted.
-    pub is_painted: bool,
+    pub(crate) is_painted: bool,
     /// The values, and the step of the house that they are for.
-    pub map: Option<(Arc<ValueMap>, u32)>,
+    pub(crate) map: Option<(Arc<ValueMap>, u32)>,
     /// The heading whose values are painted; the best without one.
-    pub heading: Option<Heading>,
+    pub(crate) heading: Option<Heading>,
 }
 
 impl Default for MainPageState {
@@ -91,7 +91,7 @@ impl Default for MindPageState {
 
 impl ChainPageState {
     /// Takes in a chain: in the place of what the same policy made of it, or beside what another one did.
-    pub fn take_in(&mut self, report: ChainReport) {
+    pub(crate) fn take_in(&mut self, report: ChainReport) {
         match &self.own {
             Some(known) if known.is_same_chain(&report) && known.who != report.who => self.rival = Some(report),
             _ => {
@@ -104,18 +104,18 @@ impl ChainPageState {
 
 impl ValueMapState {
     /// Paints values, or ends that; what was painted is of another time.
-    pub fn toggle(&mut self) {
+    pub(crate) fn toggle(&mut self) {
         self.is_painted = !self.is_painted;
         self.map = None;
     }
 
     /// The map, where it is painted.
-    pub fn painted(&self) -> Option<&(Arc<ValueMap>, u32)> {
+    pub(crate) fn painted(&self) -> Option<&(Arc<ValueMap>, u32)> {
         self.map.as_ref().filter(|_| self.is_painted)
     }
 
     /// The heading after this one: the best, then north and around.
-    pub fn next_heading(&self) -> Option<Heading> {
+    pub(crate) fn next_heading(&self) -> Option<Heading> {
         match self.heading {
             None => Some(Heading::North),
             Some(Heading::West) => None,

@@ -6,34 +6,34 @@ use crate::explore::exploration::Snapshot;
 use crate::explore::session::{RunMode, StepRate};
 
 /// What was last told of the session.
-pub struct SessionState {
+pub(crate) struct SessionState {
     /// The newest state.
-    pub now: Option<Box<Snapshot>>,
+    pub(crate) now: Option<Box<Snapshot>>,
     /// What the policy would do next, and that in words.
-    pub decision: Option<(Decision, String)>,
+    pub(crate) decision: Option<(Decision, String)>,
     /// What its critics say of the present state.
-    pub values: Option<Values>,
+    pub(crate) values: Option<Values>,
     /// The kind of policy that decides, or was asked to.
-    pub policy: PolicyKind,
+    pub(crate) policy: PolicyKind,
     /// How it goes on by itself, if it does.
-    pub run_mode: Option<RunMode>,
+    pub(crate) run_mode: Option<RunMode>,
     /// How fast it does.
-    pub rate: StepRate,
+    pub(crate) rate: StepRate,
     /// Something slow goes on.
-    pub busy: Option<String>,
+    pub(crate) busy: Option<String>,
     /// Work in the background.
-    pub working: Option<String>,
+    pub(crate) working: Option<String>,
     /// Why the policy cannot go on.
-    pub trouble: Option<String>,
+    pub(crate) trouble: Option<String>,
     /// Instructions that make sense in this house.
-    pub examples: Vec<String>,
+    pub(crate) examples: Vec<String>,
     /// What the agent was told before the present instruction.
-    pub replaced: Option<String>,
+    pub(crate) replaced: Option<String>,
 }
 
 impl SessionState {
     /// Nothing was told yet.
-    pub fn new(policy: PolicyKind) -> SessionState {
+    pub(crate) fn new(policy: PolicyKind) -> SessionState {
         SessionState {
             now: None,
             decision: None,
@@ -50,13 +50,13 @@ impl SessionState {
     }
 
     /// What acts is called: a checkpoint's name, where one is loaded.
-    pub fn acts(&self) -> &str {
+    pub(crate) fn acts(&self) -> &str {
         let loaded = self.now.as_ref().filter(|now| now.policy == self.policy).map(|now| now.acts.as_str());
         loaded.unwrap_or_else(|| self.policy.name())
     }
 
     /// Another policy was asked for.
-    pub fn choose(&mut self, policy: PolicyKind) {
+    pub(crate) fn choose(&mut self, policy: PolicyKind) {
         self.policy = policy;
         self.decision = None;
         self.trouble = None;

@@ -25,7 +25,7 @@ type Rgb = [u8; 3];
 const FLAT: u32 = 3 * 12 * 12;
 
 /// One styled character a cell, row by row, with the labels over them.
-pub fn draw(job: &Job) -> Vec<(char, Style)> {
+pub(crate) fn draw(job: &Job) -> Vec<(char, Style)> {
     let (columns, rows) = (usize::from(job.cells.width), usize::from(job.cells.height));
     let quarters = shrink(job, 2 * columns, 2 * rows);
     let mut cells: Vec<(char, Style)> = Vec::with_capacity(columns * rows);

@@ -11,7 +11,7 @@ use crate::house::view::decode;
 const HALF_VIEW: f32 = 0.577_350_3;
 
 /// One character a cell, row by row; the last rows name the letters that occur.
-pub fn draw(job: &Job) -> Vec<(char, Style)> {
+pub(crate) fn draw(job: &Job) -> Vec<(char, Style)> {
     let (columns, rows) = (usize::from(job.cells.width), usize::from(job.cells.height));
     let frame = &job.frame;
     let mut cells = Vec::with_capacity(columns * rows);

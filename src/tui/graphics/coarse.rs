@@ -5,10 +5,10 @@ use std::sync::Arc;
 use crate::house::view::Frame;
 
 /// The coarsest that pictures get.
-pub const COARSEST: u8 = 3;
+pub(crate) const COARSEST: u8 = 3;
 
 /// The frame with pixels of 1, 2, 4 or 8, and with fewer colours from the first step on.
-pub fn coarse(frame: Arc<Frame>, coarseness: u8) -> Arc<Frame> {
+pub(crate) fn coarse(frame: Arc<Frame>, coarseness: u8) -> Arc<Frame> {
     if coarseness == 0 {
         return frame;
     }

@@ -13,7 +13,7 @@ use super::Protocol;
 use crate::data::json;
 
 /// The likeliest protocol and why, given the environment's variables.
-pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
+pub(crate) fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
     let get = |name: &str| variable(name).filter(|value| !value.is_empty());
     let term = get("TERM").unwrap_or_default();
     let program = get("TERM_PROGRAM").unwrap_or_default();
@@ -60,7 +60,7 @@ pub fn guess(variable: impl Fn(&str) -> Option<String>) -> (Protocol, String) {
 }
 
 /// Whether characters beyond ASCII may be sent: the locale does not say otherwise.
-pub fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
+pub(crate) fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
     let get = |name: &str| variable(name).filter(|value| !value.is_empty());
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(get).unwrap_or_default();
     let dumb = get("TERM").is_none_or(|term| term == "dumb");
@@ -68,7 +68,7 @@ pub fn shows_unicode(variable: impl Fn(&str) -> Option<String>) -> bool {
 }
 
 /// The reason for half-blocks where nothing tells the terminal apart.
-pub const UNKNOWN: &str = "no sign of picture support";
+pub(crate) const UNKNOWN: &str = "no sign of picture support";
 
 /// What terminals answered, by their names.
 #[derive(Default, Serialize, Deserialize)]
@@ -80,7 +80,7 @@ struct Answers {
 
 /// What a terminal of that name answered before; `ask`s it only the first time. A memory that cannot be read or written is
 /// passed over.
-pub fn remembered(memory: Option<&Path>, name: &str, ask: impl FnOnce() -> bool) -> bool {
+pub(crate) fn remembered(memory: Option<&Path>, name: &str, ask: impl FnOnce() -> bool) -> bool {
     let Some(path) = memory else { return ask() };
     let mut answers = json::read::<Answers>(path, 1).map(|found| found.value).unwrap_or_default();
     if let Some(&known) = answers.has_sixel.get(name) {
@@ -100,7 +100,7 @@ pub fn remembered(memory: Option<&Path>, name: &str, ask: impl FnOnce() -> bool)
 ///
 /// # Errors
 /// When the terminal cannot be written or read.
-pub fn has_sixel(patience: Duration) -> std::io::Result<bool> {
+pub(crate) fn has_sixel(patience: Duration) -> std::io::Result<bool> {
     let mut out = std::io::stdout();
     out.write_all(b"\x1b[c")?;
     out.flush()?;

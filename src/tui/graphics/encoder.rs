@@ -36,7 +36,7 @@ impl PictureEncoder {
     }
 
     /// Leaves a frame to be encoded, in place of one that still waits.
-    pub fn submit(&self, job: Job) {
+    pub(crate) fn submit(&self, job: Job) {
         let (slot, filled) = &*self.slot;
         slot.lock().unwrap_or_else(PoisonError::into_inner).job = Some(job);
         filled.notify_one();

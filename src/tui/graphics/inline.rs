@@ -9,13 +9,13 @@ use super::job::Job;
 use super::labels::over_pixels;
 
 /// The number under which kitty keeps the frame; each new frame replaces the one before.
-pub const KITTY_ID: u8 = 83;
+pub(crate) const KITTY_ID: u8 = 83;
 /// The most that kitty takes in one piece of a transmission, in base64 characters.
 const PIECE: usize = 4096;
 
 /// Transmits the frame: in tmux with placeholders for this many cells, which it moves like any text; otherwise to be laid over
 /// cells by [`lay`], which older terminals know too. The terminal is told not to answer.
-pub fn kitty(job: &Job) -> String {
+pub(crate) fn kitty(job: &Job) -> String {
     let data = STANDARD.encode(png(job));
     let (columns, rows) = (job.cells.width, job.cells.height);
     let mut sequence = String::with_capacity(data.len() + 256);
@@ -32,7 +32,7 @@ pub fn kitty(job: &Job) -> String {
 }
 
 /// Lays the uppermost `pixels` rows of the transmitted frame over so many cells from the cursor on, which stays where it is.
-pub fn lay(columns: u16, rows: u16, pixels: usize) -> String {
+pub(crate) fn lay(columns: u16, rows: u16, pixels: usize) -> String {
     format!("\x1b_Ga=p,i={KITTY_ID},p=1,C=1,c={columns},r={rows},h={pixels},q=2\x1b\\")
 }
 
@@ -42,13 +42,13 @@ fn through_tmux(sequence: &str) -> String {
 }
 
 /// Makes kitty forget the frame.
-pub fn kitty_forget(in_tmux: bool) -> String {
+pub(crate) fn kitty_forget(in_tmux: bool) -> String {
     let sequence = format!("\x1b_Ga=d,d=I,i={KITTY_ID},q=2\x1b\\");
     if in_tmux { through_tmux(&sequence) } else { sequence }
 }
 
 /// Draws the frame where the cursor is, in iTerm2's way.
-pub fn iterm2(job: &Job) -> String {
+pub(crate) fn iterm2(job: &Job) -> String {
     let data = png(job);
     let (columns, rows, size) = (job.cells.width, job.cells.height, data.len());
     let data = STANDARD.encode(data);

@@ -13,11 +13,11 @@ use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ThingLabel {
     /// Its edges in the frame: left, top, right, bottom, in pixels.
-    pub bounds: [u16; 4],
+    pub(crate) bounds: [u16; 4],
     /// The numbers of the interactions with it, and its name where there is room: `1`, or `1,4 mug`.
-    pub text: String,
+    pub(crate) text: String,
     /// The policy is about to act on it.
-    pub chosen: bool,
+    pub(crate) chosen: bool,
 }
 
 const PLAIN: RgbColour = [255, 255, 255];
@@ -29,7 +29,7 @@ fn colour(label: &ThingLabel) -> RgbColour {
 }
 
 /// Writes the labels over character cells, each in the middle of its thing.
-pub fn over_cells(labels: &[ThingLabel], frame: &Frame, size: Cells, cells: &mut [(char, Style)]) {
+pub(crate) fn over_cells(labels: &[ThingLabel], frame: &Frame, size: Cells, cells: &mut [(char, Style)]) {
     let (columns, rows) = (usize::from(size.width), usize::from(size.height));
     let (width, height) = (frame.width.max(1), frame.height.max(1));
     for label in labels {
@@ -50,7 +50,7 @@ pub fn over_cells(labels: &[ThingLabel], frame: &Frame, size: Cells, cells: &mut
 }
 
 /// Draws the labels into a copy of the frame's pixels: an outline for each thing, and its numbers on a plate.
-pub fn over_pixels(labels: &[ThingLabel], frame: &Frame) -> Vec<u8> {
+pub(crate) fn over_pixels(labels: &[ThingLabel], frame: &Frame) -> Vec<u8> {
     let mut pixmap = Pixmap { rgb: frame.rgb.clone(), width: frame.width, height: frame.height };
     for label in labels {
         let [left, top, right, bottom] = label.bounds.map(i32::from);

@@ -22,7 +22,7 @@ impl Letters {
     }
 
     /// The letter of a class.
-    pub fn letter(&self, class: Class) -> char {
+    pub(crate) fn letter(&self, class: Class) -> char {
         self.0.get(&class).copied().unwrap_or('?')
     }
 }
@@ -59,7 +59,7 @@ fn deal(
 }
 
 /// The class of every instance code that a frame may hold.
-pub type Names = HashMap<u16, Class>;
+pub(crate) type Names = HashMap<u16, Class>;
 
 /// The classes of all instances of a world.
 pub fn names(scene: &Scene, world: &World) -> Names {
@@ -69,7 +69,7 @@ pub fn names(scene: &Scene, world: &World) -> Names {
 }
 
 /// A terminal colour for a class, so that neighbours differ; the letter alone says it too.
-pub fn tint(class: Class) -> Color {
+pub(crate) fn tint(class: Class) -> Color {
     const TINTS: [Color; 11] = [
         Color::Red,
         Color::Green,
@@ -87,7 +87,7 @@ pub fn tint(class: Class) -> Color {
 }
 
 /// The classes in a frame with their letters, the largest first.
-pub fn legend(job_ids: &[u16], names: &Names, letters: &Letters) -> Vec<(char, Class)> {
+pub(crate) fn legend(job_ids: &[u16], names: &Names, letters: &Letters) -> Vec<(char, Class)> {
     let mut counts: BTreeMap<Class, u32> = BTreeMap::new();
     for class in job_ids.iter().filter_map(|id| names.get(id)) {
         *counts.entry(*class).or_default() += 1;

@@ -1,19 +1,19 @@
 //! Pictures in a terminal: which way, and the frame encoded that way. Encoding happens on a thread of its own.
 
-pub mod blocks;
+pub(crate) mod blocks;
 pub mod classes;
-pub mod coarse;
-pub mod detect;
+pub(crate) mod coarse;
+pub(crate) mod detect;
 pub mod encoder;
-pub mod inline;
+pub(crate) mod inline;
 mod job;
-pub mod labels;
+pub(crate) mod labels;
 pub mod letters;
 pub mod overlay;
 mod picture;
 mod placeholder;
 mod protocol;
-pub mod sixel;
+pub(crate) mod sixel;
 
 pub use job::Job;
 pub use picture::{Content, Picture};

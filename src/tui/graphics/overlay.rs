@@ -20,7 +20,7 @@ pub enum Overlay {
 
 impl Overlay {
     /// The next one, around.
-    pub fn next(self) -> Overlay {
+    pub(crate) fn next(self) -> Overlay {
         match self {
             Overlay::Colour => Overlay::Depth,
             Overlay::Depth => Overlay::Things,
@@ -30,7 +30,7 @@ impl Overlay {
     }
 
     /// What the panel is called then.
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Overlay::Colour => "Sees",
             Overlay::Depth => "Sees: depth",
@@ -44,7 +44,7 @@ impl Overlay {
 const FARTHEST: f32 = 5.0;
 
 /// What an overlay shows of a frame and those before it.
-pub fn shown(overlay: Overlay, frame: &Arc<Frame>, before: &[Arc<Frame>]) -> Arc<Frame> {
+pub(crate) fn shown(overlay: Overlay, frame: &Arc<Frame>, before: &[Arc<Frame>]) -> Arc<Frame> {
     match overlay {
         Overlay::Colour => frame.clone(),
         Overlay::Depth => painted(frame, |frame, at| {

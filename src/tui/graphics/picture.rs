@@ -15,11 +15,11 @@ use super::{blocks, classes, coarse, inline, overlay, placeholder, sixel};
 #[derive(Clone)]
 pub struct Picture {
     /// How it is encoded.
-    pub protocol: Protocol,
+    pub(crate) protocol: Protocol,
     /// The character cells that it fills.
-    pub cells: Size,
+    pub(crate) cells: Size,
     /// What is put on the screen.
-    pub content: Content,
+    pub(crate) content: Content,
 }
 
 /// What an encoded frame consists of.
@@ -53,7 +53,7 @@ impl Picture {
 
     /// Whether it lies over the cells, whatever is written there: what is opened over it has to be left out of its area, from
     /// some row down.
-    pub fn lies_over(&self) -> bool {
+    pub(crate) fn lies_over(&self) -> bool {
         matches!(self.content, Content::Laid(..))
     }
 }

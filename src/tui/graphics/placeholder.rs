@@ -1,7 +1,7 @@
 //! The characters that kitty replaces by pieces of a picture, numbered by combining marks.
 
 /// The placeholder character for one cell of the picture.
-pub fn placeholder(row: usize, column: usize) -> String {
+pub(crate) fn placeholder(row: usize, column: usize) -> String {
     let mark = |at: usize| MARKS.get(at).copied().unwrap_or(MARKS[MARKS.len() - 1]);
     [PLACEHOLDER, mark(row), mark(column)].iter().collect()
 }

@@ -17,7 +17,7 @@ pub enum Protocol {
 
 impl Protocol {
     /// Every protocol, in the order in which the key goes round.
-    pub const ALL: [Protocol; 5] =
+    pub(crate) const ALL: [Protocol; 5] =
         [Protocol::HalfBlocks, Protocol::Ascii, Protocol::Kitty, Protocol::Iterm2, Protocol::Sixel];
 
     /// The name that `--graphics` takes.
@@ -32,14 +32,14 @@ impl Protocol {
     }
 
     /// The next one, around.
-    pub fn next(self) -> Protocol {
+    pub(crate) fn next(self) -> Protocol {
         let at = Protocol::ALL.iter().position(|&protocol| protocol == self).unwrap_or(0);
         Protocol::ALL[(at + 1) % Protocol::ALL.len()]
     }
 
     /// Whether the picture is drawn by an escape sequence that the screen's own cells do not know of, so that covering and
     /// uncovering it needs a full repaint.
-    pub fn floats(self) -> bool {
+    pub(crate) fn floats(self) -> bool {
         matches!(self, Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel)
     }
 }

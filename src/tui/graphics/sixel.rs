@@ -18,14 +18,14 @@ const COLOURS: usize = CUBE + GREYS;
 const BAND: usize = 6;
 
 /// Draws the frame where the cursor is, scaled to the pixels of its cells.
-pub fn draw(job: &Job) -> String {
+pub(crate) fn draw(job: &Job) -> String {
     let (across, down) = (usize::from(job.cell_pixels.0.max(1)), usize::from(job.cell_pixels.1.max(1)));
     let (width, height) = (usize::from(job.cells.width) * across, usize::from(job.cells.height) * down);
     encode(&over_pixels(&job.labels, &job.frame), job.frame.width, job.frame.height, width, height)
 }
 
 /// Encodes pixels (three bytes each) of one size at another.
-pub fn encode(rgb: &[u8], from_width: usize, from_height: usize, width: usize, height: usize) -> String {
+pub(crate) fn encode(rgb: &[u8], from_width: usize, from_height: usize, width: usize, height: usize) -> String {
     let mut sequence = String::with_capacity(width * height / 4 + 8192);
     // Aspect 1:1, and what is not drawn stays as it is.
     let _ = write!(sequence, "\x1bP0;1;0q\"1;1;{width};{height}");

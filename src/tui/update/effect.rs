@@ -4,7 +4,7 @@ use crate::explore::session::SessionCommand;
 
 /// Something to be done about a message.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub(crate) enum Effect {
     /// Ask the session.
     Send(SessionCommand),
     /// Encode the frame again.

@@ -7,8 +7,8 @@ mod on_event;
 mod pages;
 mod pointer;
 
-pub use effect::{Effect, ExitReason};
-pub use on_action::on_action;
+pub(crate) use effect::{Effect, ExitReason};
+pub(crate) use on_action::on_action;
 
 use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
 use ratatui::layout::Size;
@@ -43,7 +43,7 @@ pub enum Msg {
 }
 
 /// Changes the state by one message.
-pub fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
+pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
         Msg::Mouse(event) => pointer::on_pointer(app, event),
@@ -113,7 +113,8 @@ mod tests {
     use crate::domain::{Action, ActionType};
     use crate::explore::exploration::StepTaken;
     use crate::explore::session::{RunMode, SessionCommand};
-    use crate::house::{Outcome, Reason};
+    use crate::house::Outcome;
+    use crate::house::outcome::Reason;
     use crate::tui::graphics::Protocol;
     use crate::tui::log::Tone;
     use crate::tui::testing;

@@ -14,7 +14,7 @@ use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
 
 /// Does what a person asked for.
-pub fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
+pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
     match verb {
         Verb::Ask(command) => ask(app, command),
         Verb::ToggleRun | Verb::Continue => run(app, verb == Verb::Continue),

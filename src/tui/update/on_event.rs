@@ -13,7 +13,7 @@ use crate::tui::graphics::letters::{self, Letters};
 use crate::tui::log::{LogEntry, Tone};
 
 /// Changes the state by what the session tells.
-pub fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
+pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
     match event {
         SessionEvent::State(snapshot) => {
             let new_episode = app.session.now.as_ref().is_none_or(|now| now.episode != snapshot.episode);

@@ -7,7 +7,7 @@ use crate::tui::app::App;
 use crate::tui::keys::Mode;
 
 /// Shows a page. Everything is drawn anew: pictures lie over the cells that change.
-pub fn turn_to(app: &mut App, page: ExplorerPage) -> Vec<Effect> {
+pub(crate) fn turn_to(app: &mut App, page: ExplorerPage) -> Vec<Effect> {
     if app.page == page {
         return vec![];
     }

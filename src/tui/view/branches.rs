@@ -14,7 +14,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The page: the tree of branches, and two of them side by side.
-pub struct BranchesView<'a>(pub &'a App);
+pub(crate) struct BranchesView<'a>(pub(crate) &'a App);
 
 impl Widget for BranchesView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

@@ -16,7 +16,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The page: every legal choice, curves over the branch, and the instruction as it is read.
-pub struct ChoicesView<'a>(pub &'a App);
+pub(crate) struct ChoicesView<'a>(pub(crate) &'a App);
 
 /// A number of a step, where there is one.
 type Curve<'a> = &'a dyn Fn(&TimelineStep) -> Option<f32>;

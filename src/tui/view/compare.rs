@@ -13,7 +13,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The page: two instructions and their distributions.
-pub struct CompareView<'a>(pub &'a App);
+pub(crate) struct CompareView<'a>(pub(crate) &'a App);
 
 /// Rows above the table: both instructions, values, and the scores.
 const HEAD: u16 = 8;

@@ -13,7 +13,7 @@ use crate::tui::graphics::{Protocol, letters};
 use crate::tui::theme::THEME;
 
 /// The panel with the picture.
-pub struct FramePanel<'a>(pub &'a App);
+pub(crate) struct FramePanel<'a>(pub(crate) &'a App);
 
 impl Widget for FramePanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

@@ -11,7 +11,7 @@ use crate::tui::keys::{self, Mode};
 use crate::tui::theme::THEME;
 
 /// The overlay with the keys.
-pub struct HelpOverlay<'a>(pub &'a App);
+pub(crate) struct HelpOverlay<'a>(pub(crate) &'a App);
 
 /// Columns that the names of keys take.
 const LABEL: usize = 9;

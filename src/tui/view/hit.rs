@@ -14,7 +14,7 @@ use crate::tui::app::App;
 use crate::tui::layout::ScreenLayout;
 
 /// What lies there.
-pub fn target_at(app: &App, at: Position) -> Option<Target> {
+pub(crate) fn target_at(app: &App, at: Position) -> Option<Target> {
     let layout = app.layout()?;
     if layout.time.contains(at) {
         return timeline::step_at(app, layout.time, at.x).map(Target::Step);

@@ -12,7 +12,7 @@ use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 
 /// The line with the instruction.
-pub struct InstructionRow<'a>(pub &'a App);
+pub(crate) struct InstructionRow<'a>(pub(crate) &'a App);
 
 impl Widget for InstructionRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

@@ -12,7 +12,7 @@ use crate::tui::log::{LogEntry, Tone};
 use crate::tui::theme::THEME;
 
 /// The panel with the events.
-pub struct LogPanel<'a>(pub &'a App);
+pub(crate) struct LogPanel<'a>(pub(crate) &'a App);
 
 impl Widget for LogPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

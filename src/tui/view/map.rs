@@ -18,7 +18,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with the floor plan.
-pub struct MapPanel<'a>(pub &'a App);
+pub(crate) struct MapPanel<'a>(pub(crate) &'a App);
 
 /// The side of the smallest square that is drawn, in millimetres.
 const FINEST: i32 = 50;

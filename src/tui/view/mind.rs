@@ -15,7 +15,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with the distribution.
-pub struct MindPanel<'a>(pub &'a App);
+pub(crate) struct MindPanel<'a>(pub(crate) &'a App);
 
 /// Columns that the object classes get where there is room beside the actions.
 const OBJECTS: u16 = 26;

@@ -12,7 +12,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The list, at the foot of an area.
-pub struct PaletteOverlay<'a>(pub &'a App);
+pub(crate) struct PaletteOverlay<'a>(pub(crate) &'a App);
 
 /// Verbs that are listed at a time.
 const ROWS: u16 = 12;

@@ -12,7 +12,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with hand and interactions.
-pub struct ReachPanel<'a>(pub &'a App);
+pub(crate) struct ReachPanel<'a>(pub(crate) &'a App);
 
 impl Widget for ReachPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

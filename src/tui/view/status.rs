@@ -15,7 +15,7 @@ use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
 
 /// The first row.
-pub struct HeaderRow<'a>(pub &'a App);
+pub(crate) struct HeaderRow<'a>(pub(crate) &'a App);
 
 impl Widget for HeaderRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
@@ -91,7 +91,7 @@ fn pictures(app: &App, room: usize) -> String {
 }
 
 /// The last row.
-pub struct StatusRow<'a>(pub &'a App);
+pub(crate) struct StatusRow<'a>(pub(crate) &'a App);
 
 impl Widget for StatusRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

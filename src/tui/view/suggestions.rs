@@ -11,7 +11,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The list, at the foot of an area.
-pub struct SuggestionsOverlay<'a>(pub &'a App);
+pub(crate) struct SuggestionsOverlay<'a>(pub(crate) &'a App);
 
 /// Instructions that are listed at a time.
 const ROWS: u16 = 8;

@@ -4,7 +4,7 @@ use crate::domain::{Cell, Instance};
 
 /// Something on the screen that can be picked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
+pub(crate) enum Target {
     /// The interaction of that number, from 1.
     Candidate(u8),
     /// A step, on the timeline or in the log.

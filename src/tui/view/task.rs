@@ -11,7 +11,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The panel with the subtasks.
-pub struct TaskPanel<'a>(pub &'a App);
+pub(crate) struct TaskPanel<'a>(pub(crate) &'a App);
 
 impl Widget for TaskPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

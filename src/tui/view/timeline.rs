@@ -13,7 +13,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The row with the timeline.
-pub struct TimelineRow<'a>(pub &'a App);
+pub(crate) struct TimelineRow<'a>(pub(crate) &'a App);
 
 impl Widget for TimelineRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {

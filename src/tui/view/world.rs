@@ -13,7 +13,7 @@ use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
 /// The page: the floor plan, and every thing with what can be done to it.
-pub struct WorldView<'a>(pub &'a App);
+pub(crate) struct WorldView<'a>(pub(crate) &'a App);
 
 /// Rows that the details of the selected thing take.
 const DETAILS: u16 = 7;

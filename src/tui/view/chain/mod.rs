@@ -23,7 +23,7 @@ const LINK: u16 = 6;
 const SHOWN: u16 = 4;
 
 /// The page: links, their values over time, and the selected link.
-pub struct ChainView<'a>(pub &'a App);
+pub(crate) struct ChainView<'a>(pub(crate) &'a App);
 
 impl Widget for ChainView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
