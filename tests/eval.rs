@@ -20,7 +20,7 @@ fn the_expert_completes_every_sampled_task() {
     let on_disk: Value = serde_json::from_str(&sprint.read("run/summary.json")).unwrap();
     assert_eq!(on_disk, summary);
     let manifest: Value = serde_json::from_str(&sprint.read("run/manifest.json")).unwrap();
-    assert_eq!(manifest["format_version"], 1);
+    assert_eq!(manifest["format_version"], 2);
     assert!(sprint.read("run/summary.md").contains("| success "));
     assert!(sprint.read("run/summary.csv").starts_with("group,measure,"));
     for line in sprint.read("run/episodes.jsonl").lines() {
