@@ -7,7 +7,7 @@
 //! | [`domain`] | the words of the program as plain data: classes, actions, scenes, worlds, skills, tasks, trajectories |
 //! | [`language`] | instruction text, the phrase grammar, summaries by rules |
 //! | [`house`] | the simulator: rules, sight, rendering, graders, the expert, generated houses |
-//! | [`env`] | the trait `Environment`, and House as the first one |
+//! | [`mod@env`] | the trait `Environment`, and House as the first one |
 //! | [`data`] | dataset folders, the ALFRED importer, task files, training items, labels, feature files |
 //! | [`nets`] | visual encoders, policy and critic, sentence encoders, strict weights files |
 //! | [`algo`] | behaviour cloning, IQL, chaining; the update, optimiser, learner |

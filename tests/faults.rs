@@ -103,7 +103,7 @@ fn no_result_depends_on_the_clock() {
         }
     }
     found.sort();
-    assert_eq!(found, ["src/cli/eval.rs", "src/explore/session/save.rs", "src/train/tensorboard.rs"]);
+    assert_eq!(found, ["src/cli/eval.rs", "src/explore/exploration/save.rs", "src/train/tensorboard.rs"]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use tch::{Kind, Tensor};
 
 use crate::nets::policy::Logits;
 
-/// −log π of each item's demonstration, both [n].
+/// −log π of each item's demonstration, both `[n]`.
 #[derive(Debug)]
 pub(crate) struct NegLogLikelihood {
     /// Cross-entropy of the action head.

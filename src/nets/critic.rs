@@ -146,7 +146,7 @@ impl Critic {
         }
     }
 
-    /// Q and V of a batch in training: `observation` [n, channels, 7, 7], `conditioning` as the policy's, `actions` and `objects` [n]
+    /// Q and V of a batch in training: `observation` [n, channels, 7, 7], `conditioning` as the policy's, `actions` and `objects` `[n]`
     /// (class indices, 0 for navigation).
     pub(crate) fn evaluate(
         &self,

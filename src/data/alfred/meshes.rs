@@ -43,7 +43,7 @@ pub(crate) fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
     sights.into_iter().map(|(name, sights)| fit(name, &sights, agent_y)).collect()
 }
 
-/// Pickups and slicings of objects that were not touched before. A drawer's contents slide with it: they are left out.
+/// Pickups and slices of objects that were not touched before. A drawer's contents slide with it: they are left out.
 fn first_touches(recording: &Recording) -> Vec<ObjectView<'_>> {
     let mut touched = vec![false; recording.setting.objects.len()];
     let mut sights = Vec::new();

@@ -22,6 +22,8 @@ use crate::tui::keys::Mode;
 use on_event::on_event;
 
 /// Something that happened.
+// Nearly all messages of a session are its events: a box for each would only cost.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone)]
 pub enum Msg {
     /// A key was pressed.
