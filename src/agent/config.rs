@@ -101,7 +101,6 @@ pub(crate) struct Provenance {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointConfig {
-    /// Version of this format.
     pub(crate) format_version: u32,
     /// The classes and actions of the heads.
     pub(crate) ontology: Ontology,
@@ -128,7 +127,6 @@ pub struct CheckpointConfig {
     /// How much the critic's advantages count when it decides, see [`AdvantageScale`]; absent where the policy decides alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) advantage_scale: Option<f32>,
-    /// The sentence encoder.
     pub(crate) sentence_encoder: SentenceSpec,
     /// How it was trained, and from what.
     pub(crate) provenance: Provenance,

@@ -46,7 +46,6 @@ pub struct Reading {
 /// What a policy carries from one step of an episode to the next. Restored, it decides as it did then, bit for bit.
 #[derive(Clone, Debug, Default)]
 pub enum PolicyState {
-    /// Nothing.
     #[default]
     Nothing,
     /// Its random numbers.

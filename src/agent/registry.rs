@@ -44,7 +44,6 @@ pub(crate) struct PolicyIdentity {
 
 /// A policy that acts, and what identifies it beside its name.
 pub(crate) struct Loaded {
-    /// The policy.
     pub(crate) policy: Box<dyn Policy>,
     /// SHA-256 of its checkpoint, where it has one.
     pub(crate) checkpoint: Option<String>,
@@ -57,7 +56,6 @@ pub(crate) type LoadAgent = Box<dyn Fn() -> anyhow::Result<Loaded>>;
 pub struct NamedAgent {
     /// The name of its checkpoint.
     pub(crate) name: String,
-    /// Loads it.
     pub(crate) load: LoadAgent,
 }
 

@@ -71,7 +71,6 @@ impl Values {
 /// x A) (Peng et al., 2019, equation 9), which a network of few updates is far from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdvantageScale<'a> {
-    /// The values.
     pub(crate) values: &'a Values,
     /// How much they count.
     pub(crate) weight: f32,

@@ -8,7 +8,6 @@ use tch::{Kind, Tensor, nn};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Iql {
-    /// γ.
     pub(crate) discount: f64,
     /// τ: which expectile of Q over the demonstrated actions V is.
     pub(crate) expectile: f64,

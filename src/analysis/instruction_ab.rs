@@ -10,7 +10,6 @@ use crate::language::instruction;
 /// One instruction in a state.
 #[derive(Clone, Debug)]
 pub(crate) struct Side {
-    /// The instruction.
     pub(crate) instruction: String,
     /// What the policy would do.
     pub(crate) decision: Decision,
@@ -34,9 +33,7 @@ pub struct Contrast {
 /// A choice under both instructions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Row {
-    /// What.
     pub(crate) kind: ActionType,
-    /// To what.
     pub(crate) class: Option<Class>,
     /// How likely it is under each.
     pub(crate) shares: [f32; 2],

@@ -19,7 +19,6 @@ pub(crate) enum Measure {
 }
 
 impl Measure {
-    /// In words.
     pub(crate) fn words(self) -> &'static str {
         match self {
             Measure::Value => "V",
@@ -27,7 +26,6 @@ impl Measure {
         }
     }
 
-    /// In a letter.
     pub(crate) fn letter(self) -> char {
         match self {
             Measure::Value => 'V',
@@ -36,10 +34,8 @@ impl Measure {
     }
 }
 
-/// One cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellValue {
-    /// Where.
     pub(crate) cell: Cell,
     /// The value looking each way, in the order of [`Heading::ALL`].
     pub(crate) values: [f32; 4],

@@ -20,7 +20,6 @@ const TRAJECTORIES: &str = "trajectories.jsonl.zst";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Counts {
-    /// Trajectories.
     pub(crate) trajectories: u64,
     /// Skills, once for each annotation of their trajectory.
     pub(crate) annotated_primitives: u64,
@@ -46,13 +45,11 @@ pub(crate) struct Skipped {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DatasetManifest {
-    /// Version of this format.
     pub(crate) format_version: u32,
     /// Where it came from: `alfred`, `generated`.
     pub(crate) source: String,
     /// Counts by split.
     pub(crate) counts: BTreeMap<String, Counts>,
-    /// How many scenes there are.
     pub(crate) scenes: u64,
     /// Trajectories of which the whole must not be trained on as one span.
     pub(crate) held_out: Vec<String>,

@@ -53,7 +53,6 @@ pub struct Features {
     width: usize,
 }
 
-/// The maps of one file.
 struct MapFile {
     file: File,
     path: PathBuf,

@@ -19,7 +19,6 @@ use crate::language::instruction;
 pub(crate) struct FrameSequence {
     /// Task, scene and result in a line.
     pub(crate) title: String,
-    /// Where it was.
     pub(crate) scene: Arc<Scene>,
     /// What the task asked, in words.
     pub(crate) subtasks: Vec<String>,

@@ -59,11 +59,9 @@ impl Verdict {
 pub(crate) struct Difference {
     /// Which episode of the run, from 1.
     pub(crate) episode: usize,
-    /// Its task.
     pub(crate) task: String,
     /// At which step, from 1; 0 for the start or the whole.
     pub(crate) step: u32,
-    /// Of what.
     pub(crate) what: &'static str,
     /// What the run says.
     pub(crate) recorded: String,

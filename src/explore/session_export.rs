@@ -25,7 +25,6 @@ use crate::run_dir::writer::RunWriter;
 /// The tasks and episodes of an exploration, a branch each.
 #[derive(Clone, Debug)]
 pub(crate) struct SessionExport {
-    /// Where it was.
     pub(crate) scene: Arc<Scene>,
     /// What was asked at the start, under each branch's name.
     pub(crate) tasks: Vec<Task>,

@@ -21,7 +21,6 @@ pub(crate) struct Timeline {
     pub(crate) branch: usize,
 }
 
-/// A step on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TimelineStep {
     /// What was done.

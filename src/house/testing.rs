@@ -24,7 +24,6 @@ pub(crate) fn kitchen() -> (Arc<Scene>, World) {
     (Arc::new(kitchen.scene), kitchen.world)
 }
 
-/// A house in that kitchen.
 pub(crate) fn kitchen_house() -> House {
     let (scene, world) = kitchen();
     House::new(scene, world)
@@ -56,7 +55,6 @@ pub(crate) fn subtask(skill: SkillKind, object: u8) -> Subtask {
     Subtask { skill, object, receptacle: None, closes: false, literal: None }
 }
 
-/// A Put.
 pub(crate) fn put_subtask(object: u8, receptacle: u8) -> Subtask {
     Subtask { receptacle: Some(receptacle), ..subtask(SkillKind::Put, object) }
 }

@@ -20,7 +20,6 @@ pub(crate) enum InstructionError {
     Control {
         /// Which character.
         code: u32,
-        /// Where, from 1.
         position: usize,
     },
 }

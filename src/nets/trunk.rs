@@ -126,10 +126,7 @@ impl DenseLayers {
 #[derive(Debug)]
 pub(crate) enum Conditioning {
     /// A sentence embedding of unit length.
-    Sentence {
-        /// Its width.
-        width: i64,
-    },
+    Sentence { width: i64 },
     /// Actionable Models: the stack of frames of the state to reach, seen by convolutions of its own.
     Goal {
         /// Convolutions over the goal's maps.

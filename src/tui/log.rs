@@ -5,9 +5,7 @@ use std::collections::VecDeque;
 /// How a line of the log is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tone {
-    /// It was done.
     Done,
-    /// It was impossible.
     Impossible,
     /// A subtask or the task is complete.
     Good,
@@ -20,7 +18,6 @@ pub(crate) enum Tone {
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct LogEntry {
-    /// At which step.
     pub(crate) step: Option<u32>,
     /// An action, or a sentence about what happened.
     pub(crate) text: String,

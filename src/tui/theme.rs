@@ -30,7 +30,6 @@ pub(crate) struct Theme {
     pub(crate) instruction: Style,
 }
 
-/// The one theme.
 pub(crate) const THEME: Theme = Theme {
     title: Style::new().fg(Color::Cyan).add_modifier(Modifier::BOLD),
     quiet: Style::new().fg(Color::DarkGray),
@@ -95,7 +94,6 @@ impl Scheme {
 /// What the terminal can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ability {
-    /// How many colours it has.
     pub(crate) colours: TermProfile,
     /// It shows characters beyond ASCII.
     pub(crate) unicode: bool,

@@ -14,7 +14,6 @@ use crate::house::grading::{Grader, Grading};
 pub(crate) struct LinkRate {
     /// Times it was done.
     pub(crate) done: u32,
-    /// Of how many.
     pub(crate) of: u32,
 }
 

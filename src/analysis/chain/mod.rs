@@ -20,7 +20,6 @@ use crate::house::grading::{Grader, Grading};
 /// A chain that can be followed from a state.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
-    /// Where.
     pub(crate) scene: Arc<Scene>,
     /// The state in which it begins.
     pub(crate) start: World,

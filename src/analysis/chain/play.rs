@@ -16,7 +16,6 @@ pub(crate) struct LinkOutcome {
     pub(crate) reached: bool,
     /// It was done; `None` where nobody grades it.
     pub(crate) done: Option<bool>,
-    /// Its steps.
     pub(crate) steps: u32,
     /// The state in which it began.
     pub(crate) entry: World,

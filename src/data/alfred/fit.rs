@@ -21,7 +21,6 @@ const FARTHEST: i32 = 900;
 /// Nothing is thinner than this, in millimetres.
 const THINNEST: i32 = 20;
 
-/// A view of a fixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FixtureView {
     pose: Pose,

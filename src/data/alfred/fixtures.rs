@@ -29,12 +29,10 @@ pub(crate) struct Use {
     pub(crate) open: bool,
 }
 
-/// A fixture as found.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FoundFixture {
     /// Its id.
     pub(crate) name: Name,
-    /// Its pivot.
     pub(crate) pivot: Point,
     /// The vetted pose for using it, from the layout files.
     pub(crate) vetted: Option<Pose>,

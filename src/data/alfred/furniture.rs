@@ -2,7 +2,6 @@
 
 use crate::domain::Class;
 
-/// From where a height is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum MeasuredHeight {
     /// Above the fixture's pivot, in millimetres.

@@ -29,7 +29,6 @@ pub struct RecordedStart {
 /// A movable object at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Placed {
-    /// Its class.
     pub(crate) class: Class,
     /// ALFRED's `objectName`: one mesh.
     pub(crate) mesh: String,
@@ -55,13 +54,11 @@ pub struct RecordedStep {
 /// One merged skill as planned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {
-    /// Its kind.
     pub(crate) kind: SkillKind,
     /// The object (Pickup, Put, Slice, Toggle), or the fixture (Clean, Heat, Cool).
     pub(crate) object: Name,
     /// For Put, the receptacle.
     pub(crate) receptacle: Option<Name>,
-    /// For Clean, what is cleaned.
     pub(crate) cleaned: Option<Name>,
     /// The object's first place to the millimetre.
     pub(crate) object_at: Option<(Class, Point)>,

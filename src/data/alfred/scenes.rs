@@ -13,7 +13,6 @@ use crate::domain::{Cell, Fixture, Room, Scene};
 /// A floor plan and what is needed to resolve recordings against it.
 #[derive(Clone, Debug)]
 pub(crate) struct Built {
-    /// The scene.
     pub(crate) scene: Scene,
     /// Names of its fixtures.
     pub(crate) inventory: Inventory,

@@ -28,7 +28,6 @@ pub(crate) struct StandingObject {
     pub(crate) at: Point,
     /// What stands there.
     pub(crate) class: Class,
-    /// The fixture.
     pub(crate) fixture: u16,
     /// How far from here things still count as standing in the same fixture.
     limit: f32,
@@ -39,7 +38,6 @@ pub(crate) struct StandingObject {
 pub(crate) enum Holder {
     /// None: it was taken from a receptacle that was shut, so it lies on or beside it.
     None,
-    /// A fixture.
     Fixture(u16),
     /// A movable object.
     Object(u16),

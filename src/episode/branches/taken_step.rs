@@ -5,7 +5,6 @@ use std::sync::Arc;
 use crate::agent::{Decision, Values};
 use crate::episode::record::{Author, TraceStep};
 
-/// A step that was taken.
 #[derive(Clone, Debug)]
 pub(crate) struct TakenStep {
     /// What was decided, and the distribution behind it.

@@ -126,7 +126,6 @@ impl Tree {
         line.into_iter().map(|place| (&self.twigs[place].moment, self.twigs[place].taken.as_ref())).collect()
     }
 
-    /// Every branch.
     pub(crate) fn branches(&self) -> &[Branch] {
         &self.branches
     }

@@ -68,7 +68,6 @@ impl Jobs {
     }
 }
 
-/// What is worked on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
     ValueMap,

@@ -25,7 +25,6 @@ pub(crate) struct Wall {
     pub(crate) length: i32,
 }
 
-/// The floor of a room.
 #[derive(Clone, Debug)]
 pub(crate) struct RoomFloor {
     /// The walls, anticlockwise.
@@ -77,7 +76,6 @@ impl RoomFloor {
         &self.cells
     }
 
-    /// The bodies of the walls.
     pub(crate) fn wall_bodies(&self) -> Vec<Cuboid> {
         let count = self.walls.len();
         let body = |(index, wall): (usize, &Wall)| {

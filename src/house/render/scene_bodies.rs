@@ -23,7 +23,6 @@ pub(crate) struct Figure {
     pub(crate) solids: Vec<Solid>,
     /// The middle of the ball, in metres.
     pub(crate) centre: Vec3,
-    /// Its radius.
     pub(crate) radius: f32,
     /// How far it comes forward where it meets others, in metres.
     pub(crate) forward: f32,
@@ -60,7 +59,6 @@ pub(crate) struct SceneBodies {
     known: Option<SceneGeometry>,
     states: Vec<FixtureState>,
     objects: Vec<Object>,
-    /// The walls.
     pub(crate) walls: Figure,
     /// One for each fixture.
     pub(crate) fixtures: Vec<Figure>,

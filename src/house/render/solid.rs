@@ -11,7 +11,6 @@ pub(crate) type RgbF32 = [f32; 3];
 /// The outline that a round body turns about its y axis: rings of (height, radius) from bottom to top, each from -1 or 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lathe {
-    /// The rings.
     pub(crate) rings: &'static [[f32; 2]],
     /// The top is open and one looks inside.
     pub(crate) hollow: bool,
@@ -27,7 +26,6 @@ pub(crate) enum SolidKind {
     },
     /// A body of revolution.
     Lathe(Lathe),
-    /// An ellipsoid.
     Ellipsoid,
 }
 

@@ -17,7 +17,6 @@ use crate::nets::visual::VisualSpec;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Preset {
-    /// Version of this format.
     pub(crate) format_version: u32,
     /// The method's name in cards and reports.
     pub name: String,

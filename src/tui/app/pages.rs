@@ -20,7 +20,6 @@ pub(crate) struct MainPageState {
     pub(crate) interactions: usize,
 }
 
-/// The page of branches.
 #[derive(Default)]
 pub(crate) struct BranchesPageState {
     /// The branch that is selected.
@@ -55,7 +54,6 @@ pub(crate) struct ComparePageState {
     pub(crate) state: Option<(usize, u32)>,
 }
 
-/// The page of a chain.
 #[derive(Default)]
 pub(crate) struct ChainPageState {
     /// The link that is selected.

@@ -28,7 +28,6 @@ pub(super) struct FurniturePiece {
     pub(super) fixture: u16,
 }
 
-/// What is where on the floor.
 pub(super) struct FloorPlan<'a> {
     pub(super) now: &'a Snapshot,
     /// The share of each cell's value, where values are painted.

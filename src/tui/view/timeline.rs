@@ -12,7 +12,6 @@ use crate::explore::timeline::{Timeline, TimelineStep};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
-/// The row with the timeline.
 pub(crate) struct TimelineRow<'a>(pub(crate) &'a App);
 
 impl Widget for TimelineRow<'_> {
