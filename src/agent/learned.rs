@@ -35,7 +35,7 @@ pub(crate) struct LearnedPolicy {
 }
 
 /// What the networks take of a slot: an observation [1, history x features, 7, 7], and what conditions it.
-struct Inputs {
+struct PolicyInputs {
     observation: Tensor,
     conditioning: Tensor,
 }
@@ -75,7 +75,7 @@ impl LearnedPolicy {
         Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
     }
 
-    fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Inputs> {
+    fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<PolicyInputs> {
         let image = self.encoder.image(here.environment.frame()?);
         let slots = self.slots.len();
         let history = self.slots.get_mut(slot).with_context(|| format!("there are {slots} slots, not {slot}"))?;
@@ -85,12 +85,12 @@ impl LearnedPolicy {
         let observation = history.observe(map, here.step, self.config.policy.history as usize);
         let instruction = here.instruction;
         let condition = || conditioning::of(here, &self.config, &*self.encoder, &self.sentences, self.device);
-        Ok(Inputs { observation, conditioning: history.conditioning(instruction, condition)? })
+        Ok(PolicyInputs { observation, conditioning: history.conditioning(instruction, condition)? })
     }
 
-    fn blank(&self) -> Inputs {
+    fn blank(&self) -> PolicyInputs {
         let channels = self.config.policy.history * self.config.features();
-        Inputs {
+        PolicyInputs {
             observation: Tensor::zeros([1, channels, SIDE, SIDE], (Kind::Float, self.device)),
             conditioning: conditioning::blank(&self.config, self.device),
         }
@@ -100,7 +100,7 @@ impl LearnedPolicy {
         &mut self,
         slot: usize,
         here: &mut Observation<'_>,
-        of: &Inputs,
+        of: &PolicyInputs,
         logits: Rows,
     ) -> anyhow::Result<Decision> {
         let candidates = here.environment.legal_actions()?;
@@ -147,15 +147,15 @@ impl Policy for LearnedPolicy {
     fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
         let (given, slots) = (observations.len(), self.slots.len());
         anyhow::ensure!(given == slots, "{given} observations for {slots} slots");
-        let mut inputs: Vec<Option<anyhow::Result<Inputs>>> = Vec::with_capacity(slots);
+        let mut inputs: Vec<Option<anyhow::Result<PolicyInputs>>> = Vec::with_capacity(slots);
         for (slot, here) in observations.iter_mut().enumerate() {
             inputs.push(here.as_mut().map(|here| self.perceive(slot, here)));
         }
         let blank = self.blank();
-        let seen = |input: &Option<anyhow::Result<Inputs>>, part: fn(&Inputs) -> &Tensor| {
+        let seen = |input: &Option<anyhow::Result<PolicyInputs>>, part: fn(&PolicyInputs) -> &Tensor| {
             part(input.as_ref().and_then(|input| input.as_ref().ok()).unwrap_or(&blank)).shallow_clone()
         };
-        let together = |part: fn(&Inputs) -> &Tensor| {
+        let together = |part: fn(&PolicyInputs) -> &Tensor| {
             Tensor::cat(&inputs.iter().map(|input| seen(input, part)).collect::<Vec<_>>(), 0)
         };
         let (observation, conditioning) = (together(|of| &of.observation), together(|of| &of.conditioning));

@@ -13,7 +13,7 @@ use super::streams::say;
 use super::{jobs, progress, stop, streams};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
-use crate::eval::evaluation::{Evaluation, Progress};
+use crate::eval::evaluation::{Evaluation, EvaluationProgress};
 use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
 use crate::eval::tasks::sample;
@@ -166,14 +166,14 @@ impl Meter {
         Meter { display: (!json).then(progress::Progress::new), started: Instant::now() }
     }
 
-    fn show(&mut self, progress: Progress) {
+    fn show(&mut self, progress: EvaluationProgress) {
         let Some(display) = &mut self.display else {
             let seconds = self.started.elapsed().as_secs_f64();
             let event = ProgressEvent::Progress { progress, seconds };
             say(&serde_json::to_string(&event).unwrap_or_default());
             return;
         };
-        let Progress { done, of, successes, errors } = progress;
+        let EvaluationProgress { done, of, successes, errors } = progress;
         let message = match errors {
             0 => format!("{successes} succeeded"),
             _ => format!("{successes} succeeded, {errors} errored"),

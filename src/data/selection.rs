@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn a_selection_is_written_in_kebab_case() {
-        let read: DataSelection = toml::from_str("composites = \"labels\"\nlabels_of = \"rules\"").unwrap();
+        let read: DataSelection = toml::from_str("composites = \"labels\"\nlabel_source = \"rules\"").unwrap();
         assert_eq!(read, DataSelection { label_source: Some("rules".into()), ..DataSelection::of(Composites::Labels) });
         assert!(toml::from_str::<DataSelection>("composites = \"some\"").is_err());
     }

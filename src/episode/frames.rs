@@ -57,9 +57,9 @@ impl Shot {
 }
 
 /// Draws the states of a recording.
-pub(crate) struct Camera(House);
+pub(crate) struct FrameCamera(House);
 
-impl Camera {
+impl FrameCamera {
     /// What the agent saw.
     pub(crate) fn draw(&mut self, shot: &Shot) -> Frame {
         self.0.restore(shot.world.clone());
@@ -129,9 +129,9 @@ impl FrameSequence {
     }
 
     /// Something to draw its states with.
-    pub(crate) fn camera(&self) -> Camera {
+    pub(crate) fn camera(&self) -> FrameCamera {
         let world = self.shots.first().map_or_else(World::default, |shot| shot.world.clone());
-        Camera(House::new(self.scene.clone(), world))
+        FrameCamera(House::new(self.scene.clone(), world))
     }
 }
 

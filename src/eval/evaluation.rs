@@ -29,7 +29,7 @@ pub struct Evaluation {
 
 /// How far an evaluation is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
-pub struct Progress {
+pub struct EvaluationProgress {
     /// Episodes that are over.
     pub(crate) done: usize,
     /// Of how many.
@@ -40,7 +40,7 @@ pub struct Progress {
     pub(crate) errors: usize,
 }
 
-impl Progress {
+impl EvaluationProgress {
     fn count(&mut self, episode: &Episode) {
         self.done += 1;
         self.successes += usize::from(episode.success);
@@ -165,7 +165,7 @@ pub fn evaluate(
     make_policy: &Arc<MakePolicy>,
     folder: &mut RunWriter,
     stop: &Arc<AtomicBool>,
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(EvaluationProgress),
 ) -> anyhow::Result<RunSummary> {
     let all = evaluation.all();
     let mut episodes: BTreeMap<EpisodeKey, Episode> =
@@ -181,7 +181,7 @@ pub fn evaluate(
             Some(_) => {}
         }
     }
-    let mut state = Progress { of: all.len(), ..Progress::default() };
+    let mut state = EvaluationProgress { of: all.len(), ..EvaluationProgress::default() };
     let again: Vec<EpisodeKey> = wanted.iter().map(|spec| evaluation.key(spec)).collect();
     for key in &again {
         episodes.remove(key);
@@ -340,7 +340,7 @@ pub(crate) mod tests {
         let mut folder = RunWriter::open(into, evaluation.manifest())?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopping = stop.clone();
-        let mut progress = move |progress: Progress| {
+        let mut progress = move |progress: EvaluationProgress| {
             if progress.done >= stop_after {
                 stopping.store(true, Ordering::Relaxed);
             }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::evaluation::Progress;
+use super::evaluation::EvaluationProgress;
 
 /// A line of standard error of `sprint eval --json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, schemars::JsonSchema)]
@@ -11,7 +11,7 @@ pub(crate) enum ProgressEvent {
     /// An episode is over.
     Progress {
         /// The counts so far.
-        progress: Progress,
+        progress: EvaluationProgress,
         /// Since the evaluation began.
         seconds: f64,
     },

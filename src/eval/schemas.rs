@@ -38,7 +38,7 @@ mod tests {
     use crate::data::taskset::tests::sample_set;
     use crate::domain::{ActionType, Class, Instance};
     use crate::episode::record::{Author, TraceStep};
-    use crate::eval::evaluation::Progress;
+    use crate::eval::evaluation::EvaluationProgress;
     use crate::house::Outcome;
     use crate::house::outcome::Reason;
     use crate::report::compare::paired::tests::run;
@@ -65,7 +65,7 @@ mod tests {
         };
         let explored = Episode { trace: vec![step], ..episode("a") };
         let comparison = Comparison::of(&[run("a", &[true, false]), run("b", &[false, true])]).unwrap().0;
-        let progress = Progress { done: 1, of: 2, successes: 1, errors: 0 };
+        let progress = EvaluationProgress { done: 1, of: 2, successes: 1, errors: 0 };
         assert_eq!(faults("tasks", &sample_set()), []);
         assert_eq!(faults("manifest", &all), []);
         assert_eq!(faults("episode", &explored), []);

@@ -1,6 +1,6 @@
 //! Everything that could be done now, as rows of a table: how likely, how good.
 
-use super::exploration::Snapshot;
+use super::exploration::SessionSnapshot;
 use crate::agent::{ActionDistribution, Decision, Values};
 use crate::domain::{Action, ActionType, Class};
 
@@ -55,7 +55,7 @@ impl Sort {
 }
 
 /// Every legal action, interactions once for each class that is a candidate.
-pub(crate) fn choices(now: &Snapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
+pub(crate) fn choices(now: &SessionSnapshot, decision: &Decision, values: Option<&Values>, sort: Sort) -> Vec<Choice> {
     let class_of = |action: Action| action.target.and_then(|target| now.world.class_of(&now.scene, target));
     let distribution = decision.distribution.as_ref();
     let joint = match distribution {
@@ -85,7 +85,7 @@ pub(crate) fn choices(now: &Snapshot, decision: &Decision, values: Option<&Value
 }
 
 /// The choices of a policy without a distribution.
-fn legal(now: &Snapshot) -> Vec<(ActionType, Option<Class>, f32)> {
+fn legal(now: &SessionSnapshot) -> Vec<(ActionType, Option<Class>, f32)> {
     let uniform = ActionDistribution {
         actions: [None; ActionType::COUNT],
         objects: Vec::new(),

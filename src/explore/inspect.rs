@@ -1,6 +1,6 @@
 //! Why a thing can be acted on now, or cannot: what the inspector says of everything in a house.
 
-use super::exploration::Snapshot;
+use super::exploration::SessionSnapshot;
 use crate::domain::world::Parent;
 use crate::domain::{Action, ActionType, Class, Instance, Scene, World};
 use crate::house::{rules, view};
@@ -40,7 +40,7 @@ impl Thing {
 }
 
 /// Everything in the house: what can be acted on first, then what is in view, the nearest first.
-pub(crate) fn things(now: &Snapshot) -> Vec<Thing> {
+pub(crate) fn things(now: &SessionSnapshot) -> Vec<Thing> {
     let fixtures = (0..now.scene.fixtures.len() as u16).map(Instance::Fixture);
     let objects = (0..now.world.objects.len() as u16).map(Instance::Object);
     let mut found: Vec<Thing> = fixtures.chain(objects).filter_map(|instance| thing(now, instance)).collect();
@@ -51,7 +51,7 @@ pub(crate) fn things(now: &Snapshot) -> Vec<Thing> {
     found
 }
 
-fn thing(now: &Snapshot, instance: Instance) -> Option<Thing> {
+fn thing(now: &SessionSnapshot, instance: Instance) -> Option<Thing> {
     let (scene, world) = (&now.scene, &now.world);
     let class = world.class_of(scene, instance)?;
     let reachable = view::reachable(scene, world, &now.view, instance);
@@ -78,7 +78,7 @@ fn thing(now: &Snapshot, instance: Instance) -> Option<Thing> {
 
 /// Whether an interaction makes sense for a class, whatever its state. The likeliest reason to ask comes first in the order of
 /// actions.
-fn applies(kind: ActionType, class: Class, now: &Snapshot) -> bool {
+fn applies(kind: ActionType, class: Class, now: &SessionSnapshot) -> bool {
     let info = class.info();
     match kind {
         ActionType::Pickup => info.pickupable,
@@ -91,7 +91,7 @@ fn applies(kind: ActionType, class: Class, now: &Snapshot) -> bool {
 }
 
 /// The state of a thing in words, where it differs from the usual.
-pub(crate) fn state(now: &Snapshot, instance: Instance) -> String {
+pub(crate) fn state(now: &SessionSnapshot, instance: Instance) -> String {
     let mut words = Vec::new();
     if now.world.is_open(instance) {
         words.push("open");

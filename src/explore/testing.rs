@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::episode_source::{EpisodeOrigin, EpisodeSource};
-use super::exploration::{Exploration, Snapshot};
+use super::exploration::{Exploration, SessionSnapshot};
 use super::session::SessionEvent;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::agent::value_estimates::ChoiceValue;
@@ -43,7 +43,7 @@ pub(crate) fn exploration() -> Exploration {
 }
 
 /// The exploration's state with a made-up frame: a mug on a table before a wall.
-pub(crate) fn snapshot(exploration: &mut Exploration) -> Snapshot {
+pub(crate) fn snapshot(exploration: &mut Exploration) -> SessionSnapshot {
     let mut now = exploration.snapshot();
     let (scene, world) = (&now.scene, &now.world);
     let seen = ["DiningTable", "Mug", "Plate", "Fridge"].map(|name| named(scene, world, name));
@@ -89,7 +89,7 @@ pub(crate) fn snapshot(exploration: &mut Exploration) -> Snapshot {
 }
 
 /// What a policy might think of that.
-pub(crate) fn decided(now: &Snapshot) -> SessionEvent {
+pub(crate) fn decided(now: &SessionSnapshot) -> SessionEvent {
     let mut actions = [None; ActionType::COUNT];
     let shares = [(0, 0.08), (1, 0.02), (2, 0.12), (3, 0.01), (4, 0.06), (5, 0.66), (7, 0.05)];
     for (at, p) in shares {
@@ -118,7 +118,7 @@ pub(crate) fn decided(now: &Snapshot) -> SessionEvent {
 }
 
 /// What critics might say of it.
-pub(crate) fn values(now: &Snapshot) -> Values {
+pub(crate) fn values(now: &SessionSnapshot) -> Values {
     let kinds = [(ActionType::MoveAhead, 0.44), (ActionType::RotateLeft, 0.31), (ActionType::RotateRight, 0.47)];
     let navigation = kinds.into_iter().map(|(kind, q)| ChoiceValue { kind, class: None, q });
     let interactions = now.candidates.iter().zip([0.71, 0.28, -0.02]);

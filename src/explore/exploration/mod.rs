@@ -10,7 +10,7 @@ mod state;
 mod step;
 mod time;
 
-pub(crate) use snapshot::{Snapshot, TaskProgress};
+pub(crate) use snapshot::{SessionSnapshot, TaskProgress};
 pub(crate) use step::StepTaken;
 
 use std::sync::Arc;

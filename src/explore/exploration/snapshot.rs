@@ -15,7 +15,7 @@ use crate::house::view::{Candidate, Frame, View};
 
 /// Everything that a screen shows of the present state.
 #[derive(Clone, Debug)]
-pub struct Snapshot {
+pub struct SessionSnapshot {
     /// Counts the episodes of this session, from 1.
     pub(crate) episode: u32,
     /// The floor plan.
@@ -71,7 +71,7 @@ pub(crate) struct TaskProgress {
 
 impl Exploration {
     /// The present state for a screen; draws the frame when it changed.
-    pub fn snapshot(&mut self) -> Snapshot {
+    pub fn snapshot(&mut self) -> SessionSnapshot {
         let candidates = self.rollout.env.house.candidates();
         let frame = match &self.frames.present {
             Some(frame) => frame.clone(),
@@ -83,7 +83,7 @@ impl Exploration {
         let house = &self.rollout.env.house;
         let mut path: Vec<Cell> = self.tree.past().map(|moment| moment.world.agent.cell).collect();
         path.dedup();
-        Snapshot {
+        SessionSnapshot {
             episode: self.episode.number,
             scene: house.scene().clone(),
             seed: self.episode.seed,

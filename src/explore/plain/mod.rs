@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use super::chain_report::ChainReport;
 use super::choices::Sort;
-use super::exploration::{Exploration, Snapshot};
+use super::exploration::{Exploration, SessionSnapshot};
 use super::session::{Session, SessionCommand, SessionEvent};
 use super::timeline::BranchPosition;
 use super::verb::{Verb, parse};
@@ -25,7 +25,7 @@ struct Plain<W> {
     session: Session,
     events: Receiver<SessionEvent>,
     out: W,
-    state: Option<Box<Snapshot>>,
+    state: Option<Box<SessionSnapshot>>,
     decided: Option<(Decision, String, Option<Values>)>,
     position: Option<BranchPosition>,
     /// The other instruction of the last comparison.
@@ -115,7 +115,7 @@ impl<W: Write> Plain<W> {
     }
 
     /// The present state.
-    fn state(&mut self) -> anyhow::Result<Snapshot> {
+    fn state(&mut self) -> anyhow::Result<SessionSnapshot> {
         self.ask_quietly(SessionCommand::Show)?;
         self.state.take().map(|now| *now).ok_or_else(|| anyhow::anyhow!("the state was not told"))
     }

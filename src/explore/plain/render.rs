@@ -7,7 +7,7 @@ use crate::analysis::instruction_ab::Contrast;
 use crate::domain::{ActionType, Instance};
 use crate::episode::rollout::End;
 use crate::explore::choices::{Sort, choices as table};
-use crate::explore::exploration::{Snapshot, StepTaken};
+use crate::explore::exploration::{SessionSnapshot, StepTaken};
 use crate::explore::inspect;
 use crate::explore::inspect::state;
 use crate::explore::timeline::{BranchPosition, Divergence, Timeline};
@@ -93,7 +93,7 @@ pub(super) fn next(
 }
 
 /// The interactions that are possible now, by number.
-pub(super) fn candidates(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
+pub(super) fn candidates(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Result<()> {
     if now.candidates.is_empty() {
         writeln!(out, "no interaction is possible here")?;
     }
@@ -115,7 +115,7 @@ fn top(distribution: &ActionDistribution) -> String {
     format!("{}{object}", words.join(", "))
 }
 
-pub(super) fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
+pub(super) fn opening(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(out, "scene: {} ({}), seed {}", now.scene.name, now.scene.room.spoken(), now.seed)?;
     writeln!(out, "instruction: {}", now.instruction)?;
     match &now.progress {
@@ -130,7 +130,7 @@ pub(super) fn opening(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()
 
 /// Every legal choice: how likely, how good.
 pub(super) fn choices(
-    now: &Snapshot,
+    now: &SessionSnapshot,
     decision: &Decision,
     values: Option<&Values>,
     sort: Sort,
@@ -153,7 +153,7 @@ pub(super) fn choices(
 }
 
 /// Everything in the house: where it is, and what can be done to it or why not.
-pub(super) fn things(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
+pub(super) fn things(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Result<()> {
     for thing in inspect::things(now) {
         let state = if thing.state.is_empty() { String::new() } else { format!(" ({})", thing.state) };
         let seen = if thing.seen { "" } else { ", not in view" };
@@ -170,7 +170,7 @@ pub(super) fn things(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()>
 }
 
 /// What is seen, the largest first, with where it is.
-pub(super) fn look(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
+pub(super) fn look(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Result<()> {
     let pose = now.world.agent;
     writeln!(
         out,
@@ -195,7 +195,7 @@ pub(super) fn look(now: &Snapshot, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn state_words(now: &Snapshot, instance: Instance) -> String {
+fn state_words(now: &SessionSnapshot, instance: Instance) -> String {
     let words = state(now, instance);
     if words.is_empty() { words } else { format!(" ({words})") }
 }

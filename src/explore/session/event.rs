@@ -10,7 +10,7 @@ use crate::analysis::value_map::ValueMap;
 use crate::episode::rollout::End;
 use crate::explore::breakpoints::Condition;
 use crate::explore::chain_report::ChainReport;
-use crate::explore::exploration::{Snapshot, StepTaken};
+use crate::explore::exploration::{SessionSnapshot, StepTaken};
 use crate::explore::timeline::{BranchPosition, Divergence};
 
 /// Takes in what a session tells, from its own thread and from those that compute in the background.
@@ -20,7 +20,7 @@ pub(crate) type EventSink = Arc<dyn Fn(SessionEvent) + Send + Sync>;
 #[derive(Clone, Debug)]
 pub enum SessionEvent {
     /// The present state.
-    State(Box<Snapshot>),
+    State(Box<SessionSnapshot>),
     /// A step was taken.
     Stepped(Box<StepTaken>),
     /// What the policy would do next, with the action in words, and what its critics say.

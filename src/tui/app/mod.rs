@@ -22,7 +22,7 @@ use super::layout::ScreenLayout;
 use super::log::{EventLog, LogEntry, Tone};
 use super::theme::Ability;
 use crate::agent::registry::PolicyKind;
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::verb::ExplorerPage;
 use crate::house::view::Candidate;
 
@@ -193,7 +193,7 @@ impl App {
         })
     }
 
-    fn labelled(&self, now: &Snapshot) -> Vec<ThingLabel> {
+    fn labelled(&self, now: &SessionSnapshot) -> Vec<ThingLabel> {
         let target = self.session.decision.as_ref().and_then(|(decision, _)| decision.action.target);
         // Names need room.
         let named = self.picture_area().is_some_and(|area| area.width >= NAMED);

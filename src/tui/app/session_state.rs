@@ -2,13 +2,13 @@
 
 use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::session::{RunMode, StepRate};
 
 /// What was last told of the session.
 pub(crate) struct SessionState {
     /// The newest state.
-    pub(crate) now: Option<Box<Snapshot>>,
+    pub(crate) now: Option<Box<SessionSnapshot>>,
     /// What the policy would do next, and that in words.
     pub(crate) decision: Option<(Decision, String)>,
     /// What its critics say of the present state.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::pages::turn_to;
 use crate::episode::rollout::End;
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
@@ -181,12 +181,12 @@ fn asked_again(app: &App) -> Vec<Effect> {
 }
 
 /// What is worth saying about a new state that was not stepped to.
-fn arrival(before: Option<&Snapshot>, now: &Snapshot, new_episode: bool) -> Option<String> {
+fn arrival(before: Option<&SessionSnapshot>, now: &SessionSnapshot, new_episode: bool) -> Option<String> {
     let Some(before) = before else { return Some(now.scene.name.clone()) };
     if new_episode {
         return Some(now.scene.name.clone());
     }
-    let name = |snapshot: &Snapshot| {
+    let name = |snapshot: &SessionSnapshot| {
         snapshot.time.branches.get(snapshot.time.branch).map_or_else(String::new, |branch| branch.name.clone())
     };
     let forked = now.time.branches.len() > before.time.branches.len();

@@ -10,7 +10,7 @@ use unicode_width::UnicodeWidthStr;
 use super::panel::{bar, fit, panel, put, share, wrap};
 use crate::domain::Class;
 use crate::explore::choices::{Choice, choices};
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::timeline::TimelineStep;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -37,7 +37,7 @@ impl Widget for ChoicesView<'_> {
 }
 
 impl ChoicesView<'_> {
-    fn table(&self, now: &Snapshot, area: Rect, buf: &mut Buffer) {
+    fn table(&self, now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         let Some((decision, words)) = &app.session.decision else {
             let inner = panel(buf, area, "Mind", &now.acts);
@@ -79,7 +79,7 @@ impl ChoicesView<'_> {
     }
 
     /// What the sentence encoder reads.
-    fn reading(&self, now: &Snapshot, area: Rect, buf: &mut Buffer) {
+    fn reading(&self, now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
         let words = now.instruction.split_whitespace().count();
         let right = match &now.reading {
             Some(reading) if reading.cut > 0 => format!("{} tokens, {} more are cut off", reading.tokens, reading.cut),
@@ -124,7 +124,7 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
 }
 
 /// The curves over the branch: what is low, what is high, and where subtasks were done.
-fn curves(now: &Snapshot, area: Rect, buf: &mut Buffer) {
+fn curves(now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
     let steps = &now.time.steps;
     let inner = panel(buf, area, "Over the branch", &format!("{} steps; digits mark subtasks", steps.len()));
     let has_values = steps.iter().any(|beat| beat.value.is_some());

@@ -8,7 +8,7 @@ use super::value_colour::value_colour;
 use crate::analysis::value_map::ValueMap;
 use crate::domain::place::{Cuboid, Rect as Floor};
 use crate::domain::{Cell, Class, Heading, Pose};
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 
 /// Furniture that begins higher above the floor than this hangs over other furniture and is left out, in millimetres.
 const OVERHEAD: i32 = 1200;
@@ -22,24 +22,24 @@ const PATH: Color = Color::Rgb(86, 140, 190);
 
 /// A box of a piece of furniture, from above.
 #[derive(Clone, Copy)]
-pub(super) struct FurniturePiece {
+pub(super) struct DrawnPiece {
     pub(super) floor: Floor,
     pub(super) class: Class,
     pub(super) fixture: u16,
 }
 
 pub(super) struct FloorPlan<'a> {
-    pub(super) now: &'a Snapshot,
+    pub(super) now: &'a SessionSnapshot,
     /// The share of each cell's value, where values are painted.
     pub(super) values: HashMap<Cell, f32>,
     /// The furniture that stands on the floor or on other furniture, box by box, lowest first.
-    pub(super) furniture: Vec<FurniturePiece>,
+    pub(super) furniture: Vec<DrawnPiece>,
     /// What the whole plan covers.
     pub(super) bounds: Option<Floor>,
 }
 
 impl<'a> FloorPlan<'a> {
-    pub(super) fn of(now: &'a Snapshot, values: Option<&ValueMap>, heading: Option<Heading>) -> FloorPlan<'a> {
+    pub(super) fn of(now: &'a SessionSnapshot, values: Option<&ValueMap>, heading: Option<Heading>) -> FloorPlan<'a> {
         let values = values.map_or_else(HashMap::new, |values| values.shares(heading));
         let floor = now.scene.floor();
         let fixtures = (0u16..).zip(&now.scene.fixtures);
@@ -49,8 +49,8 @@ impl<'a> FloorPlan<'a> {
             .collect();
         parts.sort_by_key(|(part, ..)| part.max.y);
         let piece =
-            |(part, class, fixture): (&Cuboid, Class, u16)| FurniturePiece { floor: part.footprint(), class, fixture };
-        let furniture: Vec<FurniturePiece> = parts.into_iter().map(piece).collect();
+            |(part, class, fixture): (&Cuboid, Class, u16)| DrawnPiece { floor: part.footprint(), class, fixture };
+        let furniture: Vec<DrawnPiece> = parts.into_iter().map(piece).collect();
         let cells = now.scene.cells.iter().map(|cell| {
             let at = cell.centre(0);
             Floor { min: [at.x, at.z], max: [at.x, at.z] }.grown(Cell::SIDE / 2)
@@ -64,7 +64,7 @@ impl<'a> FloorPlan<'a> {
     }
 
     /// The furniture at a point, the highest of it.
-    fn piece(&self, x: i32, z: i32) -> Option<&FurniturePiece> {
+    fn piece(&self, x: i32, z: i32) -> Option<&DrawnPiece> {
         self.furniture.iter().rev().find(|piece| piece.floor.contains(x, z))
     }
 

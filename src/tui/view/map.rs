@@ -11,7 +11,7 @@ use super::panel::{fit, panel};
 use super::target::Target;
 use crate::analysis::value_map::ValueMap;
 use crate::domain::{Cell, Heading, Instance, Point};
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::inspect::things;
 use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
@@ -234,7 +234,7 @@ impl MapScale {
     }
 
     /// The agent, what it is about to act on, and the things it sees.
-    fn marks(&self, app: &App, now: &Snapshot, target: Option<Instance>, buf: &mut Buffer) {
+    fn marks(&self, app: &App, now: &SessionSnapshot, target: Option<Instance>, buf: &mut Buffer) {
         let shades = app.terminal.ability.shades();
         let mut mark = |x: i32, z: i32, symbol: char, style: Style| {
             if let Some((column, row)) = self.position(x, z) {

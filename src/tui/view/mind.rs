@@ -10,7 +10,7 @@ use unicode_width::UnicodeWidthStr;
 use super::panel::{bar, fit, panel, put, share, wrap};
 use crate::agent::{ActionDistribution, Decision};
 use crate::domain::{ActionType, Class};
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -56,7 +56,7 @@ impl Widget for MindPanel<'_> {
 struct DistributionTable<'a> {
     decision: &'a Decision,
     distribution: Option<&'a ActionDistribution>,
-    now: &'a Snapshot,
+    now: &'a SessionSnapshot,
 }
 
 impl Widget for DistributionTable<'_> {
@@ -115,7 +115,7 @@ impl DistributionTable<'_> {
 }
 
 /// Why an action cannot be chosen now, in words that fit where they can.
-fn masked(kind: ActionType, now: &Snapshot, room: usize) -> &'static str {
+fn masked(kind: ActionType, now: &SessionSnapshot, room: usize) -> &'static str {
     let held = now.world.held.and_then(|held| now.world.object(held));
     let (long, short) = match kind {
         ActionType::Pickup if held.is_some() => ("masked: the hand is full", "hand full"),

@@ -7,7 +7,7 @@ use ratatui::widgets::Widget;
 
 use crate::analysis::chain::Handover;
 use crate::explore::chain_report::ChainReport;
-use crate::explore::exploration::Snapshot;
+use crate::explore::exploration::SessionSnapshot;
 use crate::explore::inspect::{changes, stands};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -40,7 +40,7 @@ impl Widget for LinkPanel<'_> {
     }
 }
 
-fn lines(side: &ChainReport, at: usize, head: Option<&str>, now: &Snapshot, area: Rect, buf: &mut Buffer) {
+fn lines(side: &ChainReport, at: usize, head: Option<&str>, now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
     let mut row = 0;
     let mut line = |label: &str, text: &str, style: Style| {
         for (at, part) in wrap(text, usize::from(area.width).saturating_sub(LABEL), "").into_iter().enumerate() {
