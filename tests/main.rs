@@ -15,6 +15,7 @@ mod command_line;
 mod generated;
 mod properties;
 mod program;
+mod reader;
 mod evaluator;
 mod faults;
 mod scenarios;

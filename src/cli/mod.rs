@@ -25,6 +25,7 @@ mod open;
 mod policies;
 mod pretrain;
 mod progress;
+mod read;
 mod relabel;
 mod replay;
 mod report;
@@ -88,6 +89,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Embed sentences: a sentence a line in, a JSON array a line out
     Embed(embed::EmbedArgs),
+    /// Read wishes: a sentence a line in, its subtasks as a JSON object a line out
+    Read(read::ReadArgs),
     /// Print a completion script for a shell
     Completions(shell::Completions),
     /// Print the manual page (roff)
@@ -131,6 +134,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
+        Command::Read(read) => read.run(),
         Command::Completions(completions) => completions.run(Cli::command()),
         Command::Man => shell::man(Cli::command()),
     }

@@ -5,6 +5,7 @@ pub(crate) mod instruction;
 pub(crate) mod nouns;
 pub(crate) mod passage;
 pub(crate) mod phrases;
+pub mod reader;
 pub(crate) mod rules;
 pub(crate) mod story;
 pub(crate) mod summary;

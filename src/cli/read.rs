@@ -1,0 +1,109 @@
+//! `sprint read`: a wish a line in, how it is read as a JSON object a line out.
+
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow, bail};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::Ending;
+use super::rooms::RoomName;
+use crate::data::dataset;
+use crate::domain::{Class, Room};
+use crate::house::generate;
+use crate::language::reader::features::Before;
+use crate::language::reader::spelling::Spelling;
+use crate::language::reader::{Context, ReadSubtask, Reader, Reading, features_of};
+
+/// Reads wishes.
+#[derive(Args)]
+pub struct ReadArgs {
+    /// The house that they are said in: ROOM:SEED for a generated one (kitchen:7), or a scene file
+    #[arg(long, value_name = "ROOM:SEED|FILE")]
+    scene: Option<String>,
+    /// Print each line's features instead, for training; the words that count as spelt right are in this file, a word a line
+    #[arg(long, value_name = "FILE", hide = true)]
+    features: Option<PathBuf>,
+}
+
+/// A line of the answer.
+#[derive(Serialize)]
+struct Line<'a> {
+    text: &'a str,
+    #[serde(flatten)]
+    reading: &'a Reading,
+}
+
+/// A line of an example to train on.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Example {
+    text: String,
+    #[serde(default)]
+    object: Option<Class>,
+    #[serde(default)]
+    place: Option<Class>,
+}
+
+impl ReadArgs {
+    /// Reads standard input to standard output, a line at a time.
+    ///
+    /// # Errors
+    /// When the scene cannot be read or a line is not UTF-8.
+    pub fn run(self) -> anyhow::Result<Ending> {
+        if let Some(words) = &self.features {
+            return print_features(words);
+        }
+        let house = self.scene.as_deref().map(classes).transpose()?;
+        let reader = Reader::shipped().map_err(|error| anyhow!("{error}"))?;
+        let mut out = std::io::stdout().lock();
+        let none: &[ReadSubtask] = &[];
+        for (number, text) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
+            let text = text.with_context(|| format!("line {number} is not UTF-8 text"))?;
+            let reading = reader.read(&text, &Context { before: none, house: house.as_ref() });
+            serde_json::to_writer(&mut out, &Line { text: &text, reading: &reading })?;
+            out.write_all(b"\n")?;
+            out.flush()?;
+        }
+        Ok(Ending::Ok)
+    }
+}
+
+/// The classes of a house: of a generated one all that it holds, of a scene file its furniture and everything movable.
+fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
+    if let Some((room, seed)) = name.split_once(':')
+        && let Ok(room) = RoomName::from_str(room, true)
+    {
+        let seed =
+            seed.parse().with_context(|| format!("--scene {name}: {seed:?} is not a seed: use a whole number"))?;
+        let (scene, world) = generate::house(Room::from(room), seed);
+        let fixtures = scene.fixtures.iter().map(|fixture| fixture.class);
+        return Ok(fixtures.chain(world.objects.iter().map(|object| object.class)).collect());
+    }
+    let file = Path::new(name);
+    let (Some(folder), Some(stem)) = (file.parent(), file.file_stem().and_then(|stem| stem.to_str())) else {
+        bail!("--scene {name}: neither a generated house (kitchen:7) nor a scene file");
+    };
+    let scene = dataset::read_scene(folder, stem)
+        .with_context(|| format!("--scene {name}: neither a generated house (kitchen:7) nor a scene file"))?;
+    // A scene file says which furniture there is; what lies on it is another in every episode.
+    let movable = Class::all().filter(|class| class.info().pickupable);
+    Ok(scene.fixtures.iter().map(|fixture| fixture.class).chain(movable).collect())
+}
+
+fn print_features(words: &Path) -> anyhow::Result<Ending> {
+    let known = std::fs::read_to_string(words).with_context(|| words.display().to_string())?;
+    let spelling = Spelling::of(known.lines().map(str::to_string));
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    for (number, line) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
+        let line = line.with_context(|| format!("line {number} is not UTF-8 text"))?;
+        let Example { text, object, place } = serde_json::from_str(&line).with_context(|| format!("line {number}"))?;
+        let all: Vec<String> =
+            features_of(&text, Before { object, place }, &spelling).iter().map(u32::to_string).collect();
+        writeln!(out, "{}", all.join(" "))?;
+    }
+    out.flush()?;
+    Ok(Ending::Ok)
+}

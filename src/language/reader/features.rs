@@ -1,0 +1,200 @@
+//! What the model sees of a unit of text: its words, who does what to whom, and what was named before.
+
+use super::clauses::{Chunk, Clause, chunks};
+use super::lexicon::lexicon;
+use crate::domain::Class;
+
+/// What is known before a unit is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Before {
+    /// The thing that was last named.
+    pub object: Option<Class>,
+    /// Where it was put.
+    pub place: Option<Class>,
+}
+
+/// The FNV-1a hash of a feature's name.
+pub fn hash(name: &str) -> u32 {
+    name.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+/// The features of a unit, each once.
+pub fn features(clauses: &[Clause], before: Before) -> Vec<u32> {
+    let mut out = Features { seen: Vec::with_capacity(160) };
+    out.words(clauses);
+    out.structure(clauses, before);
+    out.seen.sort_unstable();
+    out.seen.dedup();
+    out.seen
+}
+
+struct Features {
+    seen: Vec<u32>,
+}
+
+const CHANGING: [&str; 9] = ["take", "put", "slice", "turn", "wash", "heat", "chill", "look", "make"];
+
+impl Features {
+    fn add(&mut self, kind: &str, value: &str) {
+        self.seen.push(hash(&format!("{kind}:{value}")));
+    }
+
+    fn words(&mut self, clauses: &[Clause]) {
+        let words = &lexicon().words;
+        let skipped = |text: &str| words.determiners.contains(text) && text != "another" && text != "other";
+        let mut last = "^";
+        let tokens = clauses.iter().flat_map(|clause| &clause.tokens);
+        for token in tokens.filter(|token| token.unknown.is_none() && !skipped(&token.text)) {
+            self.add("w", &token.text);
+            self.add("b", &format!("{last} {}", token.text));
+            last = &token.text;
+        }
+        self.add("b", &format!("{last} $"));
+    }
+
+    fn structure(&mut self, clauses: &[Clause], before: Before) {
+        let lemmas: Vec<&str> = clauses.iter().map(|clause| clause.lemma).collect();
+        let mut steps: Vec<&str> = lemmas.iter().copied().filter(|lemma| CHANGING.contains(lemma)).collect();
+        self.add("q", &lemmas.join(","));
+        self.add("s", &steps.join(","));
+        self.add("n", &steps.len().to_string());
+        steps.dedup();
+        let all = in_pieces(clauses);
+        let mut names: Vec<&str> = Vec::new();
+        for (lemma, pieces) in &all {
+            for (at, chunk) in pieces.iter().enumerate() {
+                let Some(head) = chunk.head() else { continue };
+                if chunk.is_pronoun() {
+                    self.add("p", &format!("{lemma} {}", chunk.lead));
+                    continue;
+                }
+                self.add("x", &format!("{lemma} {} {}", chunk.lead, head.text));
+                self.add("k", &format!("{lemma} {at} {}", head.text));
+                self.add("l", &format!("{} {}", chunk.lead, head.text));
+                if head.is_name() && !names.contains(&head.text.as_str()) {
+                    names.push(&head.text);
+                }
+            }
+        }
+        self.add("m", &names.len().to_string());
+        for (at, name) in names.iter().enumerate().take(4) {
+            self.add("a", &format!("{at} {name}"));
+        }
+        if let Some(name) = names.last() {
+            self.add("z", name);
+        }
+        if let Some((lemma, pieces)) = main(&all) {
+            self.thing("d", direct(lemma, pieces), before);
+            self.add("v", lemma);
+        }
+        if let Some((lemma, pieces)) = putting(&all) {
+            self.thing("e", direct(lemma, pieces), before);
+            let mut places = places(pieces);
+            self.place("r", places.next());
+            self.place("t", places.next());
+        }
+        match (before.object, before.place) {
+            (None, _) => self.add("c", "none"),
+            (Some(object), place) => {
+                self.add("co", object.name());
+                self.add("cp", place.map_or("none", Class::name));
+            }
+        }
+    }
+
+    fn thing(&mut self, kind: &str, chunk: Option<&Chunk>, before: Before) {
+        match chunk {
+            None => {
+                self.add(kind, "none");
+                let object = before.object.map_or("none", Class::name);
+                self.add(kind, &format!("none {object}"));
+            }
+            Some(chunk) if chunk.is_pronoun() => {
+                let object = before.object.map_or("none", Class::name);
+                self.add(kind, &format!("it {object}"));
+                self.add(kind, &format!("it {object} {}", before.place.map_or("none", Class::name)));
+            }
+            Some(chunk) => {
+                let Some(head) = chunk.head() else { return };
+                self.add(kind, &head.text);
+                for class in head.classes {
+                    self.add(kind, &format!("= {}", class.name()));
+                    if before.object == Some(*class) {
+                        self.add(kind, &format!("again {}", class.name()));
+                    }
+                }
+                for word in chunk.words.iter().filter(|word| *word != head) {
+                    self.add(kind, &format!("{} {}", word.text, head.text));
+                }
+            }
+        }
+    }
+
+    fn place(&mut self, kind: &str, chunk: Option<&Chunk>) {
+        let Some((chunk, head)) = chunk.and_then(|chunk| Some((chunk, chunk.head()?))) else {
+            self.add(kind, "none");
+            return;
+        };
+        self.add(kind, &head.text);
+        self.add(kind, &format!("{} {}", chunk.lead, head.text));
+        for class in head.classes {
+            self.add(kind, &format!("= {}", class.name()));
+        }
+        for word in chunk.words.iter().filter(|word| *word != head) {
+            self.add(kind, &format!("{} {}", word.text, head.text));
+        }
+    }
+}
+
+/// A clause's verb and its pieces.
+type Pieces = (&'static str, Vec<Chunk>);
+
+fn in_pieces(clauses: &[Clause]) -> Vec<Pieces> {
+    clauses.iter().map(|clause| (clause.lemma, chunks(clause))).collect()
+}
+
+/// The first clause that changes something.
+fn main(all: &[Pieces]) -> Option<&Pieces> {
+    all.iter().find(|(lemma, _)| CHANGING.contains(lemma)).or(all.first())
+}
+
+/// The last clause that puts something.
+fn putting(all: &[Pieces]) -> Option<&Pieces> {
+    all.iter().rev().find(|(lemma, _)| *lemma == "put").or(all.last())
+}
+
+fn places(pieces: &[Chunk]) -> impl Iterator<Item = &Chunk> {
+    pieces.iter().filter(|chunk| {
+        let lead = chunk.lead.as_str();
+        matches!(lead, "in" | "on" | "into" | "onto" | "inside" | "to" | "at" | "atop" | "upon" | "by" | "under")
+            || matches!(lead, "within" | "next" | "near" | "above" | "over" | "below")
+    })
+}
+
+/// The classes that a unit calls by their usual names: of the thing, and of the place.
+pub fn named_outright(clauses: &[Clause]) -> [Option<Class>; 2] {
+    let all = in_pieces(clauses);
+    let usual = |chunk: Option<&Chunk>| {
+        let head = chunk?.head()?;
+        head.classes.iter().copied().find(|class| lexicon().usual(*class) == Some(head.text.as_str()))
+    };
+    let thing = main(&all).and_then(|(lemma, pieces)| direct(lemma, pieces));
+    let place = putting(&all).and_then(|(_, pieces)| places(pieces).next());
+    [usual(thing), usual(place)]
+}
+
+/// What a verb is about: what follows it at once; a switch may have its particle in between, a slice is of something.
+pub fn direct<'a>(lemma: &str, pieces: &'a [Chunk]) -> Option<&'a Chunk> {
+    let first = pieces.first()?;
+    let sliced = |chunk: &Chunk| {
+        chunk.words.last().is_some_and(|word| {
+            matches!(word.text.as_str(), "slice" | "slices" | "piece" | "pieces" | "pair" | "couple" | "half")
+        })
+    };
+    if sliced(first)
+        && let Some(second) = pieces.get(1).filter(|second| second.lead == "of")
+    {
+        return Some(second);
+    }
+    (first.lead.is_empty() || first.lead == "off" || matches!(lemma, "turn" | "look" | "")).then_some(first)
+}

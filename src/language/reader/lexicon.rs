@@ -1,0 +1,213 @@
+//! The reader's words: what stands for what, which words are verbs or lead to a place, and every name of a class.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::OnceLock;
+
+use serde::Deserialize;
+
+use crate::domain::Class;
+use crate::language::{grammar::grammar, nouns};
+
+/// `assets/reader/words.toml`.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    same: BTreeMap<String, String>,
+    verbs: BTreeMap<String, Vec<String>>,
+    grammar: Words,
+}
+
+/// Words by what they do in a sentence.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Words {
+    /// Words after which a verb counts as one.
+    pub before_verb: BTreeSet<String>,
+    /// Words that lead to a place or a tool.
+    pub prepositions: BTreeSet<String>,
+    /// Articles and the like.
+    pub determiners: BTreeSet<String>,
+    /// Words that stand for what was named before.
+    pub pronouns: BTreeSet<String>,
+    /// Words that end a noun.
+    pub breaks: BTreeSet<String>,
+    /// Words that belong to a verb.
+    pub particles: BTreeSet<String>,
+    /// Parts of a piece of furniture.
+    pub places: BTreeSet<String>,
+    /// Words that carry nothing to be read.
+    pub plain: BTreeSet<String>,
+    /// Words that are spelt right and not understood.
+    pub foreign: BTreeSet<String>,
+}
+
+/// Everything that is known of words before anything is learned.
+#[derive(Debug, Default)]
+pub struct Lexicon {
+    /// Phrases and what they stand for, by their first word; the longest first.
+    same: HashMap<String, Vec<(Vec<String>, Vec<String>)>>,
+    /// Verbs by form.
+    verbs: HashMap<String, &'static str>,
+    /// Names of classes, as words, by their first word; the longest first.
+    names: HashMap<String, Vec<Name>>,
+    /// Every class's usual name, as one word.
+    usual: BTreeMap<Class, String>,
+    /// Words by what they do.
+    pub words: Words,
+    /// Every single word above.
+    all: BTreeSet<String>,
+}
+
+/// One name, in the singular or plural.
+#[derive(Clone, Debug)]
+struct Name {
+    words: Vec<String>,
+    singular: String,
+    classes: Vec<Class>,
+}
+
+const LEMMAS: [&str; 14] =
+    ["take", "put", "slice", "turn", "wash", "heat", "chill", "look", "open", "close", "go", "wait", "find", "make"];
+
+/// The lexicon that is part of the program.
+pub fn lexicon() -> &'static Lexicon {
+    static LEXICON: OnceLock<Lexicon> = OnceLock::new();
+    LEXICON.get_or_init(|| {
+        // A test parses the table, so the default cannot be reached in a build that passed.
+        let table: Table = toml::from_str(include_str!("../../../assets/reader/words.toml")).unwrap_or_default();
+        Lexicon::of(table)
+    })
+}
+
+fn split(text: &str) -> Vec<String> {
+    text.to_lowercase().split(' ').map(str::to_string).collect()
+}
+
+impl Lexicon {
+    fn of(table: Table) -> Lexicon {
+        let mut lexicon = Lexicon { words: table.grammar, ..Lexicon::default() };
+        for (from, to) in &table.same {
+            let (from, to) = (split(from), split(to));
+            lexicon.all.extend(from.iter().chain(&to).cloned());
+            lexicon.same.entry(from[0].clone()).or_default().push((from, to));
+        }
+        for same in lexicon.same.values_mut() {
+            same.sort_by_key(|(from, _)| std::cmp::Reverse(from.len()));
+        }
+        for lemma in LEMMAS {
+            for form in table.verbs.get(lemma).into_iter().flatten() {
+                lexicon.verbs.insert(form.clone(), lemma);
+                lexicon.all.insert(form.clone());
+            }
+        }
+        let words = &lexicon.words;
+        let lists = [&words.before_verb, &words.prepositions, &words.determiners, &words.pronouns];
+        let more = [&words.breaks, &words.particles, &words.places, &words.plain, &words.foreign];
+        lexicon.all.extend(lists.into_iter().chain(more).flatten().cloned());
+        lexicon.add_names();
+        lexicon
+    }
+
+    fn add_names(&mut self) {
+        let mut found: BTreeMap<String, (String, BTreeSet<Class>)> = BTreeMap::new();
+        for class in Class::all().filter(|class| class.in_vocabulary()) {
+            let usual = self.replace(&split(class.spoken())).join("_");
+            self.usual.insert(class, usual);
+            let plural = |head: &str| nouns::Noun { modifiers: Vec::new(), head: head.into() }.plural(&[], class);
+            for head in nouns::heads(class).map(str::to_lowercase) {
+                // The same replacements as in the text.
+                let head = self.replace(&split(&head)).join(" ");
+                for form in [head.clone(), plural(&head).to_lowercase()] {
+                    found.entry(form).or_insert_with(|| (head.clone(), BTreeSet::new())).1.insert(class);
+                }
+            }
+            found
+                .entry(grammar().plural(class).to_lowercase())
+                .or_insert_with(|| (class.spoken().to_lowercase(), BTreeSet::new()))
+                .1
+                .insert(class);
+        }
+        for (form, (singular, classes)) in found {
+            let words = split(&form);
+            self.all.extend(words.iter().cloned());
+            let name = Name { singular: singular.replace(' ', "_"), classes: classes.into_iter().collect(), words };
+            self.names.entry(name.words[0].clone()).or_default().push(name);
+        }
+        for names in self.names.values_mut() {
+            names.sort_by_key(|name| std::cmp::Reverse(name.words.len()));
+        }
+    }
+
+    /// Replaces people's words by the plain ones.
+    pub fn replace(&self, words: &[String]) -> Vec<String> {
+        self.replace_marked(words).into_iter().map(|(word, _)| word).collect()
+    }
+
+    /// The same; each word with the position of the word that it stands for.
+    pub fn replace_marked(&self, words: &[String]) -> Vec<(String, usize)> {
+        let mut out = Vec::with_capacity(words.len());
+        let mut at = 0;
+        while at < words.len() {
+            let fits = |(from, _): &&(Vec<String>, Vec<String>)| words[at..].starts_with(from);
+            match self.same.get(&words[at]).and_then(|same| same.iter().find(fits)) {
+                Some((from, to)) => {
+                    out.extend(to.iter().map(|word| (word.clone(), at)));
+                    at += from.len();
+                }
+                None => {
+                    out.push((words[at].clone(), at));
+                    at += 1;
+                }
+            }
+        }
+        out
+    }
+
+    /// The longest name that starts here: how many words it has, its singular as one word, and the classes that bear it.
+    pub fn name_at<'a>(&'a self, words: &[(String, usize)]) -> Option<(usize, &'a str, &'a [Class])> {
+        let fits = |name: &&Name| {
+            name.words.len() <= words.len() && name.words.iter().zip(words).all(|(name, (word, _))| name == word)
+        };
+        let name = self.names.get(&words.first()?.0)?.iter().find(fits)?;
+        Some((name.words.len(), &name.singular, &name.classes))
+    }
+
+    /// A class's usual name, as one word.
+    pub fn usual(&self, class: Class) -> Option<&str> {
+        self.usual.get(&class).map(String::as_str)
+    }
+
+    /// What a verb's form comes to.
+    pub fn verb(&self, word: &str) -> Option<&'static str> {
+        self.verbs.get(word).copied()
+    }
+
+    /// Whether the word is one of the lexicon's.
+    pub fn knows(&self, word: &str) -> bool {
+        self.all.contains(word)
+    }
+
+    /// Every single word, for spelling.
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        self.all.iter().map(String::as_str)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_words_is_sound() {
+        let table: Table = toml::from_str(include_str!("../../../assets/reader/words.toml")).unwrap();
+        assert!(table.verbs.keys().all(|lemma| LEMMAS.contains(&lemma.as_str())));
+        assert_eq!(table.verbs.len(), LEMMAS.len());
+    }
+
+    #[test]
+    fn every_class_that_an_action_may_name_has_a_name() {
+        let lexicon = lexicon();
+        let named: BTreeSet<Class> = lexicon.names.values().flatten().flat_map(|name| name.classes.clone()).collect();
+        assert_eq!(named.len(), Class::VOCABULARY - 1);
+    }
+}

@@ -1,0 +1,21 @@
+//! Reads a wish: typed text as an ordered list of subtasks, with how sure that is and what was not understood.
+
+pub mod clauses;
+pub mod features;
+pub mod lexicon;
+pub mod model;
+pub mod shape;
+pub mod spelling;
+pub mod tokens;
+
+mod reading;
+mod units;
+
+pub use reading::{Alternative, CERTAIN, ReadSubtask, Reading, Step, canonical};
+pub use units::{Context, Reader};
+
+/// The features of a text as one unit, for training.
+pub fn features_of(text: &str, before: features::Before, spelling: &spelling::Spelling) -> Vec<u32> {
+    let wanted = clauses::without_the_forbidden(tokens::tokens(text, spelling));
+    features::features(&clauses::clauses(&wanted), before)
+}

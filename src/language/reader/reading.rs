@@ -1,0 +1,174 @@
+//! What was read.
+
+use serde::Serialize;
+
+use crate::domain::Class;
+use crate::domain::skill::{Role, SkillKind, Subtask};
+
+/// Above this confidence a reading may be shown as certain; below it the display should ask.
+pub const CERTAIN: f32 = 0.96;
+
+/// Another class that may have been meant, and how likely.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Alternative {
+    /// The receptacle was meant otherwise, not the object.
+    pub is_receptacle: bool,
+    /// The class.
+    pub class: Class,
+    /// How likely beside the one that was chosen.
+    pub probability: f32,
+}
+
+/// One subtask as it was read.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReadSubtask {
+    /// What is to be done.
+    pub skill: SkillKind,
+    /// With what; `None` where the text says "it" and nothing was named before.
+    pub object: Option<Class>,
+    /// For Put, into or onto what.
+    pub receptacle: Option<Class>,
+    /// A slice of the object is meant, not a whole one.
+    pub slice: bool,
+    /// Words of the object's looks: "red".
+    pub looks: Vec<String>,
+    /// Where the thing is said to be.
+    pub place: Option<Class>,
+    /// What else may have been meant, the likeliest first.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// A text as it was read.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Reading {
+    /// What is to be done, in order.
+    pub subtasks: Vec<ReadSubtask>,
+    /// How likely all of it is right, from 0 to 1.
+    pub confidence: f32,
+    /// Words that were not understood.
+    pub unread: Vec<String>,
+    /// Classes that are asked for and not in the house.
+    pub absent: Vec<Class>,
+}
+
+impl Reading {
+    /// In words: "pick up a mug, put it in the sink".
+    pub fn words(&self) -> String {
+        let mut last = None;
+        let said = self.subtasks.iter().map(|subtask| {
+            let looks: String = subtask.looks.iter().map(|look| format!("{look} ")).collect();
+            let named = |class: Class| {
+                let what = if subtask.slice { format!("slice of {}", class.spoken()) } else { class.spoken().into() };
+                crate::language::grammar::with_article(&format!("{looks}{what}"))
+            };
+            let object = match subtask.object {
+                None => "something".to_string(),
+                again if again == last && subtask.skill != SkillKind::Pickup => "it".to_string(),
+                Some(class) => named(class),
+            };
+            if subtask.object.is_some() {
+                last = subtask.object;
+            }
+            match (subtask.skill, subtask.receptacle) {
+                (SkillKind::Pickup, _) => format!("pick up {object}"),
+                (SkillKind::Put, Some(place)) => format!("put {object} {} the {}", place.preposition(), place.spoken()),
+                (SkillKind::Put, None) => format!("put {object} somewhere"),
+                (SkillKind::Slice, _) => format!("slice {object}"),
+                (SkillKind::Toggle, _) => format!("switch on {object}"),
+                (SkillKind::Clean, _) => format!("rinse {object}"),
+                (SkillKind::Heat, _) => format!("heat {object}"),
+                (SkillKind::Cool, _) => format!("chill {object}"),
+            }
+        });
+        said.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The reading with another class in a subtask, and wherever the text means the same thing.
+    #[must_use]
+    pub fn with(&self, at: usize, alternative: Alternative) -> Reading {
+        let mut other = self.clone();
+        let Some(chosen) = self.subtasks.get(at) else { return other };
+        let was = if alternative.is_receptacle { chosen.receptacle } else { chosen.object };
+        for subtask in &mut other.subtasks {
+            if subtask.object == was {
+                subtask.object = Some(alternative.class);
+            }
+            if subtask.receptacle == was {
+                subtask.receptacle = Some(alternative.class);
+            }
+        }
+        other
+    }
+
+    /// The reading with the likeliest single other class in it.
+    pub fn second(&self) -> Option<Reading> {
+        let all = self.subtasks.iter().enumerate();
+        let all = all.flat_map(|(at, subtask)| subtask.alternatives.iter().map(move |&other| (at, other)));
+        let (at, best) = all.max_by(|a, b| a.1.probability.total_cmp(&b.1.probability))?;
+        Some(self.with(at, best))
+    }
+
+    /// The parts and steps that a grader follows; `None` when something was left open. A thing that is put, cleaned, heated or
+    /// cooled without a word of picking it up is graded as that alone.
+    pub fn task(&self) -> Option<(Vec<Role>, Vec<Subtask>)> {
+        let mut roles: Vec<Role> = Vec::new();
+        let mut subtasks: Vec<Subtask> = Vec::new();
+        let mut part = |class: Class, slice: bool, new: bool| {
+            let known = roles.iter().rposition(|role| role.class == class && role.slice == slice && !new);
+            known.unwrap_or_else(|| {
+                roles.push(Role { class, slice, bound: None, expert: None });
+                roles.len() - 1
+            }) as u8
+        };
+        for (at, read) in self.subtasks.iter().enumerate() {
+            let class = read.object?;
+            // A second mug that is picked up or put after the first one was put is another mug.
+            let earlier = &self.subtasks[..at];
+            let same = |other: &&ReadSubtask| other.object == read.object && other.slice == read.slice;
+            let done = earlier.iter().rev().find(same).is_some_and(|other| other.skill == SkillKind::Put);
+            let carried = earlier.iter().any(|other| other.skill == SkillKind::Put && other.receptacle == Some(class));
+            let new = done && !carried && matches!(read.skill, SkillKind::Pickup | SkillKind::Put);
+            let object = part(class, read.slice, new);
+            let receptacle = match read.skill {
+                SkillKind::Put => Some(part(read.receptacle?, false, false)),
+                _ => None,
+            };
+            subtasks.push(Subtask { skill: read.skill, object, receptacle, closes: false, literal: None });
+        }
+        (!subtasks.is_empty()).then_some((roles, subtasks))
+    }
+}
+
+/// A skill with its object and receptacle.
+pub type Step = (SkillKind, Option<Class>, Option<Class>);
+
+/// The form in which readings are compared, that of what the steps come to: without the pickups that another step of the same
+/// thing implies, without the knife where something is sliced and without a put before the slicing of the same thing; a thing
+/// goes into another before that is put somewhere, is in the hand before the lamp goes on, and is sliced once.
+pub fn canonical(steps: &[Step]) -> Vec<Step> {
+    let cuts = steps.iter().any(|step| step.0 == SkillKind::Slice);
+    let is_knife = |step: &Step| step.1.is_some_and(Class::is_knife);
+    let follows = |at: usize, kind: SkillKind, thing: Option<Class>| {
+        steps[at + 1..].iter().any(|other| other.0 == kind && other.1 == thing)
+    };
+    let mut kept: Vec<Step> = Vec::new();
+    for (at, step) in steps.iter().enumerate() {
+        let implied = step.0 == SkillKind::Pickup
+            && steps.iter().any(|other| !matches!(other.0, SkillKind::Pickup | SkillKind::Slice) && other.1 == step.1);
+        let knife = cuts && is_knife(step) && steps.len() > 1;
+        let aside = step.0 == SkillKind::Put && follows(at, SkillKind::Slice, step.1);
+        let again = step.0 == SkillKind::Slice && kept.contains(step);
+        if !(implied || knife || aside || again) {
+            kept.push(*step);
+        }
+    }
+    for at in 1..kept.len() {
+        let (first, second) = (kept[at - 1], kept[at]);
+        let stacked =
+            first.0 == SkillKind::Put && second.0 == SkillKind::Put && second.2 == first.1 && first.1 != second.1;
+        if stacked || first.0 == SkillKind::Toggle && second.0 == SkillKind::Pickup {
+            kept.swap(at - 1, at);
+        }
+    }
+    kept
+}

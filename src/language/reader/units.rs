@@ -1,0 +1,392 @@
+//! The reader: cuts a text into units, and asks the model what each is about.
+
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+
+use super::clauses::{Clause, chunks, clauses, without_the_forbidden};
+use super::features::{Before, direct, features, named_outright};
+use super::lexicon::lexicon;
+use super::model::{Head, Model, ModelError, softmax};
+use super::reading::{Alternative, ReadSubtask, Reading};
+use super::shape::Shape;
+use super::tokens::{Token, tokens};
+use crate::domain::Class;
+use crate::domain::skill::SkillKind;
+
+/// The most clauses that one unit has.
+const WIDEST: usize = 6;
+/// What another unit costs, as the logarithm of a probability.
+const NEW_UNIT: f32 = -0.7;
+/// What passing over a clause that names something costs.
+const PASSED_OVER: f32 = -3.0;
+/// How likely it must be that something of the house is meant.
+const IN_HOUSE: f32 = 0.05;
+/// Alternatives that are kept.
+const ALTERNATIVES: usize = 3;
+/// What a class's usual name speaks for it, as the logarithm of odds, beside what was learned.
+const OUTRIGHT: f32 = 2.0;
+
+/// What is known besides the text.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Context<'a> {
+    /// What was asked for before.
+    pub before: &'a [ReadSubtask],
+    /// The classes of the house.
+    pub house: Option<&'a BTreeSet<Class>>,
+}
+
+/// Reads wishes.
+#[derive(Debug)]
+pub struct Reader {
+    model: Model,
+}
+
+/// A unit as the model sees it.
+struct Unit {
+    shape: Shape,
+    score: f32,
+    features: Vec<u32>,
+}
+
+/// A class with its probability, and the ones behind it.
+struct Answer {
+    class: Option<Class>,
+    probability: f32,
+    others: Vec<(Class, f32)>,
+}
+
+/// The best way to cut the clauses up to a place.
+#[derive(Clone, Default)]
+struct Path {
+    score: f32,
+    read: Vec<ReadSubtask>,
+    probability: f32,
+    absent: Vec<Class>,
+}
+
+impl Reader {
+    /// The reader that is part of the program.
+    ///
+    /// # Errors
+    /// When its model is damaged.
+    pub fn shipped() -> Result<&'static Reader, &'static ModelError> {
+        static READER: OnceLock<Result<Reader, ModelError>> = OnceLock::new();
+        READER.get_or_init(|| Reader::of(include_bytes!("../../../assets/reader/model.bin"))).as_ref()
+    }
+
+    /// A reader with a model's file.
+    ///
+    /// # Errors
+    /// When it is not one, of another version, or damaged.
+    pub fn of(file: &[u8]) -> Result<Reader, ModelError> {
+        Model::parse(file).map(|model| Reader { model })
+    }
+
+    /// Reads a text.
+    pub fn read(&self, text: &str, context: &Context<'_>) -> Reading {
+        let wanted = without_the_forbidden(tokens(text, &self.model.spelling));
+        let clauses = clauses(&wanted);
+        let mut paths: Vec<Option<Path>> = vec![None; clauses.len() + 1];
+        paths[0] = Some(Path { probability: 1.0, ..Path::default() });
+        for end in 1..=clauses.len() {
+            let mut best: Option<Path> = None;
+            for start in end.saturating_sub(WIDEST)..end {
+                let Some(path) = &paths[start] else { continue };
+                let some = &clauses[start..end];
+                for next in [self.skip(path, some), self.unit(path, some, context), self.each(path, some, context)] {
+                    let Some(next) = next else { continue };
+                    if best.as_ref().is_none_or(|best| next.score > best.score) {
+                        best = Some(next);
+                    }
+                }
+            }
+            paths[end] = best;
+        }
+        let path = paths.pop().flatten().unwrap_or_default();
+        let unread = unread(&wanted, &clauses);
+        let raw = if path.read.is_empty() { 0.0 } else { path.probability * 0.6f32.powi(unread.len() as i32) };
+        let open = path
+            .read
+            .iter()
+            .any(|read| read.object.is_none() || read.skill == SkillKind::Put && read.receptacle.is_none());
+        let confidence = if path.read.is_empty() || open { 0.0 } else { self.model.calibrated(raw) };
+        Reading { subtasks: path.read, confidence, unread, absent: path.absent }
+    }
+
+    /// Passes over clauses that ask for nothing: walking, doors, remarks.
+    fn skip(&self, path: &Path, clauses: &[Clause]) -> Option<Path> {
+        let [clause] = clauses else { return None };
+        let cost = match clause.lemma {
+            "go" | "wait" | "open" | "close" => 0.0,
+            _ if is_foreign(clause) || says_nothing(clause) => 0.0,
+            "" if !clause.tokens.iter().any(Token::is_name) => 0.0,
+            "" | "find" | "make" => PASSED_OVER,
+            _ => return None,
+        };
+        Some(Path { score: path.score + cost, ..path.clone() })
+    }
+
+    /// Reads one clause that names several things as a clause for each: "put the fork and the knife in the drawer".
+    fn each(&self, path: &Path, clauses: &[Clause], context: &Context<'_>) -> Option<Path> {
+        let [clause] = clauses else { return None };
+        let apart = clause.apart()?;
+        let head = self.model.head("shape")?;
+        let many = head.labels().iter().position(|label| Shape::named(label) == Some(Shape::Many))?;
+        let p = softmax(&head.scores(&features(clauses, before(path, context))))[many];
+        let start = Path { score: 0.0, ..path.clone() };
+        let read =
+            apart.iter().try_fold(start, |path, clause| self.unit(&path, std::slice::from_ref(clause), context))?;
+        Some(Path { score: path.score + p.max(1e-9).ln() + NEW_UNIT, ..read })
+    }
+
+    fn unit(&self, path: &Path, clauses: &[Clause], context: &Context<'_>) -> Option<Path> {
+        let says = |clause: &Clause| !clause.lemma.is_empty() || clause.tokens.iter().any(Token::is_name);
+        if clauses.iter().any(|clause| is_foreign(clause) || says_nothing(clause)) || !clauses.iter().any(says) {
+            return None;
+        }
+        let unit = self.shape(clauses, before(path, context))?;
+        let mut next = path.clone();
+        next.score += unit.score + NEW_UNIT;
+        self.fill(&unit, clauses, context, &mut next);
+        Some(next)
+    }
+
+    fn shape(&self, clauses: &[Clause], before: Before) -> Option<Unit> {
+        let features = features(clauses, before);
+        let head = self.model.head("shape")?;
+        let all = softmax(&head.scores(&features));
+        let shapes = head.labels().iter().zip(all).filter_map(|(label, p)| Some((Shape::named(label)?, p)));
+        let (shape, p) = shapes.filter(|(shape, _)| *shape != Shape::Many).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(Unit { shape, score: p.max(1e-9).ln(), features })
+    }
+
+    /// Turns a unit into subtasks.
+    fn fill(&self, unit: &Unit, clauses: &[Clause], context: &Context<'_>, path: &mut Path) {
+        let Unit { shape, features, score } = unit;
+        let shape = *shape;
+        let house = context.house;
+        path.probability *= score.exp();
+        let [thing, place] = named_outright(clauses);
+        let object = self.answer("object", features, thing, house, &mut path.absent, |class| shape.takes_object(class));
+        path.probability *= object.probability;
+        let place = shape
+            .has_place()
+            .then(|| self.answer("place", features, place, house, &mut path.absent, |class| shape.takes_place(class)));
+        path.probability *= place.as_ref().map_or(1.0, |place| place.probability);
+        let slice = self.model.head("slice").map(|head| softmax(&head.scores(features)));
+        let slice = slice.is_some_and(|p| p.get(1).is_some_and(|&p| p > 0.5))
+            && object.class.is_some_and(|class| class.info().slices > 0)
+            && shape != Shape::One(SkillKind::Slice);
+        let told = Told::of(clauses);
+        let step = |skill, slice| ReadSubtask {
+            skill,
+            object: object.class,
+            receptacle: None,
+            slice,
+            looks: told.looks.clone(),
+            place: told.place.filter(|_| skill == SkillKind::Pickup),
+            alternatives: alternatives(&object, false),
+        };
+        let put = |slice| {
+            let mut put = step(SkillKind::Put, slice);
+            if let Some(place) = &place {
+                put.receptacle = place.class;
+                put.alternatives.extend(alternatives(place, true));
+                put.alternatives.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+            }
+            put
+        };
+        let first = path.read.is_empty() && context.before.is_empty();
+        let whole = !matches!(shape, Shape::One(kind) if kind != SkillKind::Put);
+        if slice && first && whole {
+            path.read.push(step(SkillKind::Slice, false));
+        }
+        let lifts = told.takes_first && !slice && whole && shape != Shape::Look && shape != Shape::Two;
+        if lifts {
+            path.read.push(step(SkillKind::Pickup, slice));
+        }
+        match shape {
+            Shape::One(SkillKind::Put) => path.read.push(put(slice)),
+            Shape::One(kind) => path.read.push(step(kind, slice)),
+            Shape::Changed(kind) => path.read.extend([step(kind, slice), put(slice)]),
+            Shape::Two => path.read.extend([put(slice), put(slice)]),
+            Shape::Look => {
+                let lamp = place.as_ref();
+                path.read.push(step(SkillKind::Pickup, slice));
+                path.read.push(ReadSubtask {
+                    object: lamp.and_then(|lamp| lamp.class),
+                    looks: Vec::new(),
+                    alternatives: lamp.map(|lamp| alternatives(lamp, false)).unwrap_or_default(),
+                    ..step(SkillKind::Toggle, false)
+                });
+            }
+            Shape::Stack => {
+                let holder = self.answer("movable", features, None, house, &mut path.absent, |class| {
+                    class.info().pickupable && class.info().receptacle
+                });
+                path.probability *= holder.probability;
+                let mut inner = step(SkillKind::Put, slice);
+                inner.receptacle = holder.class;
+                inner.alternatives.extend(alternatives(&holder, true));
+                let mut outer = put(false);
+                outer.object = holder.class;
+                outer.looks = Vec::new();
+                outer.alternatives.retain(|other| other.is_receptacle);
+                outer.alternatives.extend(alternatives(&holder, false));
+                path.read.extend([inner, outer]);
+            }
+            Shape::Many => {}
+        }
+        path.absent.dedup();
+    }
+
+    /// Which class a question is answered with; of the house's where that is known, unless none of them can be meant.
+    fn answer(
+        &self,
+        name: &str,
+        features: &[u32],
+        outright: Option<Class>,
+        house: Option<&BTreeSet<Class>>,
+        absent: &mut Vec<Class>,
+        may: impl Fn(Class) -> bool,
+    ) -> Answer {
+        let Some(head) = self.model.head(name) else {
+            return Answer { class: None, probability: 0.0, others: Vec::new() };
+        };
+        let all = ranked(head, features, outright, may);
+        let inside = |class: &Option<Class>| class.is_none_or(|class| house.is_none_or(|house| house.contains(&class)));
+        let known: f32 = all.iter().filter(|(class, _)| inside(class)).map(|(_, p)| p).sum();
+        let chosen: Vec<(Option<Class>, f32)> = if known > IN_HOUSE {
+            all.iter().filter(|(class, _)| inside(class)).map(|&(class, p)| (class, p / known)).collect()
+        } else {
+            absent.extend(all.first().and_then(|(class, _)| *class));
+            all
+        };
+        let (class, probability) = chosen.first().copied().unwrap_or((None, 0.0));
+        let others = chosen.iter().skip(1).filter_map(|&(class, p)| Some((class?, p))).take(ALTERNATIVES).collect();
+        Answer { class, probability, others }
+    }
+}
+
+/// What is known where a path ends.
+fn before(path: &Path, context: &Context<'_>) -> Before {
+    let last = path.read.last().or(context.before.last());
+    Before { object: last.and_then(|read| read.object), place: last.and_then(|read| read.receptacle) }
+}
+
+/// The classes that may be meant, the likeliest first.
+fn ranked(
+    head: &Head,
+    features: &[u32],
+    outright: Option<Class>,
+    may: impl Fn(Class) -> bool,
+) -> Vec<(Option<Class>, f32)> {
+    let scores = head.scores(features);
+    let classes: Vec<Option<Class>> = head.labels().iter().map(|label| Class::named(label)).collect();
+    let kept: Vec<(Option<Class>, f32)> = classes
+        .into_iter()
+        .map(|class| class.filter(|&class| class != Class::NONE))
+        .zip(scores)
+        .filter(|(class, _)| class.is_none_or(&may))
+        .map(|(class, score)| (class, if class.is_some() && class == outright { score + OUTRIGHT } else { score }))
+        .collect();
+    let p = softmax(&kept.iter().map(|(_, score)| *score).collect::<Vec<_>>());
+    let mut all: Vec<(Option<Class>, f32)> = kept.into_iter().map(|(class, _)| class).zip(p).collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all
+}
+
+fn alternatives(answer: &Answer, is_receptacle: bool) -> Vec<Alternative> {
+    answer.others.iter().map(|&(class, probability)| Alternative { is_receptacle, class, probability }).collect()
+}
+
+/// What a unit says besides its skill and classes.
+struct Told {
+    looks: Vec<String>,
+    place: Option<Class>,
+    takes_first: bool,
+}
+
+impl Told {
+    fn of(clauses: &[Clause]) -> Told {
+        let doing: Vec<&Clause> =
+            clauses.iter().filter(|clause| !matches!(clause.lemma, "" | "go" | "wait" | "open" | "close")).collect();
+        let takes_first = doing.len() > 1 && doing[0].lemma == "take";
+        let Some(clause) = doing.first().copied().or(clauses.first()) else {
+            return Told { looks: Vec::new(), place: None, takes_first };
+        };
+        let pieces = chunks(clause);
+        let thing = direct(clause.lemma, &pieces).or(pieces.first());
+        let head = thing.and_then(|thing| thing.head());
+        let before_head = |chunk: &super::clauses::Chunk| {
+            let words = chunk.words.iter().take_while(|word| Some(*word) != head);
+            words
+                .filter(|word| !word.is_name() && !lexicon().words.plain.contains(&word.text) && word.unknown.is_none())
+                .map(|word| word.text.clone())
+                .collect()
+        };
+        let looks = thing.map(before_head).unwrap_or_default();
+        let leads = |lead: &str| matches!(lead, "in" | "on" | "from" | "off" | "out" | "inside" | "at" | "under");
+        let places = pieces.iter().skip(1).filter(|chunk| leads(&chunk.lead));
+        let mut classes = places.filter_map(|chunk| chunk.head()?.classes.first().copied());
+        Told { looks, place: classes.find(|class| class.info().receptacle), takes_first }
+    }
+}
+
+/// Whether a clause begins with something that is not understood.
+fn is_foreign(clause: &Clause) -> bool {
+    let mut before = clause.tokens.iter().take_while(|token| !token.is_name());
+    let says = |words: &[&str]| clause.tokens.iter().any(|token| words.contains(&token.text.as_str()));
+    let turned = clause.lemma == "turn"
+        && !says(&["on", "off", "lamp", "light", "floor_lamp", "desk_lamp"])
+        && !says_nothing(clause);
+    turned || clause.lemma.is_empty() && before.any(|token| is_strange(token))
+}
+
+/// Whether nothing is made of a word.
+fn is_strange(token: &Token) -> bool {
+    token.unknown.is_some() || lexicon().words.foreign.contains(&token.text) && !token.is_name()
+}
+
+/// Whether a clause is about nothing: "turn around".
+fn says_nothing(clause: &Clause) -> bool {
+    let words = &lexicon().words;
+    let mut rest = clause.tokens.iter().filter(|token| lexicon().verb(&token.text) != Some(clause.lemma));
+    matches!(clause.lemma, "turn" | "look")
+        && rest.all(|token| {
+            let word = &token.text;
+            token.is_mark()
+                || words.prepositions.contains(word) && word != "on"
+                || words.determiners.contains(word)
+                || words.places.contains(word)
+                || words.plain.contains(word)
+                || words.particles.contains(word)
+                || words.breaks.contains(word)
+        })
+}
+
+/// The words that were not understood: those that nobody knows, and the rest of a clause that begins with one.
+fn unread(typed: &[Token], clauses: &[Clause]) -> Vec<String> {
+    let plain = &lexicon().words;
+    let mut words: Vec<String> = Vec::new();
+    let foreign = clauses.iter().filter(|clause| is_foreign(clause)).flat_map(|clause| &clause.tokens);
+    let foreign: Vec<&Token> = foreign.collect();
+    for token in typed {
+        let skipped = plain.plain.contains(&token.text)
+            || plain.determiners.contains(&token.text)
+            || plain.prepositions.contains(&token.text)
+            || token.is_mark();
+        if skipped {
+            continue;
+        }
+        let word = match &token.unknown {
+            Some(word) => word.clone(),
+            None if foreign.contains(&token) || is_strange(token) => token.text.replace('_', " "),
+            None => continue,
+        };
+        if !words.contains(&word) {
+            words.push(word);
+        }
+    }
+    words
+}
