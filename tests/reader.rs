@@ -10,10 +10,7 @@ use sprint_explorer::domain::task::SceneRef;
 use sprint_explorer::domain::{Class, SkillKind, Subtask, Trajectory};
 use sprint_explorer::house::grading::{Grader, Grading};
 use sprint_explorer::language::nouns;
-use sprint_explorer::language::reader::{Context, ReadSubtask, Reader, Reading, Step, canonical};
-
-/// Above this confidence a reading is shown as certain.
-const CERTAIN: f32 = sprint_explorer::language::reader::CERTAIN;
+use sprint_explorer::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Reading, Step, canonical};
 
 fn reader() -> &'static Reader {
     Reader::shipped().unwrap()
@@ -35,7 +32,7 @@ fn parse(expected: &str) -> Vec<Step> {
 }
 
 #[test]
-fn nine_in_ten_of_peoples_sentences_are_read_exactly() {
+fn nineteen_in_twenty_of_peoples_sentences_are_read_exactly() {
     let rows: Vec<(&str, &str)> =
         include_str!("reader_sentences.tsv").lines().map(|line| line.split_once('\t').unwrap()).collect();
     assert!(rows.len() >= 300);
@@ -45,7 +42,7 @@ fn nine_in_ten_of_peoples_sentences_are_read_exactly() {
         .filter(|(text, expected)| read(text) != parse(expected))
         .map(|(text, expected)| format!("{text}: {expected}, read as {:?}", read(text)))
         .collect();
-    assert!(missed.len() * 10 <= rows.len(), "{} of {}:\n{}", missed.len(), rows.len(), missed.join("\n"));
+    assert!(missed.len() * 20 <= rows.len(), "{} of {}:\n{}", missed.len(), rows.len(), missed.join("\n"));
 }
 
 #[test]
@@ -135,7 +132,10 @@ impl Measured {
         let of = |count| self.share(count);
         let [exact, two, named] = [self.exact, self.within_two, self.as_named].map(of);
         let [certain, wrong] = [self.certain, self.wrong_and_certain].map(of);
-        eprintln!("{what}: {} texts; exact {exact}; one of two {two}; up to shared names {named}; certain {certain}; certain and wrong {wrong}", self.texts);
+        eprintln!(
+            "{what}: {} texts; exact {exact}; one of two {two}; up to shared names {named}; certain {certain}; certain and wrong {wrong}",
+            self.texts
+        );
     }
 
     fn exact_share(&self) -> f64 {
@@ -145,7 +145,12 @@ impl Measured {
 
 fn expected(trajectory: &Trajectory, skills: &[Subtask]) -> Vec<Step> {
     let class = |role: u8| Some(trajectory.roles[usize::from(role)].class);
-    canonical(&skills.iter().map(|skill| (skill.skill, class(skill.object), skill.receptacle.and_then(class))).collect::<Vec<_>>())
+    canonical(
+        &skills
+            .iter()
+            .map(|skill| (skill.skill, class(skill.object), skill.receptacle.and_then(class)))
+            .collect::<Vec<_>>(),
+    )
 }
 
 #[test]

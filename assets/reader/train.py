@@ -192,7 +192,7 @@ def one_made_up(chance):
     food = pick(*FOODS)
     kind = chance.randrange(20)
     if kind == 0:
-        return f"{take()} {x}{near}", [("Pickup", thing, False, None)]
+        return pick(f"{take()} {x}{near}", f"{take()} {x}{near}", f"want {x}"), [("Pickup", thing, False, None)]
     if kind in (1, 2):
         return f"{verb()} {x}{near if chance.random() < 0.3 else ''} {prep()} {y}", [put]
     if kind == 3:
@@ -237,7 +237,8 @@ def one_made_up(chance):
     if kind == 15:
         return pick(f"want {x} {prep()} {y}", f"{x} {pick('belongs', 'goes', 'should be', 'must be')} {prep()} {y}", f"make sure {x} is {prep()} {y}", f"{x} to {y}", f"get {x} {pick('in', 'on', 'into', 'onto')} {y}"), [put]
     if kind == 16:
-        return f"{pick('take', 'bring', 'carry', 'move', 'get')} {x} from {say(pick(*PLACES))} to {y}", [put]
+        source = pick(f" from {say(pick(*PLACES))}", "", " over")
+        return f"{pick('take', 'take', 'bring', 'carry', 'move', 'get')} {x}{source} to {y}", [put]
     if kind == 17:
         return f"{pick('discard', 'throw out', 'bin', 'trash')} {x}{near}", [("Put", thing, False, "GarbageCan")]
     if kind == 18:
@@ -255,13 +256,14 @@ def made_up(chance, count):
         if one is None:
             continue
         made.append(one)
-        yield one[0], label(one[1])
+        polite = chance.choice(["", "", "", "", "please ", "could you ", "want you to ", "would you mind ", "can you please "])
+        yield polite + one[0], label(one[1])
         if len(made) > 3 and chance.random() < 0.5:
             some = chance.sample(made[-1000:], chance.choice([2, 2, 3]))
             yield joined([text for text, _ in some], chance), label([skill for _, skills in some for skill in skills])
 
 
-def softmax_fit(features, labels, count, sure, epochs=14, rate=0.12, decay=2e-6, seed=1):
+def softmax_fit(features, labels, count, sure, epochs, rate=0.12, decay=2e-6, seed=1):
     """Weights of a linear softmax by AdaGrad over small batches; `decay` pulls weights to zero (L1)."""
     chance = np.random.default_rng(seed)
     rows, columns = features.shape
@@ -305,11 +307,10 @@ def main():
     parser.add_argument("--sprint", default=str(ROOT / "target/release/sprint"))
     parser.add_argument("--features", default="read --features", help=argparse.SUPPRESS)
     parser.add_argument("--out", default=str(ROOT / "assets/reader/model.bin"))
-    parser.add_argument("--epochs", type=int, default=14)
-    parser.add_argument("--made-up", type=int, default=16000)
+    parser.add_argument("--epochs", type=int, default=7)
+    parser.add_argument("--made-up", type=int, default=14000)
     parser.add_argument("--rare", type=int, default=3, help="features that fewer examples have are left out")
     parser.add_argument("--small", type=float, default=0.04, help="weights below this are left out")
-    parser.add_argument("--all", action="store_true", help="fit the held-out tenth as well, with the calibration found without it")
     options = parser.parse_args()
     chance = random.Random(7)
     rows = list(examples(options.data, chance))
@@ -363,7 +364,8 @@ def main():
         p /= p.sum(1, keepdims=True)
         chosen = p.argmax(1)
         hit = chosen == truth[other]
-        by = {kind: f"{100 * np.mean(hit[[rows[i][1] == kind for i in other]]):.2f}" for kind in ("step", "goal", "joined")}
+        kinds = np.array([rows[i][1] for i in other])
+        by = {str(kind): f"{100 * hit[kinds == kind].mean():.2f}" for kind in np.unique(kinds)}
         kept = np.flatnonzero(quantised.any(1))
         print(f"{name}: right of the tenth kept apart {by}; {len(kept)} features, {np.count_nonzero(quantised)} weights")
         if name != "slice":

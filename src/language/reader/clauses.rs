@@ -191,11 +191,12 @@ pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
             && goes_on(&tokens[at + 1..])
         {
             // "put the mug in the sink and the plate in the cabinet"
-            let verb = Token { text: "put".into(), unknown: None, classes: &[] };
+            let verb = Token { text: "put".into(), unknown: None, many: false, classes: &[] };
             all.push(Clause { lemma: "put", tokens: vec![verb], ends_sentence: false });
             continue;
         }
-        let purpose = at > 0 && tokens[at - 1].text == "to" && !last.lemma.is_empty() && last.lemma != "go";
+        let purpose =
+            at > 0 && tokens[at - 1].text == "to" && !last.lemma.is_empty() && !matches!(last.lemma, "go" | "open");
         match lemma.filter(|_| !purpose) {
             Some(lemma) if last.lemma.is_empty() && !last.tokens.iter().any(Token::is_name) => {
                 last.lemma = lemma;

@@ -46,6 +46,11 @@ impl Features {
         let tokens = clauses.iter().flat_map(|clause| &clause.tokens);
         for token in tokens.filter(|token| token.unknown.is_none() && !skipped(&token.text)) {
             self.add("w", &token.text);
+            if token.many {
+                self.add("u", "");
+                self.add("u", &token.text);
+                self.add("ub", last);
+            }
             self.add("b", &format!("{last} {}", token.text));
             last = &token.text;
         }
@@ -117,6 +122,9 @@ impl Features {
             Some(chunk) => {
                 let Some(head) = chunk.head() else { return };
                 self.add(kind, &head.text);
+                if head.many {
+                    self.add(kind, "many");
+                }
                 for class in head.classes {
                     self.add(kind, &format!("= {}", class.name()));
                     if before.object == Some(*class) {
@@ -181,6 +189,53 @@ pub fn named_outright(clauses: &[Clause]) -> [Option<Class>; 2] {
     let thing = main(&all).and_then(|(lemma, pieces)| direct(lemma, pieces));
     let place = putting(&all).and_then(|(_, pieces)| places(pieces).next());
     [usual(thing), usual(place)]
+}
+
+/// Whether the clauses are about different things that do not go together: none is a knife, and the one is not put into the
+/// other.
+pub fn are_about_different_things(clauses: &[Clause]) -> bool {
+    let all = in_pieces(clauses);
+    let about = all.iter().filter(|(lemma, _)| CHANGING.contains(lemma) && *lemma != "turn");
+    let movable = |class: &&Class| class.info().pickupable && !class.is_knife();
+    let things: Vec<(bool, Vec<Class>)> = about
+        .filter_map(|(lemma, pieces)| Some((matches!(*lemma, "put" | "take"), direct(lemma, pieces)?.head()?)))
+        .map(|(carries, head)| (carries, head.classes.iter().filter(movable).copied().collect()))
+        .filter(|(_, classes): &(bool, Vec<Class>)| !classes.is_empty())
+        .collect();
+    let carried: Vec<Vec<Class>> =
+        things.iter().filter(|(carries, _)| *carries).map(|(_, classes)| classes.clone()).collect();
+    let differ = |a: &[Class], b: &[Class]| !a.iter().any(|class| b.contains(class));
+    let changed = things.iter().filter(|(carries, _)| !carries);
+    do_not_mix(&carried) || changed.into_iter().any(|(_, one)| things.iter().any(|(_, other)| differ(one, other)))
+}
+
+fn is_lamp_name(classes: &[Class]) -> bool {
+    !classes.is_empty() && classes.iter().all(|class| matches!(class.name(), "DeskLamp" | "FloorLamp"))
+}
+
+/// Whether something is put somewhere, and whether a thing besides a lamp is spoken of.
+pub fn speaks_of(clauses: &[Clause]) -> (bool, bool) {
+    let all = in_pieces(clauses);
+    let tokens = || clauses.iter().flat_map(|clause| &clause.tokens);
+    let furniture = |class: &Class| class.info().receptacle && !class.info().pickupable;
+    let place = all.iter().any(|(_, pieces)| places(pieces).next().is_some())
+        || tokens().any(|token| lexicon().verb(&token.text) == Some("put") || token.classes.iter().any(furniture));
+    let is_lamp = |chunk: &Chunk| chunk.head().is_some_and(|head| is_lamp_name(head.classes));
+    let thing = tokens().any(|token| token.classes.iter().any(|class| class.info().pickupable))
+        || all.iter().any(|(lemma, pieces)| {
+            pieces.iter().any(Chunk::is_pronoun)
+                || !pieces.iter().any(is_lamp)
+                || *lemma != "turn" && !pieces.iter().all(is_lamp)
+        });
+    (place, thing)
+}
+
+/// Whether two of some things have no class in common, and none of them holds the other.
+pub fn do_not_mix(things: &[Vec<Class>]) -> bool {
+    let holds = |classes: &[Class]| classes.iter().any(|class| class.info().receptacle);
+    things.iter().enumerate().any(|(at, one)| {
+        things[..at].iter().any(|other| !one.iter().any(|class| other.contains(class)) && !holds(one) && !holds(other))
+    })
 }
 
 /// What a verb is about: what follows it at once; a switch may have its particle in between, a slice is of something.

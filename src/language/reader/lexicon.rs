@@ -63,6 +63,7 @@ pub struct Lexicon {
 struct Name {
     words: Vec<String>,
     singular: String,
+    many: bool,
     classes: Vec<Class>,
 }
 
@@ -130,7 +131,9 @@ impl Lexicon {
         for (form, (singular, classes)) in found {
             let words = split(&form);
             self.all.extend(words.iter().cloned());
-            let name = Name { singular: singular.replace(' ', "_"), classes: classes.into_iter().collect(), words };
+            let many = form != singular;
+            let name =
+                Name { many, singular: singular.replace(' ', "_"), classes: classes.into_iter().collect(), words };
             self.names.entry(name.words[0].clone()).or_default().push(name);
         }
         for names in self.names.values_mut() {
@@ -163,13 +166,14 @@ impl Lexicon {
         out
     }
 
-    /// The longest name that starts here: how many words it has, its singular as one word, and the classes that bear it.
-    pub fn name_at<'a>(&'a self, words: &[(String, usize)]) -> Option<(usize, &'a str, &'a [Class])> {
+    /// The longest name that starts here: how many words it has, its singular as one word, whether it is the plural, and the
+    /// classes that bear it.
+    pub fn name_at<'a>(&'a self, words: &[(String, usize)]) -> Option<(usize, &'a str, bool, &'a [Class])> {
         let fits = |name: &&Name| {
             name.words.len() <= words.len() && name.words.iter().zip(words).all(|(name, (word, _))| name == word)
         };
         let name = self.names.get(&words.first()?.0)?.iter().find(fits)?;
-        Some((name.words.len(), &name.singular, &name.classes))
+        Some((name.words.len(), &name.singular, name.many, &name.classes))
     }
 
     /// A class's usual name, as one word.

@@ -9,7 +9,9 @@ pub mod spelling;
 pub mod tokens;
 
 mod reading;
+mod told;
 mod units;
+mod unread;
 
 pub use reading::{Alternative, CERTAIN, ReadSubtask, Reading, Step, canonical};
 pub use units::{Context, Reader};

@@ -6,7 +6,7 @@ use crate::domain::Class;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 
 /// Above this confidence a reading may be shown as certain; below it the display should ask.
-pub const CERTAIN: f32 = 0.96;
+pub const CERTAIN: f32 = 0.97;
 
 /// Another class that may have been meant, and how likely.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -14,6 +14,8 @@ pub struct Token {
     pub text: String,
     /// The word as it was typed, where it is nothing that the reader knows.
     pub unknown: Option<String>,
+    /// It is a name in the plural.
+    pub many: bool,
     /// The classes that bear the name.
     pub classes: &'static [Class],
 }
@@ -81,13 +83,13 @@ pub fn tokens(text: &str, spelling: &Spelling) -> Vec<Token> {
     let mut at = 0;
     while at < words.len() {
         let (word, from) = &words[at];
-        if let Some((length, name, classes)) = lexicon.name_at(&words[at..]) {
-            tokens.push(Token { text: name.to_string(), unknown: None, classes });
+        if let Some((length, name, many, classes)) = lexicon.name_at(&words[at..]) {
+            tokens.push(Token { text: name.to_string(), unknown: None, many, classes });
             at += length;
             continue;
         }
         let unknown = unknown.get(*from).copied().unwrap_or(false).then(|| typed[*from].clone());
-        tokens.push(Token { text: word.clone(), unknown, classes: &[] });
+        tokens.push(Token { text: word.clone(), unknown, many: false, classes: &[] });
         at += 1;
     }
     tokens

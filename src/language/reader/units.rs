@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use super::clauses::{Clause, chunks, clauses, without_the_forbidden};
-use super::features::{Before, direct, features, named_outright};
-use super::lexicon::lexicon;
+use super::clauses::{Clause, clauses, without_the_forbidden};
+use super::features::{Before, are_about_different_things, do_not_mix, features, named_outright, speaks_of};
 use super::model::{Head, Model, ModelError, softmax};
 use super::reading::{Alternative, ReadSubtask, Reading};
 use super::shape::Shape;
 use super::tokens::{Token, tokens};
+use super::told::Told;
+use super::unread::{is_foreign, says_nothing, unread};
 use crate::domain::Class;
 use crate::domain::skill::SkillKind;
 
@@ -23,8 +24,8 @@ const PASSED_OVER: f32 = -3.0;
 const IN_HOUSE: f32 = 0.05;
 /// Alternatives that are kept.
 const ALTERNATIVES: usize = 3;
-/// What a class's usual name speaks for it, as the logarithm of odds, beside what was learned.
-const OUTRIGHT: f32 = 2.0;
+/// How much likelier a class gets by its usual name, beside what was learned.
+const OUTRIGHT: f32 = 1.5;
 
 /// What is known besides the text.
 #[derive(Clone, Copy, Debug, Default)]
@@ -102,7 +103,8 @@ impl Reader {
             }
             paths[end] = best;
         }
-        let path = paths.pop().flatten().unwrap_or_default();
+        let mut path = paths.pop().flatten().unwrap_or_default();
+        leave_out_means(&mut path.read);
         let unread = unread(&wanted, &clauses);
         let raw = if path.read.is_empty() { 0.0 } else { path.probability * 0.6f32.powi(unread.len() as i32) };
         let open = path
@@ -130,18 +132,26 @@ impl Reader {
     fn each(&self, path: &Path, clauses: &[Clause], context: &Context<'_>) -> Option<Path> {
         let [clause] = clauses else { return None };
         let apart = clause.apart()?;
+        let read = |score: f32| {
+            let start = Path { score: 0.0, ..path.clone() };
+            let read = apart.iter().try_fold(start, |path, one| self.unit(&path, std::slice::from_ref(one), context));
+            Some(Path { score: path.score + score + NEW_UNIT, ..read? })
+        };
+        if is_certainly_apart(clause) {
+            return read(0.0);
+        }
         let head = self.model.head("shape")?;
         let many = head.labels().iter().position(|label| Shape::named(label) == Some(Shape::Many))?;
         let p = softmax(&head.scores(&features(clauses, before(path, context))))[many];
-        let start = Path { score: 0.0, ..path.clone() };
-        let read =
-            apart.iter().try_fold(start, |path, clause| self.unit(&path, std::slice::from_ref(clause), context))?;
-        Some(Path { score: path.score + p.max(1e-9).ln() + NEW_UNIT, ..read })
+        read(p.max(1e-9).ln())
     }
 
     fn unit(&self, path: &Path, clauses: &[Clause], context: &Context<'_>) -> Option<Path> {
         let says = |clause: &Clause| !clause.lemma.is_empty() || clause.tokens.iter().any(Token::is_name);
         if clauses.iter().any(|clause| is_foreign(clause) || says_nothing(clause)) || !clauses.iter().any(says) {
+            return None;
+        }
+        if are_about_different_things(clauses) || matches!(clauses, [clause] if is_certainly_apart(clause)) {
             return None;
         }
         let unit = self.shape(clauses, before(path, context))?;
@@ -156,7 +166,14 @@ impl Reader {
         let head = self.model.head("shape")?;
         let all = softmax(&head.scores(&features));
         let shapes = head.labels().iter().zip(all).filter_map(|(label, p)| Some((Shape::named(label)?, p)));
-        let (shape, p) = shapes.filter(|(shape, _)| *shape != Shape::Many).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (place, thing) = speaks_of(clauses);
+        let may = |shape: Shape| match shape {
+            Shape::Many => false,
+            Shape::Changed(_) | Shape::Stack | Shape::Two => place,
+            Shape::Look => thing,
+            Shape::One(_) => true,
+        };
+        let (shape, p) = shapes.filter(|(shape, _)| may(*shape)).max_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(Unit { shape, score: p.max(1e-9).ln(), features })
     }
 
@@ -167,7 +184,15 @@ impl Reader {
         let house = context.house;
         path.probability *= score.exp();
         let [thing, place] = named_outright(clauses);
-        let object = self.answer("object", features, thing, house, &mut path.absent, |class| shape.takes_object(class));
+        let mut object =
+            self.answer("object", features, thing, house, &mut path.absent, |class| shape.takes_object(class));
+        let holder = (shape == Shape::Stack).then(|| {
+            let may = |class: Class| class.info().pickupable && class.info().receptacle;
+            let mut holder = self.answer("movable", features, None, house, &mut path.absent, may);
+            set_apart(&mut object, &mut holder);
+            path.probability *= holder.probability;
+            holder
+        });
         path.probability *= object.probability;
         let place = shape
             .has_place()
@@ -221,18 +246,15 @@ impl Reader {
                 });
             }
             Shape::Stack => {
-                let holder = self.answer("movable", features, None, house, &mut path.absent, |class| {
-                    class.info().pickupable && class.info().receptacle
-                });
-                path.probability *= holder.probability;
+                let Some(holder) = &holder else { return };
                 let mut inner = step(SkillKind::Put, slice);
                 inner.receptacle = holder.class;
-                inner.alternatives.extend(alternatives(&holder, true));
+                inner.alternatives.extend(alternatives(holder, true));
                 let mut outer = put(false);
                 outer.object = holder.class;
                 outer.looks = Vec::new();
                 outer.alternatives.retain(|other| other.is_receptacle);
-                outer.alternatives.extend(alternatives(&holder, false));
+                outer.alternatives.extend(alternatives(holder, false));
                 path.read.extend([inner, outer]);
             }
             Shape::Many => {}
@@ -268,6 +290,42 @@ impl Reader {
     }
 }
 
+/// A thing does not go into itself: of two answers that are the same, the one that loses less by it is the next best.
+fn set_apart(object: &mut Answer, holder: &mut Answer) {
+    if object.class != holder.class {
+        return;
+    }
+    let next = |answer: &Answer| answer.others.first().map_or(0.0, |other| other.1);
+    let keeps_object = object.probability * next(holder) > next(object) * holder.probability;
+    let other = if keeps_object { holder } else { object };
+    if !other.others.is_empty() {
+        let (class, probability) = other.others.remove(0);
+        (other.class, other.probability) = (Some(class), probability);
+    }
+}
+
+/// Putting a thing into what then heats, chills or rinses it is part of that.
+fn leave_out_means(read: &mut Vec<ReadSubtask>) {
+    let means = |put: &ReadSubtask, then: &ReadSubtask| {
+        let place = put.receptacle.map_or("", Class::name);
+        let tool = match then.skill {
+            SkillKind::Heat => "Microwave",
+            SkillKind::Cool => "Fridge",
+            SkillKind::Clean => "Sink",
+            _ => return false,
+        };
+        put.skill == SkillKind::Put && place == tool && put.object == then.object
+    };
+    let mut at = 0;
+    while at + 1 < read.len() {
+        if means(&read[at], &read[at + 1]) {
+            read.remove(at);
+        } else {
+            at += 1;
+        }
+    }
+}
+
 /// What is known where a path ends.
 fn before(path: &Path, context: &Context<'_>) -> Before {
     let last = path.read.last().or(context.before.last());
@@ -288,11 +346,13 @@ fn ranked(
         .map(|class| class.filter(|&class| class != Class::NONE))
         .zip(scores)
         .filter(|(class, _)| class.is_none_or(&may))
-        .map(|(class, score)| (class, if class.is_some() && class == outright { score + OUTRIGHT } else { score }))
         .collect();
     let p = softmax(&kept.iter().map(|(_, score)| *score).collect::<Vec<_>>());
     let mut all: Vec<(Option<Class>, f32)> = kept.into_iter().map(|(class, _)| class).zip(p).collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // What a name speaks for its class decides, but makes nothing more certain.
+    let weight =
+        |&(class, p): &(Option<Class>, f32)| if class.is_some() && class == outright { p * OUTRIGHT } else { p };
+    all.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
     all
 }
 
@@ -300,93 +360,11 @@ fn alternatives(answer: &Answer, is_receptacle: bool) -> Vec<Alternative> {
     answer.others.iter().map(|&(class, probability)| Alternative { is_receptacle, class, probability }).collect()
 }
 
-/// What a unit says besides its skill and classes.
-struct Told {
-    looks: Vec<String>,
-    place: Option<Class>,
-    takes_first: bool,
-}
-
-impl Told {
-    fn of(clauses: &[Clause]) -> Told {
-        let doing: Vec<&Clause> =
-            clauses.iter().filter(|clause| !matches!(clause.lemma, "" | "go" | "wait" | "open" | "close")).collect();
-        let takes_first = doing.len() > 1 && doing[0].lemma == "take";
-        let Some(clause) = doing.first().copied().or(clauses.first()) else {
-            return Told { looks: Vec::new(), place: None, takes_first };
-        };
-        let pieces = chunks(clause);
-        let thing = direct(clause.lemma, &pieces).or(pieces.first());
-        let head = thing.and_then(|thing| thing.head());
-        let before_head = |chunk: &super::clauses::Chunk| {
-            let words = chunk.words.iter().take_while(|word| Some(*word) != head);
-            words
-                .filter(|word| !word.is_name() && !lexicon().words.plain.contains(&word.text) && word.unknown.is_none())
-                .map(|word| word.text.clone())
-                .collect()
-        };
-        let looks = thing.map(before_head).unwrap_or_default();
-        let leads = |lead: &str| matches!(lead, "in" | "on" | "from" | "off" | "out" | "inside" | "at" | "under");
-        let places = pieces.iter().skip(1).filter(|chunk| leads(&chunk.lead));
-        let mut classes = places.filter_map(|chunk| chunk.head()?.classes.first().copied());
-        Told { looks, place: classes.find(|class| class.info().receptacle), takes_first }
-    }
-}
-
-/// Whether a clause begins with something that is not understood.
-fn is_foreign(clause: &Clause) -> bool {
-    let mut before = clause.tokens.iter().take_while(|token| !token.is_name());
-    let says = |words: &[&str]| clause.tokens.iter().any(|token| words.contains(&token.text.as_str()));
-    let turned = clause.lemma == "turn"
-        && !says(&["on", "off", "lamp", "light", "floor_lamp", "desk_lamp"])
-        && !says_nothing(clause);
-    turned || clause.lemma.is_empty() && before.any(|token| is_strange(token))
-}
-
-/// Whether nothing is made of a word.
-fn is_strange(token: &Token) -> bool {
-    token.unknown.is_some() || lexicon().words.foreign.contains(&token.text) && !token.is_name()
-}
-
-/// Whether a clause is about nothing: "turn around".
-fn says_nothing(clause: &Clause) -> bool {
-    let words = &lexicon().words;
-    let mut rest = clause.tokens.iter().filter(|token| lexicon().verb(&token.text) != Some(clause.lemma));
-    matches!(clause.lemma, "turn" | "look")
-        && rest.all(|token| {
-            let word = &token.text;
-            token.is_mark()
-                || words.prepositions.contains(word) && word != "on"
-                || words.determiners.contains(word)
-                || words.places.contains(word)
-                || words.plain.contains(word)
-                || words.particles.contains(word)
-                || words.breaks.contains(word)
-        })
-}
-
-/// The words that were not understood: those that nobody knows, and the rest of a clause that begins with one.
-fn unread(typed: &[Token], clauses: &[Clause]) -> Vec<String> {
-    let plain = &lexicon().words;
-    let mut words: Vec<String> = Vec::new();
-    let foreign = clauses.iter().filter(|clause| is_foreign(clause)).flat_map(|clause| &clause.tokens);
-    let foreign: Vec<&Token> = foreign.collect();
-    for token in typed {
-        let skipped = plain.plain.contains(&token.text)
-            || plain.determiners.contains(&token.text)
-            || plain.prepositions.contains(&token.text)
-            || token.is_mark();
-        if skipped {
-            continue;
-        }
-        let word = match &token.unknown {
-            Some(word) => word.clone(),
-            None if foreign.contains(&token) || is_strange(token) => token.text.replace('_', " "),
-            None => continue,
-        };
-        if !words.contains(&word) {
-            words.push(word);
-        }
-    }
-    words
+/// Whether a clause names several things of which none goes into another.
+fn is_certainly_apart(clause: &Clause) -> bool {
+    let names = |part: &Clause| part.tokens.iter().find(|token| token.is_name()).map(|token| token.classes.to_vec());
+    let Some(parts) = clause.apart() else { return false };
+    let things: Vec<Vec<Class>> = parts.iter().filter_map(names).collect();
+    let movable = things.iter().flatten().all(|class| class.info().pickupable);
+    movable && (clause.lemma != "put" || do_not_mix(&things)) && things.windows(2).all(|pair| pair[0] != pair[1])
 }
