@@ -23,7 +23,7 @@
 //! | [`cli`] | the command line |
 
 pub mod domain;
-mod language;
+pub mod language;
 pub mod house;
 mod env;
 pub mod data;

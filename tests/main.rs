@@ -15,7 +15,6 @@ mod command_line;
 mod generated;
 mod properties;
 mod program;
-mod reader;
 mod evaluator;
 mod faults;
 mod scenarios;

@@ -1,16 +1,20 @@
-//! How well typed wishes are read: people's sentences, any text, and what annotators of the held-out split wrote.
+//! How well typed wishes are read: people's sentences, any text, and what annotators of the held-out split wrote. Part of the
+//! library's own tests, which see its inside.
+
+// What was measured is printed, and so is why a test was skipped.
+#![allow(clippy::print_stderr)]
 
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Instant;
 
+use crate::data::Dataset;
+use crate::domain::task::SceneRef;
+use crate::domain::{Class, SkillKind, Subtask, Trajectory};
+use crate::house::grading::{Grader, Grading};
+use crate::language::nouns::names;
+use crate::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Reading, Step, canonical};
 use proptest::prelude::*;
-use sprint_explorer::data::Dataset;
-use sprint_explorer::domain::task::SceneRef;
-use sprint_explorer::domain::{Class, SkillKind, Subtask, Trajectory};
-use sprint_explorer::house::grading::{Grader, Grading};
-use sprint_explorer::language::nouns;
-use sprint_explorer::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Reading, Step, canonical};
 
 fn reader() -> &'static Reader {
     Reader::shipped().unwrap()
@@ -22,7 +26,7 @@ fn steps(read: &[ReadSubtask]) -> Vec<Step> {
 
 /// "Pickup Mug; Put Mug Sink", or "-" for nothing.
 fn parse(expected: &str) -> Vec<Step> {
-    let skill = |name: &str| SkillKind::ALL.into_iter().find(|kind| format!("{kind:?}") == name).unwrap();
+    let skill = |name: &str| serde_json::from_value::<SkillKind>(name.into()).unwrap();
     let class = |name: &str| Class::named(name).unwrap_or_else(|| panic!("no class {name}"));
     let all = expected.split("; ").filter(|step| *step != "-").map(|step| {
         let words: Vec<&str> = step.split(' ').collect();
@@ -107,7 +111,7 @@ impl Measured {
         let exact = read == expected;
         let second = || reading.second().is_some_and(|second| steps(&second.subtasks) == expected);
         let alike = |a: Option<Class>, b: Option<Class>| match (a, b) {
-            (Some(a), Some(b)) => a == b || nouns::names(text, a) && nouns::names(text, b),
+            (Some(a), Some(b)) => a == b || names(text, a) && names(text, b),
             (a, b) => a == b,
         };
         let named = read.len() == expected.len()

@@ -5,11 +5,10 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 
-use super::Ending;
-use super::rooms::RoomName;
+use super::exit_status::ExitStatus;
 use crate::data::dataset;
 use crate::domain::{Class, Room};
 use crate::house::generate;
@@ -19,7 +18,7 @@ use crate::language::reader::{Context, ReadSubtask, Reader, Reading, features_of
 
 /// Reads wishes.
 #[derive(Args)]
-pub struct ReadArgs {
+pub(crate) struct ReadArgs {
     /// The house that they are said in: ROOM:SEED for a generated one (kitchen:7), or a scene file
     #[arg(long, value_name = "ROOM:SEED|FILE")]
     scene: Option<String>,
@@ -52,7 +51,7 @@ impl ReadArgs {
     ///
     /// # Errors
     /// When the scene cannot be read or a line is not UTF-8.
-    pub fn run(self) -> anyhow::Result<Ending> {
+    pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         if let Some(words) = &self.features {
             return print_features(words);
         }
@@ -67,18 +66,18 @@ impl ReadArgs {
             out.write_all(b"\n")?;
             out.flush()?;
         }
-        Ok(Ending::Ok)
+        Ok(ExitStatus::Ok)
     }
 }
 
 /// The classes of a house: of a generated one all that it holds, of a scene file its furniture and everything movable.
 fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
     if let Some((room, seed)) = name.split_once(':')
-        && let Ok(room) = RoomName::from_str(room, true)
+        && let Ok(room) = room.parse::<Room>()
     {
         let seed =
             seed.parse().with_context(|| format!("--scene {name}: {seed:?} is not a seed: use a whole number"))?;
-        let (scene, world) = generate::house(Room::from(room), seed);
+        let (scene, world) = generate::house(room, seed);
         let fixtures = scene.fixtures.iter().map(|fixture| fixture.class);
         return Ok(fixtures.chain(world.objects.iter().map(|object| object.class)).collect());
     }
@@ -93,7 +92,7 @@ fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
     Ok(scene.fixtures.iter().map(|fixture| fixture.class).chain(movable).collect())
 }
 
-fn print_features(words: &Path) -> anyhow::Result<Ending> {
+fn print_features(words: &Path) -> anyhow::Result<ExitStatus> {
     let known = std::fs::read_to_string(words).with_context(|| words.display().to_string())?;
     let spelling = Spelling::of(known.lines().map(str::to_string));
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
@@ -105,5 +104,5 @@ fn print_features(words: &Path) -> anyhow::Result<Ending> {
         writeln!(out, "{}", all.join(" "))?;
     }
     out.flush()?;
-    Ok(Ending::Ok)
+    Ok(ExitStatus::Ok)
 }

@@ -21,3 +21,7 @@ pub fn features_of(text: &str, before: features::Before, spelling: &spelling::Sp
     let wanted = clauses::without_the_forbidden(tokens::tokens(text, spelling));
     features::features(&clauses::clauses(&wanted), before)
 }
+
+#[cfg(test)]
+#[path = "../../../tests/reader.rs"]
+mod tests;

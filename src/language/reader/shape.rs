@@ -31,7 +31,14 @@ impl Shape {
             "CoolPut" => Shape::Changed(SkillKind::Cool),
             "Two" => Shape::Two,
             "Many" => Shape::Many,
-            _ => Shape::One(SkillKind::ALL.into_iter().find(|kind| format!("{kind:?}") == name)?),
+            "Pickup" => Shape::One(SkillKind::Pickup),
+            "Put" => Shape::One(SkillKind::Put),
+            "Slice" => Shape::One(SkillKind::Slice),
+            "Toggle" => Shape::One(SkillKind::Toggle),
+            "Clean" => Shape::One(SkillKind::Clean),
+            "Heat" => Shape::One(SkillKind::Heat),
+            "Cool" => Shape::One(SkillKind::Cool),
+            _ => return None,
         })
     }
 
