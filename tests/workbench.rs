@@ -10,7 +10,7 @@ const RANDOM: [&str; 7] = ["--policy", "random", "--graphics", "halfblocks", "--
 /// The explorer in a kitchen with a task of two subtasks, chance deciding.
 fn random() -> Session {
     let session = Session::start(&RANDOM);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     session
 }
@@ -163,7 +163,7 @@ fn a_terminal_that_never_answers_is_asked_once_and_a_late_answer_is_no_text() {
     let state = tempfile::tempdir().unwrap();
     let arguments = ["--policy", "random", "--seed", "3", "--paused"];
     let mut session = Session::open(state.path(), (80, 24), "explore", &arguments);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     assert!(session.has_written("\x1b[c"), "the terminal is asked what it is");
     session.press("i");
@@ -175,7 +175,7 @@ fn a_terminal_that_never_answers_is_asked_once_and_a_late_answer_is_no_text() {
     session.see("Instruction > Take the mug.");
     leave(session);
     let session = Session::open(state.path(), (80, 24), "explore", &arguments);
-    session.see("ActionDistribution");
+    session.see("Mind");
     session.see("step 0");
     assert!(!session.has_written("\x1b[c"), "and is not asked again");
     leave(session);
