@@ -207,9 +207,9 @@ fn what_annotators_wrote_is_read_as_measured() {
     eprintln!("{:.3} ms a text", 1000.0 * seconds / f64::from(texts));
     assert!(alone.exact_share() > LEAST[0] && told.exact_share() > LEAST[1] && told_there.exact_share() > LEAST[2]);
     assert!(goals.exact_share() > LEAST[3] && goals_there.exact_share() > LEAST[4]);
-    assert!(told.wrong_and_certain as f64 <= 0.025 * told.texts as f64);
+    assert!(told.wrong_and_certain as f64 <= 0.02 * told.texts as f64);
     assert!(seconds / f64::from(texts) < 0.015);
 }
 
 /// What was measured, less a small margin.
-const LEAST: [f64; 5] = [0.75, 0.82, 0.83, 0.70, 0.72];
+const LEAST: [f64; 5] = [0.755, 0.83, 0.845, 0.72, 0.745];

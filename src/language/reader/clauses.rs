@@ -273,7 +273,9 @@ pub fn chunks(clause: &Clause) -> Vec<Chunk> {
         } else if words.prepositions.contains(text) {
             let place = !chunk.words.is_empty() && chunk.words.iter().all(|word| words.places.contains(&word.text));
             if place {
-                let beside = chunk.words.iter().any(|word| matches!(word.text.as_str(), "left" | "right" | "front"));
+                let side = |word: &Token| word.text == "side" && chunk.lead != "to" && chunk.lead != "by";
+                let beside = !chunk.words.iter().any(side)
+                    && chunk.words.iter().any(|word| matches!(word.text.as_str(), "left" | "right" | "front"));
                 if beside && matches!(chunk.lead.as_str(), "to" | "in" | "on" | "by" | "from") && text == "of" {
                     chunk.lead = "by".into();
                 } else if text != "of" {
@@ -336,7 +338,8 @@ mod tests {
     fn a_clause_begins_at_each_verb() {
         let all = read("Please grab the red mug on the table, wash it and put it in the sink. Turn on the lamp");
         assert_eq!(all, ["take: [red mug] on[table]", "wash: [it]", "put: [it] in[sink]", "turn: on[lamp]"]);
-        assert_eq!(read("put a clean mug on the back of the toilet"), ["put: [clean mug] on[toilet]"]);
+        assert_eq!(read("put a clean mug on the back of the toilet"), ["put: [clean mug] on[back_of_the_toilet]"]);
+        assert_eq!(read("put it on the right side of the desk"), ["put: [it] on[desk]"]);
         assert_eq!(read("pick up a slice of bread"), ["take: [slice] of[bread]"]);
     }
 

@@ -37,16 +37,20 @@ impl Spelling {
         self.rank.contains_key(word)
     }
 
-    /// The nearest known word: one slip away, or two in a long word; a slip in the first letter counts twice.
+    /// The nearest known word: one slip away, or two in a long word; a slip in the first letter counts twice. In words of three
+    /// letters only two that changed places are put right.
     pub fn correct(&self, word: &str) -> Option<&str> {
         let letters: Vec<char> = word.chars().collect();
-        if letters.len() < 4 || letters.len() > LONGEST || letters.iter().any(char::is_ascii_digit) {
+        if letters.len() < 3 || letters.len() > LONGEST || letters.iter().any(char::is_ascii_digit) {
             return None;
         }
         let most = if letters.len() >= 7 { 2 } else { 1 };
         let lengths = letters.len() - most..=(letters.len() + most).min(LONGEST);
         let candidates = lengths.flat_map(|length| &self.by_length[length]);
         let scored = candidates.filter(|(known, _)| known.len() > 2).filter_map(|(known, rank)| {
+            if letters.len() == 3 && sorted(known) != sorted(&letters) {
+                return None;
+            }
             let slips = slips(&letters, known, most)?;
             let first = usize::from(known[0] != letters[0]);
             (slips + first <= most).then_some(((slips + first, *rank), known))
@@ -54,6 +58,12 @@ impl Spelling {
         let (_, best) = scored.min_by_key(|&(score, _)| score)?;
         self.rank.get_key_value(&best.iter().collect::<String>()).map(|(word, _)| word.as_str())
     }
+}
+
+fn sorted(letters: &[char]) -> Vec<char> {
+    let mut letters = letters.to_vec();
+    letters.sort_unstable();
+    letters
 }
 
 /// How many letters were left out, added, changed or swapped with the next; `None` when more than `most`.
@@ -84,7 +94,9 @@ mod tests {
     #[test]
     fn slips_of_the_finger_are_put_right() {
         let spelling = Spelling::of(["lettuce", "microwave", "potato"].map(str::to_string));
-        for (wrong, right) in [("letuce", "lettuce"), ("mircowave", "microwave"), ("poatto", "potato"), ("mgu", "")] {
+        for (wrong, right) in
+            [("letuce", "lettuce"), ("mircowave", "microwave"), ("poatto", "potato"), ("mgu", "mug"), ("mgx", "")]
+        {
             assert_eq!(spelling.correct(wrong).unwrap_or_default(), right);
         }
     }

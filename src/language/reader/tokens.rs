@@ -112,9 +112,9 @@ mod tests {
 
     #[test]
     fn slips_are_put_right_and_what_is_unknown_is_kept() {
-        assert_eq!(read("put teh mgu in the mircowave"), "put the mgu in the microwave");
-        let all = tokens("juggle the potatos", &Spelling::of([]));
-        assert_eq!(all[0].unknown.as_deref(), Some("juggle"));
+        assert_eq!(read("put teh mgu in the mircowave"), "put the mug in the microwave");
+        let all = tokens("frobnicate the potatos", &Spelling::of([]));
+        assert_eq!(all[0].unknown.as_deref(), Some("frobnicate"));
         assert_eq!(all[2].text, "potato");
     }
 }
