@@ -41,11 +41,14 @@ pub struct Words {
     pub foreign: BTreeSet<String>,
 }
 
+/// A phrase, word by word, and the words that it stands for.
+type Phrase = (Vec<String>, Vec<String>);
+
 /// Everything that is known of words before anything is learned.
 #[derive(Debug, Default)]
 pub struct Lexicon {
     /// Phrases and what they stand for, by their first word; the longest first.
-    same: HashMap<String, Vec<(Vec<String>, Vec<String>)>>,
+    same: HashMap<String, Vec<Phrase>>,
     /// Verbs by form.
     verbs: HashMap<String, &'static str>,
     /// Names of classes, as words, by their first word; the longest first.

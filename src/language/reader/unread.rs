@@ -11,7 +11,7 @@ pub(super) fn is_foreign(clause: &Clause) -> bool {
     let turned = clause.lemma == "turn"
         && !says(&["on", "off", "lamp", "light", "floor_lamp", "desk_lamp"])
         && !says_nothing(clause);
-    turned || clause.lemma.is_empty() && before.any(|token| is_strange(token))
+    turned || clause.lemma.is_empty() && before.any(is_strange)
 }
 
 /// Whether nothing is made of a word.
