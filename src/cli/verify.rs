@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::{jobs, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
-use crate::eval::verify;
+use crate::eval::verify::{Difference, Mismatch, verify};
 use crate::run_dir::reader::RecordedRun;
 
 /// Which run.
@@ -48,7 +48,7 @@ impl Verify {
             )
         };
         let (mut progress, total) = (Progress::new(), run.episodes.len() as u64);
-        let verdict = verify::verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| {
+        let verdict = verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| {
             progress.show("verifying", done as u64, total, "")
         })?;
         progress.end();
@@ -62,8 +62,9 @@ impl Verify {
                 writeln!(out, "{policy:?} is not at hand: only what its actions came to was compared")?;
             }
             for d in &verdict.differences {
-                let (number, task, step, what) = (d.episode, &d.task, d.step, d.what);
-                writeln!(out, "episode {number} ({task}), step {step}: {what} was {}, is {}", d.recorded, d.found)?;
+                let Difference { episode, task, mismatch } = d;
+                let Mismatch { step, what, recorded, found } = mismatch;
+                writeln!(out, "episode {episode} ({task}), step {step}: {what} was {recorded}, is {found}")?;
             }
             if let Some(told) = verdict.summarised.filter(|&told| told != verdict.plain) {
                 writeln!(out, "episodes: the summary tells of {told}, there are {}", verdict.plain)?;

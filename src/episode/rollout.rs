@@ -18,6 +18,8 @@ pub(crate) struct Rollout<E = HouseEnvironment> {
     pub(crate) instruction: String,
     /// After how many steps it ends; `None` for no limit.
     pub(crate) horizon: Option<u32>,
+    /// In which of its slots a policy decides here.
+    pub(crate) slot: usize,
     steps: u32,
 }
 
@@ -90,7 +92,7 @@ impl Rollout {
 impl<E: Environment> Rollout<E> {
     /// An episode at its start.
     pub(crate) fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
-        Rollout { env, instruction, horizon, steps: 0 }
+        Rollout { env, instruction, horizon, slot: 0, steps: 0 }
     }
 
     /// How many steps were taken.
@@ -125,12 +127,12 @@ impl<E: Environment> Rollout<E> {
         Observation { environment: &mut self.env, instruction: &self.instruction, step: self.steps }
     }
 
-    /// What `policy` would do now in its slot 0, without doing it.
+    /// What `policy` would do now, without doing it.
     ///
     /// # Errors
     /// Whatever the policy reports.
     pub(crate) fn decide(&mut self, policy: &mut dyn Policy) -> anyhow::Result<Decision> {
-        policy.act_in(0, self.observation())
+        policy.act_in(self.slot, self.observation())
     }
 
     /// What the policy's critics say of the present state, in which it decided so; nothing without critics.
@@ -140,7 +142,7 @@ impl<E: Environment> Rollout<E> {
     pub(crate) fn values(&mut self, policy: &mut dyn Policy, decision: &Decision) -> anyhow::Result<Option<Values>> {
         match &decision.values {
             Some(values) => Ok(Some(values.clone())),
-            None => policy.values(0, &mut self.observation()),
+            None => policy.values(self.slot, &mut self.observation()),
         }
     }
 
@@ -155,7 +157,7 @@ impl<E: Environment> Rollout<E> {
         Ok(Tick { step: self.steps, decision, outcome: transition.outcome, completed_one })
     }
 
-    /// Lets a policy act in its slot 0 until the episode is over or `observer` ends it.
+    /// Lets a policy act until the episode is over or `observer` ends it.
     ///
     /// # Errors
     /// Whatever policy, environment or observer report.

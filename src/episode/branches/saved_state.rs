@@ -60,7 +60,7 @@ pub(crate) fn look_back(
     before: &[SavedState],
     now: u32,
 ) {
-    policy.reset(0, author.seed);
+    policy.reset(rollout.slot, author.seed);
     policy.set_sampling(author.sampling);
     if before.is_empty() {
         return;
