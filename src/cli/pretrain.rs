@@ -15,6 +15,8 @@ use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
 use crate::train::in_training_eval::InTrainingEval;
+use crate::train::memory_agent::MemoryTraining;
+use crate::train::memory_agent::preset::MemoryPreset;
 use crate::train::preset::Preset;
 use crate::train::pretrain::{Pretraining, Trained};
 
@@ -72,6 +74,9 @@ impl Pretrain {
     /// # Errors
     /// When data or an earlier state cannot be read, or the checkpoint not be written.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
+        if let Some(preset) = MemoryPreset::named(&self.preset)? {
+            return self.run_memory(preset);
+        }
         let mut preset = Preset::sized(&self.preset, self.size.as_deref())?;
         if let Some(steps) = self.encoder_steps {
             preset.visual_encoder_training.optimisation.steps = steps;
@@ -107,6 +112,20 @@ impl Pretrain {
             return Ok(ExitStatus::Interrupted);
         }
         validate(&pretraining.out, &pretraining.preset.validation, embedder, progress)?;
+        Ok(ExitStatus::Ok)
+    }
+
+    fn run_memory(self, preset: MemoryPreset) -> anyhow::Result<ExitStatus> {
+        let training =
+            MemoryTraining { preset, data: self.data, out: self.out, resume: self.resume, device: best_device() };
+        let stop = stop::on_signals()?;
+        let mut progress = Progress::new();
+        let trained = training.run(&mut progress, &stop)?;
+        progress.end();
+        if trained == Trained::Stopped {
+            say("stopped; --resume goes on from here");
+            return Ok(ExitStatus::Interrupted);
+        }
         Ok(ExitStatus::Ok)
     }
 }

@@ -22,10 +22,10 @@ pub(crate) trait FrameEncoder: Send {
     fn share(&self) -> Box<dyn FrameEncoder>;
 }
 
-/// Images of one size as a tensor `[n, 3, side, side]` of bytes, laid out with the channels last: convolutions run faster so.
-pub(super) fn stacked(images: &[Vec<u8>]) -> Tensor {
-    let side = images.first().map_or(0, |image| (image.len() / 3).isqrt() as i64);
-    channels_last(&Tensor::from_slice(&images.concat()).view([images.len() as i64, 3, side, side]))
+/// Images of one size as a tensor `[n, planes, side, side]` of bytes, laid out with the channels last: convolutions run faster so.
+pub(super) fn stacked(images: &[Vec<u8>], planes: usize) -> Tensor {
+    let side = images.first().map_or(0, |image| (image.len() / planes).isqrt() as i64);
+    channels_last(&Tensor::from_slice(&images.concat()).view([images.len() as i64, planes as i64, side, side]))
 }
 
 fn channels_last(tensor: &Tensor) -> Tensor {

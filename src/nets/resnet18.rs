@@ -142,7 +142,7 @@ impl FrameEncoder for ResNet18 {
 
     fn encode(&self, images: &[Vec<u8>]) -> Tensor {
         tch::no_grad(|| {
-            let pixels = stacked(images).to_device(self.device).to_kind(Kind::Float);
+            let pixels = stacked(images, 3).to_device(self.device).to_kind(Kind::Float);
             let stem = self.stem.forward_relu(&((pixels - &self.mean) / &self.deviation));
             let pooled = stem.max_pool2d([3, 3], [2, 2], [1, 1], [1, 1], false);
             self.blocks.iter().fold(pooled, |x, block| block.forward(&x)).contiguous()

@@ -60,14 +60,14 @@ impl VisualSpec {
 }
 
 #[derive(Debug)]
-struct ConvNorm {
+pub(super) struct ConvNorm {
     conv: nn::Conv2D,
     stride: i64,
     norm: nn::BatchNorm,
 }
 
 impl ConvNorm {
-    fn new(path: &nn::Path<'_>, from: i64, to: i64, stride: i64) -> ConvNorm {
+    pub(super) fn new(path: &nn::Path<'_>, from: i64, to: i64, stride: i64) -> ConvNorm {
         let config = nn::ConvConfig { stride, padding: 1, bias: false, ..Default::default() };
         ConvNorm {
             conv: nn::conv2d(path / "conv", from, to, 3, config),
@@ -76,25 +76,25 @@ impl ConvNorm {
         }
     }
 
-    fn forward(&self, x: &Tensor, train: bool) -> Tensor {
+    pub(super) fn forward(&self, x: &Tensor, train: bool) -> Tensor {
         self.norm.forward_t(&precision::convolution(&self.conv, x, self.stride), train)
     }
 
-    fn folded(&self) -> FoldedConv {
+    pub(super) fn folded(&self) -> FoldedConv {
         FoldedConv::new(&self.conv.ws, BatchNormParts::of(&self.norm).as_ref(), self.stride)
     }
 }
 
 /// A step down in resolution, then a residual block.
 #[derive(Debug)]
-struct ResidualStage {
+pub(super) struct ResidualStage {
     down: ConvNorm,
     first: ConvNorm,
     second: ConvNorm,
 }
 
 impl ResidualStage {
-    fn new(path: &nn::Path<'_>, from: i64, to: i64) -> ResidualStage {
+    pub(super) fn new(path: &nn::Path<'_>, from: i64, to: i64) -> ResidualStage {
         ResidualStage {
             down: ConvNorm::new(&(path / "down"), from, to, 2),
             first: ConvNorm::new(&(path / "first"), to, to, 1),
@@ -102,10 +102,30 @@ impl ResidualStage {
         }
     }
 
-    fn forward(&self, x: &Tensor, train: bool) -> Tensor {
+    pub(super) fn forward(&self, x: &Tensor, train: bool) -> Tensor {
         let x = self.down.forward(x, train).relu();
         let change = self.second.forward(&self.first.forward(&x, train).relu(), train);
         (x + change).relu()
+    }
+
+    pub(super) fn folded(&self) -> FoldedStage {
+        FoldedStage([self.down.folded(), self.first.folded(), self.second.folded()])
+    }
+}
+
+/// A residual stage that only computes.
+#[derive(Debug)]
+pub(super) struct FoldedStage([FoldedConv; 3]);
+
+impl FoldedStage {
+    pub(super) fn forward(&self, x: &Tensor) -> Tensor {
+        let [down, first, second] = &self.0;
+        let x = down.forward_relu(x);
+        (second.forward(&first.forward_relu(&x)) + &x).relu_()
+    }
+
+    pub(super) fn share(&self) -> FoldedStage {
+        FoldedStage(self.0.each_ref().map(FoldedConv::share))
     }
 }
 
@@ -158,11 +178,10 @@ impl HouseEncoder {
     /// # Errors
     /// When the weights cannot be read.
     pub(crate) fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenVisual> {
-        let stage = |stage: &ResidualStage| [stage.down.folded(), stage.first.folded(), stage.second.folded()];
         Ok(FrozenVisual {
             spec: self.spec.clone(),
             stem: self.stem.folded(),
-            stages: self.stages.iter().map(stage).collect(),
+            stages: self.stages.iter().map(ResidualStage::folded).collect(),
             device: self.device,
             digest: weights::digest(store.variables())?,
         })
@@ -182,7 +201,7 @@ impl HouseEncoder {
 pub(crate) struct FrozenVisual {
     spec: VisualSpec,
     stem: FoldedConv,
-    stages: Vec<[FoldedConv; 3]>,
+    stages: Vec<FoldedStage>,
     device: Device,
     digest: String,
 }
@@ -198,11 +217,10 @@ impl FrameEncoder for FrozenVisual {
 
     fn encode(&self, images: &[Vec<u8>]) -> Tensor {
         tch::no_grad(|| {
-            let pixels = stacked(images).to_device(self.device).to_kind(Kind::Float);
+            let pixels = stacked(images, 3).to_device(self.device).to_kind(Kind::Float);
             let mut x = self.stem.forward_relu(&((pixels - 127.5) / 64.0));
-            for [down, first, second] in &self.stages {
-                x = down.forward_relu(&x);
-                x = (second.forward(&first.forward_relu(&x)) + &x).relu_();
+            for stage in &self.stages {
+                x = stage.forward(&x);
             }
             x.contiguous()
         })
@@ -216,7 +234,7 @@ impl FrameEncoder for FrozenVisual {
         Box::new(FrozenVisual {
             spec: self.spec.clone(),
             stem: self.stem.share(),
-            stages: self.stages.iter().map(|stage| stage.each_ref().map(FoldedConv::share)).collect(),
+            stages: self.stages.iter().map(FoldedStage::share).collect(),
             device: self.device,
             digest: self.digest.clone(),
         })

@@ -3,8 +3,10 @@
 pub mod batch_sampler;
 pub mod collect;
 pub(crate) mod feature_cache;
+pub(crate) mod detection;
 pub(crate) mod frame_store;
 pub(crate) mod in_training_eval;
+pub(crate) mod memory_agent;
 pub mod metrics;
 pub(crate) mod model_card;
 pub(crate) mod perception_targets;

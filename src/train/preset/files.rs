@@ -90,7 +90,7 @@ fn shipped(texts: &[(&'static str, &'static str)], name: &str, what: &str) -> an
 }
 
 /// Puts `over` over `table`, section by section; `false` takes a section away.
-pub(super) fn extend(table: &mut toml::Table, over: toml::Table) {
+pub(crate) fn extend(table: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (table.get_mut(&key), value) {
             (Some(toml::Value::Table(below)), toml::Value::Table(value)) => extend(below, value),

@@ -2,6 +2,8 @@
 
 mod files;
 
+pub(crate) use self::files::extend;
+
 use serde::{Deserialize, Serialize};
 
 use crate::algo::chain::{Chaining, PairSource};
@@ -203,7 +205,6 @@ impl Preset {
 
 #[cfg(test)]
 mod tests {
-    use super::files::extend;
     use super::*;
 
     #[test]

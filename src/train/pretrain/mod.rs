@@ -4,7 +4,7 @@
 mod checkpoint_config;
 mod demonstrations;
 mod initial_networks;
-mod out_folder;
+pub(crate) mod out_folder;
 mod policy;
 mod spec;
 mod text_embeddings;
@@ -15,6 +15,7 @@ use std::sync::atomic::AtomicBool;
 
 use self::demonstrations::Demonstrations;
 use self::initial_networks::initial_networks;
+use self::out_folder::TrainingFolder;
 use self::policy::Inputs;
 pub(crate) use self::spec::Pretraining;
 use self::text_embeddings::embed_texts;
@@ -32,6 +33,9 @@ pub(crate) enum Trained {
     Stopped,
 }
 
+/// The states of the stages, in the folder of the training.
+const STATES: [&str; 2] = ["visual.safetensors", "state.safetensors"];
+
 impl Pretraining {
     /// Trains; the checkpoint in `out` is complete whenever this returns `Finished`, and a working one from the first saved step of the
     /// policy on.
@@ -40,11 +44,12 @@ impl Pretraining {
     /// When data or an earlier state cannot be read, the folder not be written, or `out` holds something else already.
     pub(crate) fn run(&self, logger: &mut dyn ProgressLogger, stop: &Arc<AtomicBool>) -> anyhow::Result<Trained> {
         // What can be refused is refused before the folder is touched.
-        let has_state = out_folder::has_state(self)?;
+        let folder = TrainingFolder { out: &self.out, states: &STATES, resume: self.resume };
+        let has_state = folder.has_state()?;
         let demonstrations = Demonstrations::open(self)?;
         let networks = initial_networks(self)?;
         let evaluation = self.in_training_eval.as_ref().map(InTrainingEval::prepare).transpose()?;
-        out_folder::prepare(self, has_state)?;
+        folder.prepare(has_state, &toml::to_string(&self.preset)?, self.preset.format_version)?;
         let mut logger = JsonLinesLogger::open(&self.training_folder().join("progress.jsonl"), logger)?;
         let mut logger = TensorBoard::open(&self.training_folder(), &mut logger)?;
 

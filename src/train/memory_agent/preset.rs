@@ -1,0 +1,84 @@
+//! The hyper-parameters of an agent with a memory.
+
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use serde::{Deserialize, Serialize};
+
+use crate::nets::detector::DetectorSpec;
+use crate::train::detection::DetectorTraining;
+use crate::train::preset::{Preset, extend};
+
+const SHIPPED: &str = include_str!("../../../assets/presets/sprint-memory.toml");
+const NAME: &str = "sprint-memory";
+
+/// Every hyper-parameter of a training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MemoryPreset {
+    pub(crate) format_version: u32,
+    /// Always `memory`: what tells these presets from those of the paper's agents.
+    pub(crate) agent: AgentKind,
+    /// The method's name in cards and reports.
+    pub(crate) name: String,
+    /// Drives initialisation and the order of the data.
+    pub(crate) seed: u64,
+    /// One trajectory in that many is held out.
+    pub(crate) hold_out: usize,
+    /// Steps between two saved states.
+    pub(crate) save_every: u64,
+    /// Steps between two lines of training/progress.jsonl.
+    pub(crate) report_every: u64,
+    /// The size of the detector.
+    pub(crate) detector: DetectorSpec,
+    /// How the detector is trained.
+    pub(crate) detector_training: DetectorTraining,
+}
+
+/// The kind of agent that a preset is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum AgentKind {
+    /// One with a memory.
+    Memory,
+}
+
+impl MemoryPreset {
+    /// The shipped preset by its name, or a file's, which may extend it; `None` where the name or file is of another kind of agent.
+    ///
+    /// # Errors
+    /// When the file is of this kind and malformed; the field is named.
+    pub(crate) fn named(name: &str) -> anyhow::Result<Option<MemoryPreset>> {
+        let base: toml::Table = SHIPPED.parse()?;
+        let table = if name == NAME {
+            base
+        } else {
+            let Ok(text) = std::fs::read_to_string(Path::new(name)) else { return Ok(None) };
+            let Ok(mut over) = text.parse::<toml::Table>() else { return Ok(None) };
+            if over.get("extends").and_then(toml::Value::as_str) == Some(NAME) {
+                over.remove("extends");
+                let mut whole = base;
+                extend(&mut whole, over);
+                whole
+            } else if over.contains_key("agent") {
+                over
+            } else {
+                return Ok(None);
+            }
+        };
+        MemoryPreset::of(table).map(Some).with_context(|| format!("the preset {name}"))
+    }
+
+    fn of(table: toml::Table) -> anyhow::Result<MemoryPreset> {
+        let preset: MemoryPreset =
+            table.try_into().map_err(|error: toml::de::Error| anyhow::anyhow!("{}", error.to_string().trim_end()))?;
+        let (found, own) = (preset.format_version, Preset::FORMAT);
+        ensure!(found == own, "format_version is {found}, but this program reads {own}");
+        for (field, value) in [("save_every", preset.save_every), ("report_every", preset.report_every)] {
+            ensure!(value > 0, "{field} is 0");
+        }
+        preset.detector.check()?;
+        preset.detector_training.check("detector_training")?;
+        Ok(preset)
+    }
+}
