@@ -10,6 +10,8 @@ pub(crate) mod frame_history;
 pub(crate) mod learned;
 pub(crate) mod logit_adjustment;
 pub(crate) mod loop_guard;
+#[allow(dead_code)]
+pub(crate) mod memory;
 pub(crate) mod policy;
 pub mod policy_source;
 pub(crate) mod random;

@@ -24,6 +24,11 @@ impl Camera {
 
     /// The camera of an agent at `pose`.
     pub(crate) fn of(scene: &Scene, pose: Pose) -> Camera {
+        Camera::at(pose, scene.camera_y())
+    }
+
+    /// The camera of an agent at `pose` whose eye is at world height `eye_y` (millimetres).
+    pub(crate) fn at(pose: Pose, eye_y: i32) -> Camera {
         let Point { x, z, .. } = pose.cell.centre(0);
         // Quarter turns have exact sines, so that the four headings see bit-equal geometry.
         let (sin, cos) = match pose.heading {
@@ -36,10 +41,7 @@ impl Camera {
         let right = Vec3::new(cos, 0.0, -sin);
         let up = Vec3::new(sin * down, level, cos * down);
         let forward = Vec3::new(sin * level, -down, cos * level);
-        Camera {
-            eye: Point::new(x, scene.camera_y(), z).metres(),
-            turn: Mat3::from_cols(right, up, forward).transpose(),
-        }
+        Camera { eye: Point::new(x, eye_y, z).metres(), turn: Mat3::from_cols(right, up, forward).transpose() }
     }
 
     /// The eye, in metres.
@@ -69,6 +71,14 @@ impl Camera {
     pub(crate) fn project(&self, point: Vec3) -> Option<Vec3> {
         let local = self.local(point);
         (local.z > Camera::NEAR).then(|| Camera::image(local))
+    }
+
+    /// The point (metres) that is seen at a column and row of a 300 x 300 image, `depth` metres along the optical axis:
+    /// [`Camera::project`] the other way round.
+    pub(crate) fn unproject(&self, column: f32, row: f32, depth: f32) -> Vec3 {
+        let half = Camera::IMAGE / 2.0;
+        let scale = Camera::SLOPE * depth / half;
+        self.eye + self.turn.transpose() * Vec3::new(scale * (column - half), scale * (half - row), depth)
     }
 }
 
@@ -124,6 +134,17 @@ mod tests {
     fn looking_down_by_45_degrees_puts_the_floor_in_the_middle() {
         let seen = at(Heading::North, 45).project(Vec3::new(0.0, 0.0, 1.575)).unwrap();
         assert!((seen - Vec3::new(150.0, 150.0, 1.575 * 2f32.sqrt())).length() < 1e-3, "{seen}");
+    }
+
+    #[test]
+    fn a_point_is_found_again_where_it_was_seen() {
+        for (heading, horizon) in [(Heading::North, 0), (Heading::East, 30), (Heading::South, -30), (Heading::West, 60)]
+        {
+            let camera = at(heading, horizon);
+            let point = camera.unproject(40.0, 222.0, 1.7);
+            let seen = camera.project(point).unwrap();
+            assert!((seen - Vec3::new(40.0, 222.0, 1.7)).length() < 1e-3, "{heading:?}: {seen}");
+        }
     }
 
     #[test]
