@@ -2,4 +2,60 @@
 //! moves, and nothing else of the simulator. Poses are in its own frame: it starts in cell (0, 0) and faces north; heights are
 //! in metres above the floor.
 
+mod eye;
+pub(crate) mod occupancy;
+pub(crate) mod odometry;
 pub(crate) mod percept;
+pub(crate) mod semantic_map;
+
+use occupancy::Occupancy;
+use odometry::Odometry;
+use percept::Percept;
+use semantic_map::SemanticMap;
+
+use crate::domain::{ActionType, Class};
+use crate::house::view::Frame;
+
+/// All that is kept from the start of an episode on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Memory {
+    /// Where the agent is.
+    pub(crate) odometry: Odometry,
+    /// Where it can walk.
+    pub(crate) occupancy: Occupancy,
+    /// What stands where.
+    pub(crate) map: SemanticMap,
+    /// How many frames were taken in before the last one.
+    pub(crate) step: u32,
+    begun: bool,
+}
+
+/// What the agent has of one moment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glance<'a> {
+    /// What it did just before; `None` at the start.
+    pub(crate) last: Option<ActionType>,
+    /// How far the camera looks down, in degrees.
+    pub(crate) tilt: i16,
+    /// The picture and its depth.
+    pub(crate) frame: &'a Frame,
+    /// What shows in the picture.
+    pub(crate) percept: &'a Percept,
+    /// What it believes to have in its hand.
+    pub(crate) held: Option<Class>,
+}
+
+impl Memory {
+    /// Takes in the next moment; each moment once.
+    pub(crate) fn observe(&mut self, glance: Glance<'_>) {
+        let Glance { last, tilt, frame, percept, held } = glance;
+        self.step += u32::from(std::mem::replace(&mut self.begun, true));
+        self.odometry.observe(tilt, &frame.rgb, last);
+        let pose = self.odometry.pose();
+        if self.odometry.blocked() {
+            self.occupancy.bump(pose);
+        }
+        self.occupancy.observe(pose, frame);
+        self.map.observe(pose, percept, held, self.step);
+    }
+}

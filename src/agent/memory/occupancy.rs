@@ -1,0 +1,158 @@
+//! Where the agent can walk, from what it saw of the floor and of what stands on it.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+
+use super::eye;
+use crate::domain::{Cell, Heading, Pose};
+use crate::house::view::Frame;
+
+/// Every so manieth pixel of every so manieth row is looked at.
+const STRIDE: usize = 4;
+
+/// The rule by which points become cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clearance {
+    /// Points no higher than this above the floor (metres), and no deeper below it, are floor.
+    pub(crate) floor: f32,
+    /// Points between these heights (metres) are in the way.
+    pub(crate) body: [f32; 2],
+    /// How far a cell's centre must be from what is in the way, along x and z (metres).
+    pub(crate) radius: f32,
+    /// Whether the radius is of a circle, not of a square.
+    pub(crate) round: bool,
+    /// So many points in the way block a cell, seen in one frame.
+    pub(crate) points: u16,
+    /// Farther points along the optical axis (metres) count for nothing.
+    pub(crate) farthest: f32,
+}
+
+impl Default for Clearance {
+    fn default() -> Clearance {
+        Clearance { floor: 0.08, body: [0.1, 1.7], radius: 0.22, round: false, points: 3, farthest: 8.0 }
+    }
+}
+
+/// What is known of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ground {
+    /// Can be walked on.
+    Free,
+    /// Something stands there, or too near.
+    Blocked,
+    /// Not seen.
+    Unknown,
+}
+
+/// What was seen of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Glimpses {
+    /// Points on its floor.
+    floor: u32,
+    /// Points in the way of who would stand there, of frames that showed enough of them.
+    body: u32,
+    /// The highest point that was seen over the cell itself, in metres.
+    top: f32,
+    /// The agent was there.
+    visited: bool,
+    /// A move there failed.
+    bumped: bool,
+}
+
+/// The floor as far as it is known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Occupancy {
+    clearance: Clearance,
+    cells: BTreeMap<Cell, Glimpses>,
+}
+
+impl Occupancy {
+    /// An empty map that goes by this rule.
+    #[cfg(test)]
+    pub(crate) fn by(clearance: Clearance) -> Occupancy {
+        Occupancy { clearance, ..Occupancy::default() }
+    }
+
+    /// Takes in the depth that an agent at `pose` sees.
+    pub(crate) fn observe(&mut self, pose: Pose, frame: &Frame) {
+        let mut seen: BTreeMap<Cell, Glimpses> = BTreeMap::new();
+        let camera = eye::camera(pose);
+        let scale = 300.0 / frame.width.max(1) as f32;
+        for row in (STRIDE / 2..frame.height).step_by(STRIDE) {
+            for column in (STRIDE / 2..frame.width).step_by(STRIDE) {
+                let depth = frame.depth[row * frame.width + column];
+                let (x, y) = ((column as f32 + 0.5) * scale, (row as f32 + 0.5) * scale);
+                if depth < self.clearance.farthest && !eye::is_in_hand(x, y, depth) {
+                    self.vote(camera.unproject(x, y, depth), &mut seen);
+                }
+            }
+        }
+        for (cell, glimpse) in seen {
+            let known = self.cells.entry(cell).or_default();
+            known.floor += glimpse.floor;
+            known.top = known.top.max(glimpse.top);
+            if glimpse.body >= u32::from(self.clearance.points) {
+                known.body += glimpse.body;
+            }
+        }
+        self.cells.entry(pose.cell).or_default().visited = true;
+    }
+
+    fn vote(&self, point: Vec3, seen: &mut BTreeMap<Cell, Glimpses>) {
+        let Clearance { floor, body: [low, high], radius, round, .. } = self.clearance;
+        let own = seen.entry(eye::cell_under(point)).or_default();
+        own.top = own.top.max(point.y);
+        if point.y.abs() <= floor {
+            own.floor += 1;
+        }
+        if !(low..=high).contains(&point.y) {
+            return;
+        }
+        let side = Cell::SIDE as f32 / 1000.0;
+        let span = |v: f32| (((v - radius) / side).ceil() as i16)..=(((v + radius) / side).floor() as i16);
+        for x in span(point.x) {
+            for z in span(point.z) {
+                let (dx, dz) = (f32::from(x) * side - point.x, f32::from(z) * side - point.z);
+                if !round || dx * dx + dz * dz <= radius * radius {
+                    seen.entry(Cell::new(x, z)).or_default().body += 1;
+                }
+            }
+        }
+    }
+
+    /// A move ahead from `pose` failed: what lies ahead cannot be walked on.
+    pub(crate) fn bump(&mut self, pose: Pose) {
+        self.cells.entry(pose.cell.ahead(pose.heading)).or_default().bumped = true;
+    }
+
+    /// What is known of a cell.
+    pub(crate) fn ground(&self, cell: Cell) -> Ground {
+        let Some(glimpses) = self.cells.get(&cell) else { return Ground::Unknown };
+        match glimpses {
+            Glimpses { visited: true, .. } => Ground::Free,
+            Glimpses { bumped: true, .. } => Ground::Blocked,
+            Glimpses { body, .. } if *body > 0 => Ground::Blocked,
+            Glimpses { floor, .. } if *floor > 0 => Ground::Free,
+            _ => Ground::Unknown,
+        }
+    }
+
+    /// The highest point that was seen over a cell, in metres; 0 where nothing was.
+    pub(crate) fn top(&self, cell: Cell) -> f32 {
+        self.cells.get(&cell).map_or(0.0, |glimpses| glimpses.top)
+    }
+
+    /// Every cell of which something is known, in order.
+    pub(crate) fn known(&self) -> impl Iterator<Item = (Cell, Ground)> {
+        let grounds = self.cells.keys().map(|&cell| (cell, self.ground(cell)));
+        grounds.filter(|(_, ground)| *ground != Ground::Unknown)
+    }
+
+    /// Free cells beside unknown ones, in order.
+    pub(crate) fn frontier(&self) -> impl Iterator<Item = Cell> {
+        let unknown = |cell: Cell| self.ground(cell) == Ground::Unknown;
+        let beside = move |cell: &Cell| Heading::ALL.into_iter().any(|heading| unknown(cell.ahead(heading)));
+        self.known().filter(|(_, ground)| *ground == Ground::Free).map(|(cell, _)| cell).filter(beside)
+    }
+}
