@@ -3,6 +3,7 @@
 //! in metres above the floor.
 
 mod eye;
+pub(crate) mod navigator;
 pub(crate) mod occupancy;
 pub(crate) mod odometry;
 pub(crate) mod percept;

@@ -10,6 +10,8 @@ use crate::house::view::Frame;
 
 /// Every so manieth pixel of every so manieth row is looked at.
 const STRIDE: usize = 4;
+/// What is within this distance of a cell's centre, along x and z in metres, leaves no room beside it.
+const CORE: f32 = 0.1;
 
 /// The rule by which points become cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +41,9 @@ impl Default for Clearance {
 pub(crate) enum Ground {
     /// Can be walked on.
     Free,
-    /// Something stands there, or too near.
+    /// Something stands so near that a person would not fit; if it was seen rightly.
+    Narrow,
+    /// Something stands there.
     Blocked,
     /// Not seen.
     Unknown,
@@ -52,6 +56,8 @@ struct Glimpses {
     floor: u32,
     /// Points in the way of who would stand there, of frames that showed enough of them.
     body: u32,
+    /// Those of them that are in the way of even the thinnest.
+    core: u32,
     /// The highest point that was seen over the cell itself, in metres.
     top: f32,
     /// The agent was there.
@@ -69,7 +75,6 @@ pub(crate) struct Occupancy {
 
 impl Occupancy {
     /// An empty map that goes by this rule.
-    #[cfg(test)]
     pub(crate) fn by(clearance: Clearance) -> Occupancy {
         Occupancy { clearance, ..Occupancy::default() }
     }
@@ -95,6 +100,9 @@ impl Occupancy {
             if glimpse.body >= u32::from(self.clearance.points) {
                 known.body += glimpse.body;
             }
+            if glimpse.core >= u32::from(self.clearance.points) {
+                known.core += glimpse.core;
+            }
         }
         self.cells.entry(pose.cell).or_default().visited = true;
     }
@@ -102,7 +110,9 @@ impl Occupancy {
     fn vote(&self, point: Vec3, seen: &mut BTreeMap<Cell, Glimpses>) {
         let Clearance { floor, body: [low, high], radius, round, .. } = self.clearance;
         let own = seen.entry(eye::cell_under(point)).or_default();
-        own.top = own.top.max(point.y);
+        if point.y <= self.clearance.body[1] {
+            own.top = own.top.max(point.y);
+        }
         if point.y.abs() <= floor {
             own.floor += 1;
         }
@@ -115,7 +125,9 @@ impl Occupancy {
             for z in span(point.z) {
                 let (dx, dz) = (f32::from(x) * side - point.x, f32::from(z) * side - point.z);
                 if !round || dx * dx + dz * dz <= radius * radius {
-                    seen.entry(Cell::new(x, z)).or_default().body += 1;
+                    let near = seen.entry(Cell::new(x, z)).or_default();
+                    near.body += 1;
+                    near.core += u32::from(dx.abs().max(dz.abs()) <= CORE);
                 }
             }
         }
@@ -126,13 +138,23 @@ impl Occupancy {
         self.cells.entry(pose.cell.ahead(pose.heading)).or_default().bumped = true;
     }
 
+    /// The map on which these cells are free and those blocked.
+    #[cfg(test)]
+    pub(crate) fn with(free: impl IntoIterator<Item = Cell>, blocked: impl IntoIterator<Item = Cell>) -> Occupancy {
+        let free = free.into_iter().map(|cell| (cell, Glimpses { floor: 1, ..Glimpses::default() }));
+        let blocked =
+            blocked.into_iter().map(|cell| (cell, Glimpses { core: 9, body: 9, top: 1.0, ..Glimpses::default() }));
+        Occupancy { cells: free.chain(blocked).collect(), ..Occupancy::default() }
+    }
+
     /// What is known of a cell.
     pub(crate) fn ground(&self, cell: Cell) -> Ground {
         let Some(glimpses) = self.cells.get(&cell) else { return Ground::Unknown };
         match glimpses {
             Glimpses { visited: true, .. } => Ground::Free,
             Glimpses { bumped: true, .. } => Ground::Blocked,
-            Glimpses { body, .. } if *body > 0 => Ground::Blocked,
+            Glimpses { core, .. } if *core > 0 => Ground::Blocked,
+            Glimpses { body, .. } if *body > 0 => Ground::Narrow,
             Glimpses { floor, .. } if *floor > 0 => Ground::Free,
             _ => Ground::Unknown,
         }
