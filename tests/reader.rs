@@ -13,7 +13,7 @@ use crate::domain::task::SceneRef;
 use crate::domain::{Class, SkillKind, Subtask, Trajectory};
 use crate::house::grading::{Grader, Grading};
 use crate::language::nouns::names;
-use crate::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Reading, Step, canonical};
+use crate::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Step, WishReading, canonical};
 use proptest::prelude::*;
 
 fn reader() -> &'static Reader {
@@ -104,7 +104,7 @@ struct Measured {
 }
 
 impl Measured {
-    fn add(&mut self, text: &str, reading: &Reading, expected: &[Step]) {
+    fn add(&mut self, text: &str, reading: &WishReading, expected: &[Step]) {
         let read = steps(&reading.subtasks);
         let exact = read == expected;
         let second = || reading.second().is_some_and(|second| steps(&second.subtasks) == expected);

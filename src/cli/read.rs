@@ -14,7 +14,7 @@ use crate::domain::{Class, Room};
 use crate::house::generate;
 use crate::language::reader::features::Before;
 use crate::language::reader::spelling::Spelling;
-use crate::language::reader::{Context, ReadSubtask, Reader, Reading, features_of};
+use crate::language::reader::{Context, ReadSubtask, Reader, WishReading, features_of};
 
 /// Reads wishes.
 #[derive(Args)]
@@ -32,7 +32,7 @@ pub(crate) struct ReadArgs {
 struct Line<'a> {
     text: &'a str,
     #[serde(flatten)]
-    reading: &'a Reading,
+    reading: &'a WishReading,
 }
 
 /// A line of an example to train on.

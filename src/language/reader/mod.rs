@@ -13,7 +13,7 @@ mod told;
 mod units;
 mod unread;
 
-pub use reading::{Alternative, CERTAIN, ReadSubtask, Reading, Step, canonical};
+pub use reading::{Alternative, CERTAIN, ReadSubtask, Step, WishReading, canonical};
 pub use units::{Context, Reader};
 
 /// The features of a text as one unit, for training.

@@ -40,7 +40,7 @@ pub struct ReadSubtask {
 
 /// A text as it was read.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Reading {
+pub struct WishReading {
     /// What is to be done, in order.
     pub subtasks: Vec<ReadSubtask>,
     /// How likely all of it is right, from 0 to 1.
@@ -51,7 +51,7 @@ pub struct Reading {
     pub absent: Vec<Class>,
 }
 
-impl Reading {
+impl WishReading {
     /// In words: "pick up a mug, put it in the sink".
     pub fn words(&self) -> String {
         let mut last = None;
@@ -85,7 +85,7 @@ impl Reading {
 
     /// The reading with another class in a subtask, and wherever the text means the same thing.
     #[must_use]
-    pub fn with(&self, at: usize, alternative: Alternative) -> Reading {
+    pub fn with(&self, at: usize, alternative: Alternative) -> WishReading {
         let mut other = self.clone();
         let Some(chosen) = self.subtasks.get(at) else { return other };
         let was = if alternative.is_receptacle { chosen.receptacle } else { chosen.object };
@@ -101,7 +101,7 @@ impl Reading {
     }
 
     /// The reading with the likeliest single other class in it.
-    pub fn second(&self) -> Option<Reading> {
+    pub fn second(&self) -> Option<WishReading> {
         let all = self.subtasks.iter().enumerate();
         let all = all.flat_map(|(at, subtask)| subtask.alternatives.iter().map(move |&other| (at, other)));
         let (at, best) = all.max_by(|a, b| a.1.probability.total_cmp(&b.1.probability))?;

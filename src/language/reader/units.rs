@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use super::clauses::{Clause, clauses, without_the_forbidden};
 use super::features::{Before, are_about_different_things, do_not_mix, features, named_outright, speaks_of};
 use super::model::{Head, Model, ModelError, softmax};
-use super::reading::{Alternative, ReadSubtask, Reading};
+use super::reading::{Alternative, ReadSubtask, WishReading};
 use super::shape::Shape;
 use super::tokens::{Token, tokens};
 use super::told::Told;
@@ -84,7 +84,7 @@ impl Reader {
     }
 
     /// Reads a text.
-    pub fn read(&self, text: &str, context: &Context<'_>) -> Reading {
+    pub fn read(&self, text: &str, context: &Context<'_>) -> WishReading {
         let wanted = without_the_forbidden(tokens(text, &self.model.spelling));
         let clauses = clauses(&wanted);
         let mut paths: Vec<Option<Path>> = vec![None; clauses.len() + 1];
@@ -112,7 +112,7 @@ impl Reader {
             .iter()
             .any(|read| read.object.is_none() || read.skill == SkillKind::Put && read.receptacle.is_none());
         let confidence = if path.read.is_empty() || open { 0.0 } else { self.model.calibrated(raw) };
-        Reading { subtasks: path.read, confidence, unread, absent: path.absent }
+        WishReading { subtasks: path.read, confidence, unread, absent: path.absent }
     }
 
     /// Passes over clauses that ask for nothing: walking, doors, remarks.
