@@ -86,7 +86,7 @@ proptest! {
     ) {
         let reading = reader().read(&text, &Context::default());
         prop_assert!((0.0..=1.0).contains(&reading.confidence));
-        let _ = (reading.words(), reading.task(), reading.second());
+        let _ = (reading.words(), reading.task(), reading.alternatives().into_iter().next());
     }
 }
 
@@ -107,7 +107,8 @@ impl Measured {
     fn add(&mut self, text: &str, reading: &WishReading, expected: &[Step]) {
         let read = steps(&reading.subtasks);
         let exact = read == expected;
-        let second = || reading.second().is_some_and(|second| steps(&second.subtasks) == expected);
+        let second =
+            || reading.alternatives().into_iter().next().is_some_and(|second| steps(&second.subtasks) == expected);
         let alike = |a: Option<Class>, b: Option<Class>| match (a, b) {
             (Some(a), Some(b)) => a == b || names(text, a) && names(text, b),
             (a, b) => a == b,

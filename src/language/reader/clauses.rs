@@ -1,7 +1,9 @@
 //! Clauses: a text cut where a verb begins something new, what must not be done left out, and each clause in pieces.
 
 use super::lexicon::lexicon;
+use super::shape::is_lamp;
 use super::tokens::Token;
+use crate::domain::class::FixtureEffect;
 
 /// A piece of a clause: a noun and what leads to it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -33,6 +35,8 @@ pub struct Clause {
     pub tokens: Vec<Token>,
     /// A mark that ends a sentence follows.
     pub ends_sentence: bool,
+    /// The things that it names are several, and none goes into another.
+    pub is_of_each: bool,
 }
 
 impl Clause {
@@ -44,7 +48,7 @@ impl Clause {
         }
         let led = |token: &Token| words.prepositions.contains(&token.text) || words.breaks.contains(&token.text);
         let first = self.tokens.iter().position(Token::is_name)?;
-        let verb = self.tokens.iter().position(|token| lexicon().verb(&token.text).is_some()).unwrap_or(0);
+        let verb = self.tokens.iter().position(|token| token.lemma().is_some()).unwrap_or(0);
         if self.tokens[..first]
             .iter()
             .skip(verb + 1)
@@ -79,6 +83,7 @@ impl Clause {
                 .chain(self.tokens[at..].iter().cloned())
                 .collect(),
             ends_sentence: self.ends_sentence,
+            is_of_each: false,
         };
         Some(things.into_iter().map(clause).collect())
     }
@@ -92,10 +97,15 @@ pub fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
     let mut named: Option<Token> = None;
     let mut at = 0;
     while at < tokens.len() {
+        if let Some(length) = asks_by_denying(&tokens[at..]) {
+            at += length;
+            continue;
+        }
         let forbids = match (text(at), text(at + 1)) {
-            ("do" | "must" | "should" | "can" | "will" | "does", "not") => true,
+            ("do" | "must" | "should" | "can" | "will" | "does" | "need" | "would" | "could", "not") => true,
             ("not", next) => next != "only" && next != "far",
-            ("instead", "of") | ("rather", "than") | ("without", _) | ("except", _) | ("ignore", _) => true,
+            ("instead", "of") | ("rather", "than") | ("without", _) | ("except", _) | ("ignore" | "skip", _) => true,
+            ("no", "need") | ("refrain", "from") | ("forget", _) => true,
             ("leave", _) => is_let_alone(&tokens, at),
             _ => false,
         };
@@ -115,7 +125,12 @@ pub fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
             let new_verb = |from: usize| {
                 (from..tokens.len().min(from + 3)).any(|i| lexicon().verb(text(i)).is_some() && starts_verb(&tokens, i))
             };
+            let again = || {
+                // "don't take the knife take the fork"
+                is_plain_request(&tokens, at) && tokens[start..at].iter().any(Token::is_name)
+            };
             let ends = tokens[at].ends_sentence()
+                || again()
                 || matches!(text(at), "but" | "just" | "only" | "instead") && at > start + 1 && text(at + 1) != "of"
                 || text(at) == "," && at > start + 1
                 || matches!(text(at), "and" | "then") && new_verb(at + 1);
@@ -129,6 +144,38 @@ pub fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
         }
     }
     kept
+}
+
+/// How many tokens ask for something by denying its opposite: "do not forget to", "why do not you", "can not you".
+fn asks_by_denying(tokens: &[Token]) -> Option<usize> {
+    let text = |at: usize| tokens.get(at).map_or("", |token: &Token| token.text.as_str());
+    let whom = |at: usize| usize::from(matches!(text(at), "you" | "we" | "i"));
+    let not = match text(0) {
+        "why" if text(1) == "not" => return Some(2 + whom(2)),
+        "why" if text(2) == "not" => return Some(3 + whom(3)),
+        "why" if matches!(text(2), "you" | "we") && text(3) == "not" => return Some(4),
+        "do" | "must" | "should" | "can" | "will" | "does" | "would" | "could" if text(1) == "not" => 1,
+        "not" => 0,
+        _ => return None,
+    };
+    if matches!(text(not + 1), "you" | "we") && not == 1 && text(0) != "do" {
+        return Some(3);
+    }
+    let omits = matches!(text(not + 1), "forget" | "hesitate" | "fail" | "neglect" | "omit");
+    (omits && text(not + 2) == "to").then_some(not + 3)
+}
+
+/// Whether a verb that can be nothing else stands here with its object: "take the fork".
+fn is_plain_request(tokens: &[Token], at: usize) -> bool {
+    let words = &lexicon().words;
+    matches!(tokens[at].text.as_str(), "put" | "place" | "pick" | "take" | "grab" | "get")
+        && tokens
+            .get(at + 1)
+            .is_some_and(|next| words.determiners.contains(&next.text) || words.pronouns.contains(&next.text))
+        && !at.checked_sub(1).is_some_and(|before| {
+            let before = &tokens[before].text;
+            words.determiners.contains(before) || words.prepositions.contains(before)
+        })
 }
 
 /// "leave the lamp off", "leave it alone".
@@ -165,12 +212,7 @@ fn starts_verb(tokens: &[Token], at: usize) -> bool {
     let led = before.is_mark() || words.before_verb.contains(&before.text);
     let plain = words.plain.contains(&before.text) && !words.determiners.contains(&before.text);
     let pronoun = words.pronouns.contains(&before.text);
-    let at_noun = words.determiners.contains(&before.text) || words.prepositions.contains(&before.text);
-    let certain = matches!(tokens[at].text.as_str(), "put" | "place" | "pick" | "take" | "grab" | "get");
-    let object = tokens
-        .get(at + 1)
-        .is_some_and(|next| words.determiners.contains(&next.text) || words.pronouns.contains(&next.text));
-    if certain && object && !at_noun {
+    if is_plain_request(tokens, at) {
         return true;
     }
     !noun && (led || (plain || pronoun || before.is_name()) && follows && tokens[at].classes.is_empty())
@@ -178,10 +220,9 @@ fn starts_verb(tokens: &[Token], at: usize) -> bool {
 
 /// A clause begins at each verb that does not say what something is for.
 pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
-    let lexicon = lexicon();
     let mut all: Vec<Clause> = vec![Clause::default()];
     for (at, token) in tokens.iter().enumerate() {
-        let lemma = lexicon.verb(&token.text).filter(|_| starts_verb(tokens, at));
+        let lemma = token.lemma().filter(|_| starts_verb(tokens, at));
         let lemma = lemma.or_else(|| (token.text == "microwave" && starts_clause(tokens, at)).then_some("heat"));
         let Some(last) = all.last_mut() else { break };
         if lemma.is_none()
@@ -191,8 +232,8 @@ pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
             && goes_on(&tokens[at + 1..])
         {
             // "put the mug in the sink and the plate in the cabinet"
-            let verb = Token { text: "put".into(), unknown: None, many: false, classes: &[] };
-            all.push(Clause { lemma: "put", tokens: vec![verb], ends_sentence: false });
+            let verb = Token::understood("put", token.at);
+            all.push(Clause { lemma: "put", tokens: vec![verb], ..Clause::default() });
             continue;
         }
         let purpose =
@@ -203,7 +244,7 @@ pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
                 last.tokens.push(token.clone());
             }
             Some(lemma) => {
-                all.push(Clause { lemma, tokens: vec![token.clone()], ends_sentence: false });
+                all.push(Clause { lemma, tokens: vec![token.clone()], ..Clause::default() });
             }
             None if token.ends_sentence() => {
                 last.ends_sentence = true;
@@ -213,7 +254,98 @@ pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
         }
     }
     all.retain(|clause| clause.tokens.iter().any(|token| !token.is_mark()));
+    say_what_them_means(&mut all);
+    tell_switching(&mut all);
     all
+}
+
+/// Where several things were named together, a later "them" stands for each: "wash the mug and the plate and put them away".
+fn say_what_them_means(all: &mut [Clause]) {
+    let mut named: Vec<Token> = Vec::new();
+    for clause in all {
+        let them = |token: &Token| matches!(token.text.as_str(), "them" | "both");
+        let at = clause.tokens.iter().position(them).filter(|&at| {
+            at > 0 && clause.tokens[..at].last().is_some_and(|token| token.lemma().is_some()) && !named.is_empty()
+        });
+        if let Some(at) = at {
+            clause.tokens.splice(at..=at, named.iter().cloned());
+            clause.is_of_each = true;
+            continue;
+        }
+        match clause.apart() {
+            Some(parts) => {
+                named.clear();
+                for part in &parts {
+                    let name = part.tokens.iter().find(|token| token.is_name());
+                    let and = Token::understood("and", clause.tokens[0].at);
+                    named.extend((!named.is_empty()).then_some(and));
+                    named.extend(name.cloned());
+                }
+            }
+            None if clause.tokens.iter().any(Token::is_name) && clause.lemma != "go" => named.clear(),
+            None => {}
+        }
+    }
+}
+
+/// Tells switching off from switching on, and machines and water from lamps: the subtasks know only lamps that go on. "it" is what
+/// was last named that has a switch.
+fn tell_switching(all: &mut [Clause]) {
+    let words = &lexicon().words;
+    let mut named: Option<bool> = None;
+    for clause in all {
+        let tokens = &clause.tokens;
+        let lamp = |token: &Token| token.classes.iter().any(|class| is_lamp(*class));
+        let machine =
+            |token: &Token| token.classes.iter().any(|class| class.info().effect.is_some() || class.info().basin);
+        let own = tokens.iter().rev().find(|token| lamp(token) || machine(token)).map(lamp);
+        named = own.or(named);
+        let is = |token: &Token, texts: &[&str]| texts.contains(&token.text.as_str());
+        let ends = |token: Option<&Token>| token.is_none_or(|then| then.is_mark() || words.breaks.contains(&then.text));
+        // "the lamp off", not "the book off the lamp"
+        let lamp_off = tokens.iter().rposition(lamp).is_some_and(|at| {
+            let then = at + 1 + usize::from(tokens.get(at + 1).is_some_and(|token| is(token, &["is"])));
+            tokens.get(then).is_some_and(|token| is(token, &["off", "out"])) && ends(tokens.get(then + 1))
+        });
+        let verb = tokens.iter().position(|token| token.lemma().is_some());
+        let says_off = tokens.iter().any(|token| is(token, &["off"]))
+            || own == Some(true)
+                && verb.is_some_and(|at| tokens.get(at + 1).is_some_and(|token| is(token, &["out", "down"])));
+        let nothing_else = tokens.iter().all(|token| {
+            token.is_mark()
+                || token.lemma().is_some()
+                || is(token, &["off", "water", "it", "them"])
+                || words.determiners.contains(&token.text)
+                || words.plain.contains(&token.text)
+                || words.breaks.contains(&token.text)
+        });
+        let water = tokens.iter().any(|token| is(token, &["water"]));
+        let of_machine = own == Some(false) || own.is_none() && nothing_else && (water || named == Some(false));
+        match clause.lemma {
+            "turn" if says_off && of_machine => clause.lemma = "close",
+            "turn" if says_off => clause.lemma = "off",
+            _ if lamp_off || own == Some(true) && says_off && matches!(clause.lemma, "" | "close") => {
+                clause.lemma = "off";
+            }
+            // "run the mug under the tap"
+            "go" if own == Some(false) || water => {
+                let rinses = tokens.iter().any(|token| {
+                    is(token, &["water"])
+                        || token.classes.iter().any(|class| class.info().effect == Some(FixtureEffect::Rinse))
+                });
+                let runs = verb.filter(|&at| is(&tokens[at], &["run"]));
+                let thing =
+                    runs.and_then(|at| tokens[at + 1..].iter().find(|token| !words.determiners.contains(&token.text)));
+                let moved = thing.is_some_and(|token| {
+                    is(token, &["it", "them"]) || token.classes.iter().any(|class| class.info().pickupable)
+                });
+                if rinses && moved {
+                    clause.lemma = "wash";
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
 /// Whether something is named after a preposition.
@@ -226,9 +358,11 @@ fn says_where(tokens: &[Token]) -> bool {
 /// Whether a thing and its place follow at once: "the plate in the cabinet".
 fn goes_on(tokens: &[Token]) -> bool {
     let words = &lexicon().words;
+    let movable = |token: &Token| token.classes.iter().any(|class| class.info().pickupable);
     let determined = tokens.first().is_some_and(|token| words.determiners.contains(&token.text));
-    let thing = tokens.iter().take(4).position(Token::is_name).filter(|_| determined);
-    let Some(at) = thing.filter(|&at| tokens[..at].iter().all(|token| lexicon().verb(&token.text).is_none())) else {
+    let bare = tokens.iter().find(|token| token.is_name()).is_some_and(movable);
+    let thing = tokens.iter().take(4).position(Token::is_name).filter(|_| determined || bare);
+    let Some(at) = thing.filter(|&at| tokens[..at].iter().all(|token| token.lemma().is_none())) else {
         return false;
     };
     tokens.get(at + 1).is_some_and(|next| matches!(next.text.as_str(), "in" | "on" | "into" | "onto" | "inside"))
@@ -260,7 +394,7 @@ pub fn chunks(clause: &Clause) -> Vec<Chunk> {
     let mut verb = !clause.lemma.is_empty();
     for token in &clause.tokens {
         let text = token.text.as_str();
-        if verb && lexicon().verb(text) == Some(clause.lemma) {
+        if verb && token.lemma().is_some_and(|lemma| comes_to(lemma, clause.lemma)) {
             verb = false;
             chunk = Chunk::default();
         } else if token.is_mark() || words.breaks.contains(text) {
@@ -307,6 +441,11 @@ pub fn chunks(clause: &Clause) -> Vec<Chunk> {
     all
 }
 
+/// Whether a verb may make a clause of that kind: switching off and closing are told from switching on by other words.
+fn comes_to(verb: &str, lemma: &str) -> bool {
+    verb == lemma || matches!(lemma, "off" | "close") || lemma == "wash" && verb == "go"
+}
+
 fn flush(chunk: &mut Chunk, all: &mut Vec<Chunk>) {
     if !chunk.words.is_empty() {
         all.push(std::mem::take(chunk));
@@ -316,11 +455,11 @@ fn flush(chunk: &mut Chunk, all: &mut Vec<Chunk>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::reader::spelling::Spelling;
     use crate::language::reader::tokens::tokens;
+    use crate::language::reader::units::Reader;
 
     fn read(text: &str) -> Vec<String> {
-        let tokens = without_the_forbidden(tokens(text, &Spelling::of([])));
+        let tokens = without_the_forbidden(tokens(text, Reader::shipped().unwrap().spelling()).tokens);
         clauses(&tokens)
             .iter()
             .map(|clause| {

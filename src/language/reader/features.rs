@@ -2,6 +2,8 @@
 
 use super::clauses::{Chunk, Clause, chunks};
 use super::lexicon::lexicon;
+use super::shape::is_lamp;
+use super::tokens::Token;
 use crate::domain::Class;
 
 /// What is known before a unit is read.
@@ -32,7 +34,7 @@ struct Features {
     seen: Vec<u32>,
 }
 
-const CHANGING: [&str; 9] = ["take", "put", "slice", "turn", "wash", "heat", "chill", "look", "make"];
+pub(super) const CHANGING: [&str; 9] = ["take", "put", "slice", "turn", "wash", "heat", "chill", "look", "make"];
 
 impl Features {
     fn add(&mut self, kind: &str, value: &str) {
@@ -44,7 +46,7 @@ impl Features {
         let skipped = |text: &str| words.determiners.contains(text) && text != "another" && text != "other";
         let mut last = "^";
         let tokens = clauses.iter().flat_map(|clause| &clause.tokens);
-        for token in tokens.filter(|token| token.unknown.is_none() && !skipped(&token.text)) {
+        for token in tokens.filter(|token| !token.unknown && !skipped(&token.text)) {
             self.add("w", &token.text);
             if token.many {
                 self.add("u", "");
@@ -155,23 +157,23 @@ impl Features {
 }
 
 /// A clause's verb and its pieces.
-type Pieces = (&'static str, Vec<Chunk>);
+pub(super) type Pieces = (&'static str, Vec<Chunk>);
 
-fn in_pieces(clauses: &[Clause]) -> Vec<Pieces> {
+pub(super) fn in_pieces(clauses: &[Clause]) -> Vec<Pieces> {
     clauses.iter().map(|clause| (clause.lemma, chunks(clause))).collect()
 }
 
 /// The first clause that changes something.
-fn main(all: &[Pieces]) -> Option<&Pieces> {
+pub(super) fn main(all: &[Pieces]) -> Option<&Pieces> {
     all.iter().find(|(lemma, _)| CHANGING.contains(lemma)).or(all.first())
 }
 
 /// The last clause that puts something.
-fn putting(all: &[Pieces]) -> Option<&Pieces> {
+pub(super) fn putting(all: &[Pieces]) -> Option<&Pieces> {
     all.iter().rev().find(|(lemma, _)| *lemma == "put").or(all.last())
 }
 
-fn places(pieces: &[Chunk]) -> impl Iterator<Item = &Chunk> {
+pub(super) fn places(pieces: &[Chunk]) -> impl Iterator<Item = &Chunk> {
     pieces.iter().filter(|chunk| {
         let lead = chunk.lead.as_str();
         matches!(lead, "in" | "on" | "into" | "onto" | "inside" | "to" | "at" | "atop" | "upon" | "by" | "under")
@@ -209,18 +211,16 @@ pub fn are_about_different_things(clauses: &[Clause]) -> bool {
     do_not_mix(&carried) || changed.into_iter().any(|(_, one)| things.iter().any(|(_, other)| differ(one, other)))
 }
 
-fn is_lamp_name(classes: &[Class]) -> bool {
-    !classes.is_empty() && classes.iter().all(|class| matches!(class.name(), "DeskLamp" | "FloorLamp"))
-}
-
 /// Whether something is put somewhere, and whether a thing besides a lamp is spoken of.
 pub fn speaks_of(clauses: &[Clause]) -> (bool, bool) {
     let all = in_pieces(clauses);
     let tokens = || clauses.iter().flat_map(|clause| &clause.tokens);
     let furniture = |class: &Class| class.info().receptacle && !class.info().pickupable;
     let place = all.iter().any(|(_, pieces)| places(pieces).next().is_some())
-        || tokens().any(|token| lexicon().verb(&token.text) == Some("put") || token.classes.iter().any(furniture));
-    let is_lamp = |chunk: &Chunk| chunk.head().is_some_and(|head| is_lamp_name(head.classes));
+        || tokens().any(|token| token.lemma() == Some("put") || token.classes.iter().any(furniture));
+    let is_lamp = |chunk: &Chunk| {
+        chunk.head().is_some_and(|head| head.is_name() && head.classes.iter().all(|class| is_lamp(*class)))
+    };
     let thing = tokens().any(|token| token.classes.iter().any(|class| class.info().pickupable))
         || all.iter().any(|(lemma, pieces)| {
             pieces.iter().any(Chunk::is_pronoun)
@@ -228,6 +228,19 @@ pub fn speaks_of(clauses: &[Clause]) -> (bool, bool) {
                 || *lemma != "turn" && !pieces.iter().all(is_lamp)
         });
     (place, thing)
+}
+
+/// Whether something is put on a piece of furniture before something else is put on another one: then the one is not put into the
+/// other.
+pub fn are_in_two_places(clauses: &[Clause]) -> bool {
+    let furniture = |token: &&Token| {
+        token.is_name() && token.classes.iter().all(|class| class.info().receptacle && !class.info().pickupable)
+    };
+    let puts = clauses.iter().filter(|clause| clause.lemma == "put").map(chunks);
+    let named: Vec<Token> = puts
+        .flat_map(|pieces| places(&pieces).filter_map(Chunk::head).filter(furniture).cloned().collect::<Vec<_>>())
+        .collect();
+    named.windows(2).any(|two| !two[0].classes.iter().any(|class| two[1].classes.contains(class)))
 }
 
 /// Whether two of some things have no class in common, and none of them holds the other.

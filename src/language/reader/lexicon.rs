@@ -1,6 +1,7 @@
 //! The reader's words: what stands for what, which words are verbs or lead to a place, and every name of a class.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use serde::Deserialize;
@@ -14,6 +15,7 @@ use crate::language::{grammar::grammar, nouns};
 struct Table {
     same: BTreeMap<String, String>,
     verbs: BTreeMap<String, Vec<String>>,
+    counts: BTreeMap<String, usize>,
     grammar: Words,
 }
 
@@ -37,6 +39,10 @@ pub struct Words {
     pub places: BTreeSet<String>,
     /// Words that carry nothing to be read.
     pub plain: BTreeSet<String>,
+    /// Nouns that follow a verb and are no things.
+    pub nameless: BTreeSet<String>,
+    /// Words that are matched one by one.
+    pub other: BTreeSet<String>,
     /// Words that are spelt right and not understood.
     pub foreign: BTreeSet<String>,
 }
@@ -51,6 +57,8 @@ pub struct Lexicon {
     same: HashMap<String, Vec<Phrase>>,
     /// Verbs by form.
     verbs: HashMap<String, &'static str>,
+    /// How many things a word says there are.
+    counts: BTreeMap<String, usize>,
     /// Names of classes, as words, by their first word; the longest first.
     names: HashMap<String, Vec<Name>>,
     /// Every class's usual name, as one word.
@@ -89,7 +97,8 @@ fn split(text: &str) -> Vec<String> {
 
 impl Lexicon {
     fn of(table: Table) -> Lexicon {
-        let mut lexicon = Lexicon { words: table.grammar, ..Lexicon::default() };
+        let mut lexicon = Lexicon { words: table.grammar, counts: table.counts, ..Lexicon::default() };
+        lexicon.all.extend(lexicon.counts.keys().cloned());
         for (from, to) in &table.same {
             let (from, to) = (split(from), split(to));
             lexicon.all.extend(from.iter().chain(&to).cloned());
@@ -106,8 +115,9 @@ impl Lexicon {
         }
         let words = &lexicon.words;
         let lists = [&words.before_verb, &words.prepositions, &words.determiners, &words.pronouns];
-        let more = [&words.breaks, &words.particles, &words.places, &words.plain, &words.foreign];
-        lexicon.all.extend(lists.into_iter().chain(more).flatten().cloned());
+        let more = [&words.breaks, &words.particles, &words.places, &words.plain];
+        let rest = [&words.nameless, &words.other, &words.foreign];
+        lexicon.all.extend(lists.into_iter().chain(more).chain(rest).flatten().cloned());
         lexicon.add_names();
         lexicon
     }
@@ -149,19 +159,19 @@ impl Lexicon {
         self.replace_marked(words).into_iter().map(|(word, _)| word).collect()
     }
 
-    /// The same; each word with the position of the word that it stands for.
-    pub fn replace_marked(&self, words: &[String]) -> Vec<(String, usize)> {
+    /// The same; each word with the positions of the words that it stands for.
+    pub fn replace_marked(&self, words: &[String]) -> Vec<(String, Range<usize>)> {
         let mut out = Vec::with_capacity(words.len());
         let mut at = 0;
         while at < words.len() {
             let fits = |(from, _): &&(Vec<String>, Vec<String>)| words[at..].starts_with(from);
             match self.same.get(&words[at]).and_then(|same| same.iter().find(fits)) {
                 Some((from, to)) => {
-                    out.extend(to.iter().map(|word| (word.clone(), at)));
+                    out.extend(to.iter().map(|word| (word.clone(), at..at + from.len())));
                     at += from.len();
                 }
                 None => {
-                    out.push((words[at].clone(), at));
+                    out.push((words[at].clone(), at..at + 1));
                     at += 1;
                 }
             }
@@ -171,7 +181,7 @@ impl Lexicon {
 
     /// The longest name that starts here: how many words it has, its singular as one word, whether it is the plural, and the
     /// classes that bear it.
-    pub fn name_at<'a>(&'a self, words: &[(String, usize)]) -> Option<(usize, &'a str, bool, &'a [Class])> {
+    pub fn name_at<'a>(&'a self, words: &[(String, Range<usize>)]) -> Option<(usize, &'a str, bool, &'a [Class])> {
         let fits = |name: &&Name| {
             name.words.len() <= words.len() && name.words.iter().zip(words).all(|(name, (word, _))| name == word)
         };
@@ -187,6 +197,11 @@ impl Lexicon {
     /// What a verb's form comes to.
     pub fn verb(&self, word: &str) -> Option<&'static str> {
         self.verbs.get(word).copied()
+    }
+
+    /// How many things a word says there are: "three", "3"; more than can be read for "several".
+    pub fn count(&self, word: &str) -> Option<usize> {
+        self.counts.get(word).copied().or_else(|| word.parse().ok())
     }
 
     /// Whether the word is one of the lexicon's.

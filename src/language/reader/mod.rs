@@ -1,6 +1,7 @@
 //! Reads a wish: typed text as an ordered list of subtasks, with how sure that is and what was not understood.
 
 pub mod clauses;
+pub mod corrections;
 pub mod features;
 pub mod lexicon;
 pub mod model;
@@ -18,7 +19,7 @@ pub use units::{Context, Reader};
 
 /// The features of a text as one unit, for training.
 pub fn features_of(text: &str, before: features::Before, spelling: &spelling::Spelling) -> Vec<u32> {
-    let wanted = clauses::without_the_forbidden(tokens::tokens(text, spelling));
+    let wanted = clauses::without_the_forbidden(corrections::corrected(tokens::tokens(text, spelling).tokens));
     features::features(&clauses::clauses(&wanted), before)
 }
 

@@ -8,6 +8,9 @@ use crate::domain::skill::{Role, SkillKind, Subtask};
 /// Above this confidence a reading may be shown as certain; below it the display should ask.
 pub const CERTAIN: f32 = 0.97;
 
+/// The most other readings that are offered.
+const ALTERNATIVES: usize = 3;
+
 /// Another class that may have been meant, and how likely.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Alternative {
@@ -83,29 +86,61 @@ impl WishReading {
         said.collect::<Vec<_>>().join(", ")
     }
 
-    /// The reading with another class in a subtask, and wherever the text means the same thing.
+    /// The reading with another class in a subtask, and wherever the text means the same thing by it: as an object or as a
+    /// receptacle, and as both where a thing is put into another one that is then put somewhere.
     #[must_use]
     pub fn with(&self, at: usize, alternative: Alternative) -> WishReading {
         let mut other = self.clone();
-        let Some(chosen) = self.subtasks.get(at) else { return other };
-        let was = if alternative.is_receptacle { chosen.receptacle } else { chosen.object };
+        let chosen = self.subtasks.get(at);
+        let chosen =
+            chosen.and_then(|chosen| if alternative.is_receptacle { chosen.receptacle } else { chosen.object });
+        let Some(was) = chosen else { return other };
+        let is = Some(alternative.class);
+        let carried = |read: &[ReadSubtask]| {
+            let puts = |read: &ReadSubtask| read.skill == SkillKind::Put;
+            read.iter().any(|one| puts(one) && one.object == Some(was))
+                && read.iter().any(|one| puts(one) && one.receptacle == Some(was))
+        };
+        let both = carried(&self.subtasks);
         for subtask in &mut other.subtasks {
-            if subtask.object == was {
-                subtask.object = Some(alternative.class);
+            if subtask.object == Some(was) && (both || !alternative.is_receptacle) {
+                subtask.object = is;
+                subtask.slice &= alternative.class.info().slices > 0;
             }
-            if subtask.receptacle == was {
-                subtask.receptacle = Some(alternative.class);
+            if subtask.receptacle == Some(was) && (both || alternative.is_receptacle) {
+                subtask.receptacle = is;
             }
+            subtask.place = subtask.place.filter(|place| Some(*place) != subtask.object);
         }
+        let named =
+            |class: &Class| other.subtasks.iter().any(|one| [one.object, one.receptacle].contains(&Some(*class)));
+        other.absent.retain(named);
+        other.confidence = alternative.probability.min(1.0 - self.confidence).max(0.0);
         other
     }
 
-    /// The reading with the likeliest single other class in it.
-    pub fn second(&self) -> Option<WishReading> {
+    /// What was most likely meant if not this: at most three readings with one other class, the likeliest first.
+    pub fn alternatives(&self) -> Vec<WishReading> {
         let all = self.subtasks.iter().enumerate();
-        let all = all.flat_map(|(at, subtask)| subtask.alternatives.iter().map(move |&other| (at, other)));
-        let (at, best) = all.max_by(|a, b| a.1.probability.total_cmp(&b.1.probability))?;
-        Some(self.with(at, best))
+        let mut all: Vec<(usize, Alternative)> =
+            all.flat_map(|(at, subtask)| subtask.alternatives.iter().map(move |&other| (at, other))).collect();
+        all.sort_by(|a, b| b.1.probability.total_cmp(&a.1.probability));
+        let steps = |reading: &WishReading| -> Vec<_> {
+            reading.subtasks.iter().map(|one| (one.skill, one.object, one.receptacle)).collect()
+        };
+        let mut found: Vec<WishReading> = Vec::new();
+        for (at, alternative) in all {
+            let other = self.with(at, alternative);
+            let known = std::iter::once(self).chain(&found).any(|known| steps(known) == steps(&other));
+            let into_itself = other.subtasks.iter().any(|one| one.object.is_some() && one.object == one.receptacle);
+            if !known && !into_itself {
+                found.push(other);
+            }
+            if found.len() == ALTERNATIVES {
+                break;
+            }
+        }
+        found
     }
 
     /// The parts and steps that a grader follows; `None` when something was left open. A thing that is put, cleaned, heated or

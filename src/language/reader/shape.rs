@@ -47,6 +47,15 @@ impl Shape {
         !matches!(self, Shape::One(kind) if kind != SkillKind::Put)
     }
 
+    /// The skills in it that change a thing.
+    pub fn kinds(self) -> impl Iterator<Item = SkillKind> {
+        let kind = match self {
+            Shape::One(kind) | Shape::Changed(kind) => Some(kind),
+            _ => None,
+        };
+        kind.into_iter()
+    }
+
     /// Whether its object may be of that class.
     pub fn takes_object(self, class: Class) -> bool {
         let info = class.info();
@@ -63,7 +72,8 @@ impl Shape {
     }
 }
 
-/// What is switched on to look at things.
-fn is_lamp(class: Class) -> bool {
-    matches!(class.name(), "DeskLamp" | "FloorLamp")
+/// What is switched on to look at things: it has a switch, holds nothing and changes nothing.
+pub(super) fn is_lamp(class: Class) -> bool {
+    let info = class.info();
+    info.toggleable && !info.receptacle && info.effect.is_none()
 }

@@ -4,16 +4,20 @@ use super::lexicon::lexicon;
 use super::spelling::Spelling;
 use crate::domain::Class;
 
-/// More words than this are not read.
+/// Words behind this many are not read; they are [`Typed::rest`].
 pub const LONGEST: usize = 400;
 
 /// One word, name or mark.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Token {
     /// The plain word; a name's words are joined by `_`, in the singular.
     pub text: String,
-    /// The word as it was typed, where it is nothing that the reader knows.
-    pub unknown: Option<String>,
+    /// What was typed for it; empty where it is only understood.
+    pub typed: String,
+    /// Which of the typed words it begins with.
+    pub at: usize,
+    /// The reader knows no such word.
+    pub unknown: bool,
     /// It is a name in the plural.
     pub many: bool,
     /// The classes that bear the name.
@@ -21,6 +25,11 @@ pub struct Token {
 }
 
 impl Token {
+    /// A word that nobody typed.
+    pub fn understood(text: &str, at: usize) -> Token {
+        Token { text: text.into(), at, ..Token::default() }
+    }
+
     /// Whether it ends a sentence or sets something off.
     pub fn is_mark(&self) -> bool {
         self.text.len() == 1 && self.text.starts_with(['.', ',', ';', '!', '?', ':'])
@@ -35,64 +44,93 @@ impl Token {
     pub fn is_name(&self) -> bool {
         !self.classes.is_empty()
     }
+
+    /// Whether a verb's form stands here.
+    pub fn lemma(&self) -> Option<&'static str> {
+        lexicon().verb(&self.text)
+    }
 }
 
-/// Words and marks as they stand, in lower case.
-pub fn raw_words(text: &str) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
+/// A word or mark as it stands in the text.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Word {
+    lower: String,
+    typed: String,
+}
+
+/// A text's words and marks.
+fn raw_words(text: &str) -> Vec<Word> {
+    let mut words: Vec<Word> = Vec::new();
     let mut inside = false;
-    for c in text.chars().flat_map(char::to_lowercase) {
-        let c = if c == '\u{2019}' { '\'' } else { c };
-        let c = if c == '\n' { '.' } else { c };
+    for typed in text.chars() {
+        let c = match typed {
+            '\u{2019}' => '\'',
+            '\n' => '.',
+            other => other,
+        };
         let letter = c.is_alphanumeric() || (c == '\'' && inside);
-        match words.last_mut().filter(|_| letter && inside) {
-            Some(word) => word.push(c),
-            None if letter || ".,;!?:".contains(c) => words.push(c.to_string()),
-            None => {}
+        if !(letter && inside) && (letter || ".,;!?:".contains(c)) {
+            words.push(Word::default());
+        }
+        if let Some(word) = words.last_mut().filter(|_| letter || ".,;!?:".contains(c)) {
+            word.lower.extend(c.to_lowercase());
+            word.typed.push(typed);
         }
         inside = letter;
-        if words.len() > LONGEST {
-            words.pop();
-            break;
-        }
     }
     for word in &mut words {
-        if word.len() > 1 {
-            *word = word.trim_end_matches('\'').to_string();
+        if word.lower.len() > 1 {
+            word.lower.truncate(word.lower.trim_end_matches('\'').len());
+            word.typed.truncate(word.typed.trim_end_matches(['\'', '\u{2019}']).len());
         }
     }
     words
 }
 
+/// A text in tokens.
+#[derive(Clone, Debug, Default)]
+pub struct Typed {
+    /// The tokens of as many words as are read.
+    pub tokens: Vec<Token>,
+    /// The words behind those.
+    pub rest: Vec<String>,
+}
+
 /// The tokens of a text.
-pub fn tokens(text: &str, spelling: &Spelling) -> Vec<Token> {
+pub fn tokens(text: &str, spelling: &Spelling) -> Typed {
     let lexicon = lexicon();
-    let typed = raw_words(text);
+    let mut typed = raw_words(text);
+    let rest = typed.split_off(typed.len().min(LONGEST)).into_iter().map(|word| word.typed).collect();
     let is_word = |word: &str| word.chars().any(char::is_alphabetic);
     let mut unknown = vec![false; typed.len()];
     let mut spelt = Vec::with_capacity(typed.len());
-    for (at, word) in typed.iter().enumerate() {
-        let possessive = word.strip_suffix("'s").filter(|stem| spelling.knows(stem));
-        let known = spelling.knows(word) || !is_word(word);
-        let right = if known { Some(word.as_str()) } else { possessive.or_else(|| spelling.correct(word)) };
+    for (at, Word { lower, .. }) in typed.iter().enumerate() {
+        let possessive = lower.strip_suffix("'s").filter(|stem| spelling.knows(stem));
+        let known = spelling.knows(lower) || !is_word(lower);
+        let right = if known { Some(lower.as_str()) } else { possessive.or_else(|| spelling.correct(lower)) };
         unknown[at] = right.is_none();
-        spelt.push(right.unwrap_or(word).to_string());
+        spelt.push(right.unwrap_or(lower).to_string());
     }
     let words = lexicon.replace_marked(&spelt);
+    let as_typed =
+        |from: usize, to: usize| typed[from..to].iter().map(|word| word.typed.as_str()).collect::<Vec<_>>().join(" ");
     let mut tokens = Vec::with_capacity(words.len());
     let mut at = 0;
     while at < words.len() {
-        let (word, from) = &words[at];
+        let (word, span) = &words[at];
         if let Some((length, name, many, classes)) = lexicon.name_at(&words[at..]) {
-            tokens.push(Token { text: name.to_string(), unknown: None, many, classes });
+            let end = words[at + length - 1].1.end;
+            let typed = as_typed(span.start, end);
+            tokens.push(Token { text: name.to_string(), typed, at: span.start, unknown: false, many, classes });
             at += length;
             continue;
         }
-        let unknown = unknown.get(*from).copied().unwrap_or(false).then(|| typed[*from].clone());
-        tokens.push(Token { text: word.clone(), unknown, many: false, classes: &[] });
+        let unknown = unknown.get(span.start).copied().unwrap_or(false);
+        let typed = as_typed(span.start, span.end);
+        tokens.push(Token { text: word.clone(), typed, at: span.start, unknown, ..Token::default() });
         at += 1;
     }
-    tokens
+    Typed { tokens, rest }
 }
 
 #[cfg(test)]
@@ -100,8 +138,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> String {
-        let tokens = tokens(text, &Spelling::of([]));
-        tokens.iter().map(|token| token.text.as_str()).collect::<Vec<_>>().join(" ")
+        tokens(text, &Spelling::of([])).tokens.iter().map(|token| token.text.as_str()).collect::<Vec<_>>().join(" ")
     }
 
     #[test]
@@ -113,8 +150,22 @@ mod tests {
     #[test]
     fn slips_are_put_right_and_what_is_unknown_is_kept() {
         assert_eq!(read("put teh mgu in the mircowave"), "put the mug in the microwave");
-        let all = tokens("frobnicate the potatos", &Spelling::of([]));
-        assert_eq!(all[0].unknown.as_deref(), Some("frobnicate"));
+        let all = tokens("Frobnicate the potatos", &Spelling::of([])).tokens;
+        assert!(all[0].unknown);
+        assert_eq!([&all[0].typed, &all[2].typed], ["Frobnicate", "potatos"]);
         assert_eq!(all[2].text, "potato");
+    }
+
+    #[test]
+    fn what_stands_for_several_words_keeps_them_as_typed() {
+        let all = tokens("Get rid of the BARS of soap", &Spelling::of([])).tokens;
+        let typed: Vec<&str> = all.iter().map(|token| token.typed.as_str()).collect();
+        assert_eq!(typed, ["Get rid of", "the", "BARS of soap"]);
+    }
+
+    #[test]
+    fn what_is_behind_the_longest_text_is_kept_apart() {
+        let all = tokens(&format!("{}and slice it", "put the mug down ".repeat(100)), &Spelling::of([]));
+        assert_eq!((all.tokens.len(), all.rest.join(" ")), (LONGEST, "and slice it".into()));
     }
 }

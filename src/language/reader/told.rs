@@ -1,5 +1,7 @@
 //! What a unit says besides its skill and classes: looks, and where a thing is.
 
+use std::collections::BTreeSet;
+
 use super::clauses::{Chunk, Clause, chunks};
 use super::features::direct;
 use super::lexicon::lexicon;
@@ -16,7 +18,7 @@ pub(super) struct Told {
 }
 
 impl Told {
-    pub(super) fn of(clauses: &[Clause]) -> Told {
+    pub(super) fn of(clauses: &[Clause], house: Option<&BTreeSet<Class>>) -> Told {
         let doing: Vec<&Clause> =
             clauses.iter().filter(|clause| !matches!(clause.lemma, "" | "go" | "wait" | "open" | "close")).collect();
         let takes_first = doing.len() > 1 && doing[0].lemma == "take";
@@ -25,18 +27,54 @@ impl Told {
         };
         let pieces = chunks(clause);
         let thing = direct(clause.lemma, &pieces).or(pieces.first());
-        let head = thing.and_then(|thing| thing.head());
-        let before_head = |chunk: &Chunk| {
-            let words = chunk.words.iter().take_while(|word| Some(*word) != head);
-            words
-                .filter(|word| !word.is_name() && !lexicon().words.plain.contains(&word.text) && word.unknown.is_none())
-                .map(|word| word.text.clone())
-                .collect()
-        };
-        let looks = thing.map(before_head).unwrap_or_default();
-        let leads = |lead: &str| matches!(lead, "in" | "on" | "from" | "off" | "out" | "inside" | "at" | "under");
-        let places = pieces.iter().skip(1).filter(|chunk| leads(&chunk.lead));
-        let mut classes = places.filter_map(|chunk| chunk.head()?.classes.first().copied());
-        Told { looks, place: classes.find(|class| class.info().receptacle), takes_first }
+        let looks = thing.map(looks).unwrap_or_default();
+        let from = |lead: &str| matches!(lead, "from" | "off" | "out");
+        let at = |lead: &str| matches!(lead, "in" | "on" | "inside" | "at" | "under") && clause.lemma != "put";
+        let places = pieces.iter().skip(1).filter(|chunk| from(&chunk.lead) || at(&chunk.lead));
+        let mut classes = places.filter_map(|chunk| {
+            let head = chunk.head()?;
+            one_meant(&head.text, head.classes, house)
+        });
+        Told { looks, place: classes.next(), takes_first }
+    }
+}
+
+fn looks(thing: &Chunk) -> Vec<String> {
+    let head = thing.head();
+    let before = thing.words.iter().take_while(|word| Some(*word) != head);
+    let says = before.filter(|word| {
+        let plain = lexicon().words.plain.contains(&word.text);
+        !(word.is_name() || word.unknown || plain || lexicon().count(&word.text).is_some())
+    });
+    says.map(|word| word.text.clone()).collect()
+}
+
+/// Which receptacle a name means: the one whose usual name it is, or the only one that bears it; of the house's, where that is
+/// known.
+fn one_meant(name: &str, classes: &[Class], house: Option<&BTreeSet<Class>>) -> Option<Class> {
+    let mut all: Vec<Class> = classes.iter().copied().filter(|class| class.info().receptacle).collect();
+    if let Some(house) = house
+        && all.iter().any(|class| house.contains(class))
+    {
+        all.retain(|class| house.contains(class));
+    }
+    match all.as_slice() {
+        [one] => Some(*one),
+        _ => all.into_iter().find(|class| lexicon().usual(*class) == Some(name)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_the_one_that_is_called_so_or_the_only_one() {
+        let class = |name: &str| Class::named(name).unwrap();
+        let some: Vec<Class> = ["CoffeeTable", "DiningTable"].map(class).to_vec();
+        assert_eq!(one_meant("table", &some, None), None);
+        assert_eq!(one_meant("coffee_table", &some, None), Some(some[0]));
+        let house: BTreeSet<Class> = [some[1]].into();
+        assert_eq!(one_meant("table", &some, Some(&house)), Some(some[1]));
     }
 }

@@ -4,13 +4,17 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use super::clauses::{Clause, clauses, without_the_forbidden};
-use super::features::{Before, are_about_different_things, do_not_mix, features, named_outright, speaks_of};
+use super::corrections::corrected;
+use super::features::{
+    Before, are_about_different_things, are_in_two_places, do_not_mix, features, named_outright, speaks_of,
+};
 use super::model::{Head, Model, ModelError, softmax};
 use super::reading::{Alternative, ReadSubtask, WishReading};
 use super::shape::Shape;
-use super::tokens::{Token, tokens};
+use super::spelling::Spelling;
+use super::tokens::{Token, Typed, tokens};
 use super::told::Told;
-use super::unread::{is_foreign, says_nothing, unread};
+use super::unread::{Part, is_foreign, is_means, says_nothing, unread};
 use crate::domain::Class;
 use crate::domain::skill::SkillKind;
 
@@ -63,6 +67,7 @@ struct Path {
     read: Vec<ReadSubtask>,
     probability: f32,
     absent: Vec<Class>,
+    parts: Vec<Part>,
 }
 
 impl Reader {
@@ -83,9 +88,15 @@ impl Reader {
         Model::parse(file).map(|model| Reader { model })
     }
 
+    /// The words that it knows.
+    pub fn spelling(&self) -> &Spelling {
+        &self.model.spelling
+    }
+
     /// Reads a text.
     pub fn read(&self, text: &str, context: &Context<'_>) -> WishReading {
-        let wanted = without_the_forbidden(tokens(text, &self.model.spelling));
+        let Typed { tokens, rest } = tokens(text, &self.model.spelling);
+        let wanted = without_the_forbidden(corrected(tokens));
         let clauses = clauses(&wanted);
         let mut paths: Vec<Option<Path>> = vec![None; clauses.len() + 1];
         paths[0] = Some(Path { probability: 1.0, ..Path::default() });
@@ -95,8 +106,9 @@ impl Reader {
                 let Some(path) = &paths[start] else { continue };
                 let some = &clauses[start..end];
                 for next in [self.skip(path, some), self.unit(path, some, context), self.each(path, some, context)] {
-                    let Some(next) = next else { continue };
+                    let Some(mut next) = next else { continue };
                     if best.as_ref().is_none_or(|best| next.score > best.score) {
+                        next.parts.push((start..end, path.read.len()..next.read.len()));
                         best = Some(next);
                     }
                 }
@@ -104,14 +116,15 @@ impl Reader {
             paths[end] = best;
         }
         let mut path = paths.pop().flatten().unwrap_or_default();
+        let (mut unread, left) = unread(&wanted, &clauses, &path.parts, &path.read);
         leave_out_means(&mut path.read);
-        let unread = unread(&wanted, &clauses);
-        let raw = if path.read.is_empty() { 0.0 } else { path.probability * 0.6f32.powi(unread.len() as i32) };
         let open = path
             .read
             .iter()
             .any(|read| read.object.is_none() || read.skill == SkillKind::Put && read.receptacle.is_none());
-        let confidence = if path.read.is_empty() || open { 0.0 } else { self.model.calibrated(raw) };
+        let nothing = path.read.is_empty() || open || !rest.is_empty();
+        let confidence = if nothing { 0.0 } else { self.model.calibrated(path.probability * left) };
+        unread.extend(rest);
         WishReading { subtasks: path.read, confidence, unread, absent: path.absent }
     }
 
@@ -137,7 +150,7 @@ impl Reader {
             let read = apart.iter().try_fold(start, |path, one| self.unit(&path, std::slice::from_ref(one), context));
             Some(Path { score: path.score + score + NEW_UNIT, ..read? })
         };
-        if is_certainly_apart(clause) {
+        if clause.is_of_each || is_certainly_apart(clause) {
             return read(0.0);
         }
         let head = self.model.head("shape")?;
@@ -151,7 +164,7 @@ impl Reader {
         if clauses.iter().any(|clause| is_foreign(clause) || says_nothing(clause)) || !clauses.iter().any(says) {
             return None;
         }
-        if are_about_different_things(clauses) || matches!(clauses, [clause] if is_certainly_apart(clause)) {
+        if are_about_different_things(clauses) || clauses.iter().any(is_certainly_apart) {
             return None;
         }
         let unit = self.shape(clauses, before(path, context))?;
@@ -167,9 +180,11 @@ impl Reader {
         let all = softmax(&head.scores(&features));
         let shapes = head.labels().iter().zip(all).filter_map(|(label, p)| Some((Shape::named(label)?, p)));
         let (place, thing) = speaks_of(clauses);
+        let one_place = !are_in_two_places(clauses);
         let may = |shape: Shape| match shape {
             Shape::Many => false,
-            Shape::Changed(_) | Shape::Stack | Shape::Two => place,
+            Shape::Stack => place && one_place,
+            Shape::Changed(_) | Shape::Two => place,
             Shape::Look => thing,
             Shape::One(_) => true,
         };
@@ -184,32 +199,37 @@ impl Reader {
         let house = context.house;
         path.probability *= score.exp();
         let [thing, place] = named_outright(clauses);
-        let mut object =
-            self.answer("object", features, thing, house, &mut path.absent, |class| shape.takes_object(class));
-        let holder = (shape == Shape::Stack).then(|| {
+        let absent = &mut path.absent;
+        let mut object = self.answer("object", features, thing, house, absent, |class| shape.takes_object(class));
+        let mut holder = (shape == Shape::Stack).then(|| {
             let may = |class: Class| class.info().pickupable && class.info().receptacle;
-            let mut holder = self.answer("movable", features, None, house, &mut path.absent, may);
-            set_apart(&mut object, &mut holder);
-            path.probability *= holder.probability;
-            holder
+            self.answer("movable", features, None, house, absent, may)
         });
-        path.probability *= object.probability;
-        let place = shape
+        let mut place = shape
             .has_place()
-            .then(|| self.answer("place", features, place, house, &mut path.absent, |class| shape.takes_place(class)));
-        path.probability *= place.as_ref().map_or(1.0, |place| place.probability);
+            .then(|| self.answer("place", features, place, house, absent, |class| shape.takes_place(class)));
+        set_all_apart(&mut object, &mut holder, &mut place);
+        for answer in [Some(&object), holder.as_ref(), place.as_ref()].into_iter().flatten() {
+            path.probability *= answer.probability;
+        }
         let slice = self.model.head("slice").map(|head| softmax(&head.scores(features)));
         let slice = slice.is_some_and(|p| p.get(1).is_some_and(|&p| p > 0.5))
             && object.class.is_some_and(|class| class.info().slices > 0)
             && shape != Shape::One(SkillKind::Slice);
-        let told = Told::of(clauses);
+        let told = Told::of(clauses, house);
+        let stands = told.place.filter(|stands| {
+            let goes = [Some(&object), holder.as_ref(), place.as_ref()];
+            let used = goes.into_iter().flatten().any(|answer| answer.class == Some(*stands));
+            !used && !shape.kinds().any(|kind| is_means(kind, *stands))
+        });
+        let begin = path.read.len();
         let step = |skill, slice| ReadSubtask {
             skill,
             object: object.class,
             receptacle: None,
             slice,
             looks: told.looks.clone(),
-            place: told.place.filter(|_| skill == SkillKind::Pickup),
+            place: None,
             alternatives: alternatives(&object, false),
         };
         let put = |slice| {
@@ -259,7 +279,9 @@ impl Reader {
             }
             Shape::Many => {}
         }
-        path.absent.dedup();
+        if let Some(first) = path.read.get_mut(begin) {
+            first.place = stands;
+        }
     }
 
     /// Which class a question is answered with; of the house's where that is known, unless none of them can be meant.
@@ -281,7 +303,8 @@ impl Reader {
         let chosen: Vec<(Option<Class>, f32)> = if known > IN_HOUSE {
             all.iter().filter(|(class, _)| inside(class)).map(|&(class, p)| (class, p / known)).collect()
         } else {
-            absent.extend(all.first().and_then(|(class, _)| *class));
+            let wanted = all.first().and_then(|(class, _)| *class);
+            absent.extend(wanted.filter(|class| !absent.contains(class)));
             all
         };
         let (class, probability) = chosen.first().copied().unwrap_or((None, 0.0));
@@ -304,17 +327,28 @@ fn set_apart(object: &mut Answer, holder: &mut Answer) {
     }
 }
 
+/// No two of a unit's things are the same.
+fn set_all_apart(object: &mut Answer, holder: &mut Option<Answer>, place: &mut Option<Answer>) {
+    // A change may bring about another pair that is the same.
+    for _ in 0..3 {
+        if let Some(holder) = holder {
+            set_apart(object, holder);
+            if let Some(place) = place {
+                set_apart(holder, place);
+            }
+        }
+        if let Some(place) = place {
+            set_apart(object, place);
+        }
+    }
+}
+
 /// Putting a thing into what then heats, chills or rinses it is part of that.
 fn leave_out_means(read: &mut Vec<ReadSubtask>) {
     let means = |put: &ReadSubtask, then: &ReadSubtask| {
-        let place = put.receptacle.map_or("", Class::name);
-        let tool = match then.skill {
-            SkillKind::Heat => "Microwave",
-            SkillKind::Cool => "Fridge",
-            SkillKind::Clean => "Sink",
-            _ => return false,
-        };
-        put.skill == SkillKind::Put && place == tool && put.object == then.object
+        put.skill == SkillKind::Put
+            && put.object == then.object
+            && put.receptacle.is_some_and(|place| is_means(then.skill, place))
     };
     let mut at = 0;
     while at + 1 < read.len() {
@@ -364,6 +398,9 @@ fn alternatives(answer: &Answer, is_receptacle: bool) -> Vec<Alternative> {
 fn is_certainly_apart(clause: &Clause) -> bool {
     let names = |part: &Clause| part.tokens.iter().find(|token| token.is_name()).map(|token| token.classes.to_vec());
     let Some(parts) = clause.apart() else { return false };
+    if clause.is_of_each {
+        return true;
+    }
     let things: Vec<Vec<Class>> = parts.iter().filter_map(names).collect();
     let movable = things.iter().flatten().all(|class| class.info().pickupable);
     movable && (clause.lemma != "put" || do_not_mix(&things)) && things.windows(2).all(|pair| pair[0] != pair[1])
