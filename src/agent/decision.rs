@@ -13,12 +13,29 @@ pub struct Decision {
     pub(crate) distribution: Option<ActionDistribution>,
     /// What the critics say of the state, where the decision was weighed by them.
     pub(crate) values: Option<Values>,
+    /// How likely the instruction is fulfilled in the state it was decided from, by the agent's own learned end; `None` where an
+    /// agent has none.
+    pub(crate) done: Option<f32>,
 }
 
 impl Decision {
+    /// From this probability on an agent says that it is done.
+    const SAYS_DONE: f32 = 0.5;
+
+    /// Whether the agent itself says that the instruction is fulfilled; `None` where it never says.
+    pub(crate) fn says_done(&self) -> Option<bool> {
+        self.done.map(|probability| probability >= Decision::SAYS_DONE)
+    }
+
+    /// What the agent's own end says, for a display: "done 0.07", "DONE 0.93".
+    pub(crate) fn end_in_words(&self) -> Option<String> {
+        let word = if self.says_done()? { "DONE" } else { "done" };
+        Some(format!("{word} {:.2}", self.done?))
+    }
+
     /// An action with nothing behind it, as a person or a script chooses.
     pub(crate) fn of(action: Action) -> Decision {
-        Decision { action, distribution: None, values: None }
+        Decision { action, distribution: None, values: None, done: None }
     }
 }
 

@@ -84,7 +84,7 @@ impl RandomPolicy {
             entropy: (possible.len() as f32).ln(),
             greedy: action,
         };
-        Ok(Decision { action, distribution: Some(distribution), values: None })
+        Ok(Decision { action, distribution: Some(distribution), values: None, done: None })
     }
 }
 

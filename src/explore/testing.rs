@@ -111,6 +111,7 @@ pub(crate) fn decided(now: &SessionSnapshot) -> SessionEvent {
             action,
             distribution: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),
             values: None,
+            done: None,
         },
         "Pickup Mug".into(),
         None,

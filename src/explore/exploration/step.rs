@@ -76,9 +76,11 @@ impl Exploration {
         let (weighed, values) = self.acting.decision.take().unzip();
         let values = values.flatten();
         let tick = self.rollout.carry_out(decision.clone())?;
+        let (distribution, done) = weighed.map_or((None, None), |weighed| (weighed.distribution, weighed.done));
         let taken = TakenStep {
             decision: Decision {
-                distribution: decision.distribution.or(weighed.and_then(|weighed| weighed.distribution)),
+                distribution: decision.distribution.or(distribution),
+                done: decision.done.or(done),
                 ..decision
             },
             step: TraceStep::of(&tick, &self.rollout),

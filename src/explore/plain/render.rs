@@ -88,7 +88,8 @@ pub(super) fn next(
 ) -> anyhow::Result<()> {
     let top = decision.distribution.as_ref().map_or(String::new(), |distribution| format!(" ({})", top(distribution)));
     let value = values.map_or(String::new(), |values| format!(", V {:.2}", values.state));
-    writeln!(out, "next: {words}{top}{value}")?;
+    let done = decision.end_in_words().map_or(String::new(), |done| format!(", {done}"));
+    writeln!(out, "next: {words}{top}{value}{done}")?;
     Ok(())
 }
 

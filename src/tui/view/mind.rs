@@ -29,7 +29,9 @@ impl Widget for MindPanel<'_> {
             (None, Some(distribution)) => {
                 let value =
                     app.session.values.as_ref().map_or(String::new(), |values| format!(" · V {:.2}", values.state));
-                format!("{}{value} · entropy {:.2}", app.session.policy.name(), distribution.entropy)
+                let done = app.session.decision.as_ref().and_then(|(decision, _)| decision.end_in_words());
+                let done = done.map_or(String::new(), |done| format!(" · {done}"));
+                format!("{}{value} · entropy {:.2}{done}", app.session.policy.name(), distribution.entropy)
             }
             (None, None) if app.session.decision.is_some() => {
                 format!("{} · no probabilities", app.session.policy.name())
