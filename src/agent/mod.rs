@@ -12,6 +12,7 @@ pub(crate) mod logit_adjustment;
 pub(crate) mod loop_guard;
 #[allow(dead_code)]
 pub(crate) mod memory;
+pub(crate) mod memory_agent;
 pub(crate) mod policy;
 pub mod policy_source;
 pub(crate) mod random;

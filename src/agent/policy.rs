@@ -5,7 +5,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::decision::Decision;
 use super::frame_history::FrameHistory;
+use super::memory_agent::Recollection;
 use super::value_estimates::Values;
+use crate::domain::Action;
 use crate::env::Environment;
 use crate::house::expert::ExpertState;
 
@@ -17,6 +19,8 @@ pub struct Observation<'a> {
     pub(crate) instruction: &'a str,
     /// How many steps the episode has taken; deciding twice at one step looks once.
     pub(crate) step: u32,
+    /// The action that was taken last, whoever chose it; `None` at the start, and where the episode was entered anew.
+    pub(crate) last: Option<Action>,
 }
 
 /// A decision for each slot, `None` where there was no observation. A slot's own failure is in its place.
@@ -54,6 +58,8 @@ pub enum PolicyState {
     Plan(Box<ExpertState>),
     /// The last frames, and its random numbers.
     Frames(Box<FrameHistory>),
+    /// All that it remembers.
+    Recollection(Box<Recollection>),
 }
 
 /// Something that acts: a trained agent, the expert, chance. It acts in several episodes at once, each in a slot of its own;

@@ -9,7 +9,9 @@ use sha2::{Digest, Sha256};
 
 use super::config::CheckpointConfig;
 use super::experts::expert::ExpertPolicy;
-use super::learned::LearnedPolicy;
+use super::learned::{LearnedPolicy, SharedEmbedder};
+use super::memory_agent::MemoryPolicy;
+use super::memory_agent::config::MemoryConfig;
 use super::policy::Policy;
 use super::random::RandomPolicy;
 use super::registry::{Loaded, NamedAgent};
@@ -68,11 +70,11 @@ impl PolicySource {
         let load = {
             let (folder, chosen) = (folder.clone(), checkpoint_hash.clone());
             move || -> anyhow::Result<Box<dyn Policy>> {
-                let mut agent = LearnedPolicy::load(&folder, sentences.clone(), computes)?;
+                let mut agent = load_agent(&folder, sentences.clone(), computes)?;
                 // What was loaded is what the run's manifest names.
                 check_hash(&folder, &chosen)?;
                 agent.set_sampling(sampling);
-                Ok(Box::new(agent))
+                Ok(agent)
             }
         };
         let name = load()?.name().to_owned();
@@ -109,6 +111,21 @@ fn hash(folder: &Path) -> anyhow::Result<String> {
         digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
     }
     Ok(json::hex(&digest.finalize()))
+}
+
+/// The agent of a checkpoint, of whatever kind it is; it decides greedily.
+///
+/// # Errors
+/// When the checkpoint is malformed, or was trained with another sentence encoder.
+pub(crate) fn load_agent(
+    folder: &Path,
+    sentences: SharedEmbedder,
+    device: tch::Device,
+) -> anyhow::Result<Box<dyn Policy>> {
+    Ok(match MemoryConfig::is_there(folder) {
+        true => Box::new(MemoryPolicy::load(folder, device)?),
+        false => Box::new(LearnedPolicy::load(folder, sentences, device)?),
+    })
 }
 
 /// The policy that a run was made with, by its name and the hash of its checkpoint, which may be `named` or lie where

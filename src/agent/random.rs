@@ -101,7 +101,7 @@ mod tests {
         let mut environment = HouseEnvironment::new(kitchen_house(), None);
         let mut interactions = 0;
         for _ in 0..150 {
-            let here = Observation { environment: &mut environment, instruction: "", step: 0 };
+            let here = Observation { environment: &mut environment, instruction: "", step: 0, last: None };
             let action = policy.act_in(0, here).unwrap().action;
             let outcome = environment.step(action).unwrap().outcome;
             if action.target.is_some() {

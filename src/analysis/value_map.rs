@@ -79,7 +79,7 @@ impl ValueMap {
 
 /// What an agent sees that has just come there.
 fn looks<'a>(environment: &'a mut HouseEnvironment, instruction: &'a str) -> Observation<'a> {
-    Observation { environment, instruction, step: 0 }
+    Observation { environment, instruction, step: 0, last: None }
 }
 
 /// Puts the agent on every cell, looking each way, and asks the policy. `visit` sees what is there after every cell; it, or

@@ -116,8 +116,14 @@ impl Pretrain {
     }
 
     fn run_memory(self, preset: MemoryPreset) -> anyhow::Result<ExitStatus> {
-        let training =
-            MemoryTraining { preset, data: self.data, out: self.out, resume: self.resume, device: best_device() };
+        let training = MemoryTraining {
+            preset,
+            data: self.data,
+            out: self.out,
+            resume: self.resume,
+            detector_from: self.visual_from,
+            device: best_device(),
+        };
         let stop = stop::on_signals()?;
         let mut progress = Progress::new();
         let trained = training.run(&mut progress, &stop)?;

@@ -193,6 +193,18 @@ impl Pose {
     pub(crate) const DOWN: i16 = 60;
     /// One look, in degrees.
     pub const LOOK: i16 = 15;
+
+    /// The pose as one calls it who stood at `origin` and took that for cell (0, 0), facing north; horizons stay.
+    pub(crate) fn relative_to(self, origin: Pose) -> Pose {
+        let (dx, dz) = (self.cell.x - origin.cell.x, self.cell.z - origin.cell.z);
+        let cell = match origin.heading {
+            Heading::North => Cell::new(dx, dz),
+            Heading::East => Cell::new(-dz, dx),
+            Heading::South => Cell::new(-dx, -dz),
+            Heading::West => Cell::new(dz, -dx),
+        };
+        Pose { cell, heading: Heading::from_quarters(self.heading.quarters() - origin.heading.quarters()), ..self }
+    }
 }
 
 /// An axis-aligned box in the scene's frame, in millimetres.

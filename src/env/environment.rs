@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use crate::domain::{Action, Class, Instance};
+use crate::domain::{Action, Class, Instance, Pose};
 use crate::house::grading::Grader;
 use crate::house::view::{Candidate, Frame};
 use crate::house::{House, Outcome};
@@ -77,6 +77,12 @@ pub(crate) trait Environment: Send {
     /// The class of a thing that an action may name.
     fn class_of(&self, instance: Instance) -> Option<Class>;
 
+    /// Where the agent stands and looks relative to where it stood at the reset, as dead reckoning by its own moves tells; the
+    /// horizon is an inclinometer's. `None` where the simulator does not tell.
+    fn odometry(&self) -> Option<Pose> {
+        None
+    }
+
     /// A fingerprint of the state: equal states have equal ones. `None` where the simulator tells nothing of its state.
     fn fingerprint(&self) -> Option<String> {
         None
@@ -129,6 +135,10 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
 
     fn class_of(&self, instance: Instance) -> Option<Class> {
         (**self).class_of(instance)
+    }
+
+    fn odometry(&self) -> Option<Pose> {
+        (**self).odometry()
     }
 
     fn fingerprint(&self) -> Option<String> {

@@ -3,7 +3,7 @@
 use anyhow::Context;
 
 use super::environment::{Environment, HouseAccess, Snapshot, Transition};
-use crate::domain::{Action, Class, Instance, Task, World};
+use crate::domain::{Action, Class, Instance, Pose, Task, World};
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::house::view::{Candidate, Frame};
@@ -70,6 +70,10 @@ impl Environment for HouseEnvironment {
         self.house.world().class_of(self.house.scene(), instance)
     }
 
+    fn odometry(&self) -> Option<Pose> {
+        Some(self.house.world().agent.relative_to(self.start.world.agent))
+    }
+
     fn fingerprint(&self) -> Option<String> {
         Some(self.house.world().digest())
     }
@@ -122,6 +126,32 @@ mod tests {
         environment.step(Action::navigate(ActionType::RotateLeft)).unwrap();
         environment.reset().unwrap();
         assert_eq!(environment.fingerprint(), start);
+    }
+
+    #[test]
+    fn odometry_is_what_reckoning_by_the_own_moves_gives_walls_and_all() {
+        use rand::{Rng, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let mut environment = environment();
+        environment.reset().unwrap();
+        let mut reckoned = Pose { horizon: environment.house.world().agent.horizon, ..Pose::default() };
+        let mut bumps = 0;
+        for _ in 0..120 {
+            // Two moves for each other action, so that it comes about.
+            let kind = ActionType::from_index(rng.random_range(0..10usize).saturating_sub(5)).unwrap();
+            let before = environment.frame().unwrap().rgb.clone();
+            environment.step(Action::navigate(kind)).unwrap();
+            let changed = environment.frame().unwrap().rgb != before;
+            match kind {
+                ActionType::MoveAhead if changed => reckoned.cell = reckoned.cell.ahead(reckoned.heading),
+                ActionType::MoveAhead => bumps += 1,
+                ActionType::RotateLeft => reckoned.heading = reckoned.heading.left(),
+                ActionType::RotateRight => reckoned.heading = reckoned.heading.right(),
+                _ => reckoned.horizon = environment.house.world().agent.horizon,
+            }
+            assert_eq!(environment.odometry(), Some(reckoned));
+        }
+        assert!(bumps > 5, "{bumps} moves failed");
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub(crate) struct Rollout<E = HouseEnvironment> {
     /// In which of its slots a policy decides here.
     pub(crate) slot: usize,
     steps: u32,
+    last: Option<Action>,
 }
 
 /// One step that was taken.
@@ -92,7 +93,7 @@ impl Rollout {
 impl<E: Environment> Rollout<E> {
     /// An episode at its start.
     pub(crate) fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
-        Rollout { env, instruction, horizon, slot: 0, steps: 0 }
+        Rollout { env, instruction, horizon, slot: 0, steps: 0, last: None }
     }
 
     /// How many steps were taken.
@@ -105,13 +106,13 @@ impl<E: Environment> Rollout<E> {
     /// # Errors
     /// When the environment fails.
     pub(crate) fn restart(&mut self) -> anyhow::Result<()> {
-        self.steps = 0;
+        (self.steps, self.last) = (0, None);
         self.env.reset()
     }
 
     /// Goes on as if so many steps had been taken: the environment was brought to another state.
     pub(crate) fn set_steps(&mut self, steps: u32) {
-        self.steps = steps;
+        (self.steps, self.last) = (steps, None);
     }
 
     /// Whether it is over, and why.
@@ -124,7 +125,7 @@ impl<E: Environment> Rollout<E> {
 
     /// What a policy decides from now.
     pub(crate) fn observation(&mut self) -> Observation<'_> {
-        Observation { environment: &mut self.env, instruction: &self.instruction, step: self.steps }
+        Observation { environment: &mut self.env, instruction: &self.instruction, step: self.steps, last: self.last }
     }
 
     /// What `policy` would do now, without doing it.
@@ -151,8 +152,10 @@ impl<E: Environment> Rollout<E> {
     /// # Errors
     /// When the environment fails; an impossible action is an outcome.
     pub(crate) fn carry_out(&mut self, decision: Decision) -> anyhow::Result<Tick> {
-        let transition = self.env.step(decision.action)?;
+        let action = decision.action;
+        let transition = self.env.step(action)?;
         self.steps += 1;
+        self.last = Some(action);
         let completed_one = transition.completed_subtask;
         Ok(Tick { step: self.steps, decision, outcome: transition.outcome, completed_one })
     }

@@ -80,7 +80,7 @@ fn turned(heading: Heading) -> HouseEnvironment {
 }
 
 fn at<'a>(environment: &'a mut HouseEnvironment, instruction: &'static str, step: u32) -> Observation<'a> {
-    Observation { environment, instruction, step }
+    Observation { environment, instruction, step, last: None }
 }
 
 #[test]

@@ -14,7 +14,7 @@ use odometry::Odometry;
 use percept::Percept;
 use semantic_map::SemanticMap;
 
-use crate::domain::{ActionType, Class};
+use crate::domain::{Class, Pose};
 use crate::house::view::Frame;
 
 /// All that is kept from the start of an episode on.
@@ -34,10 +34,10 @@ pub(crate) struct Memory {
 /// What the agent has of one moment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glance<'a> {
-    /// What it did just before; `None` at the start.
-    pub(crate) last: Option<ActionType>,
-    /// How far the camera looks down, in degrees.
-    pub(crate) tilt: i16,
+    /// Where it stands and looks, in its own frame.
+    pub(crate) pose: Pose,
+    /// Whether the last action was a move ahead that led nowhere.
+    pub(crate) blocked: bool,
     /// The picture and its depth.
     pub(crate) frame: &'a Frame,
     /// What shows in the picture.
@@ -49,11 +49,10 @@ pub(crate) struct Glance<'a> {
 impl Memory {
     /// Takes in the next moment; each moment once.
     pub(crate) fn observe(&mut self, glance: Glance<'_>) {
-        let Glance { last, tilt, frame, percept, held } = glance;
+        let Glance { pose, blocked, frame, percept, held } = glance;
         self.step += u32::from(std::mem::replace(&mut self.begun, true));
-        self.odometry.observe(tilt, &frame.rgb, last);
-        let pose = self.odometry.pose();
-        if self.odometry.blocked() {
+        self.odometry.observe(pose, blocked);
+        if blocked {
             self.occupancy.bump(pose);
         }
         self.occupancy.observe(pose, frame);

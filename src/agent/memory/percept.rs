@@ -40,6 +40,12 @@ impl Percept {
     }
 }
 
+/// Whether a cell shows what is in the hand.
+pub(crate) fn in_hand(cell: u16, depth: &[f32]) -> bool {
+    let (column, row) = Percept::middle(cell);
+    depth.get(usize::from(cell)).is_some_and(|&depth| super::eye::is_in_hand(column, row, depth))
+}
+
 /// The median depth of each cell of a frame.
 pub(crate) fn median_depths(frame: &Frame) -> Vec<f32> {
     let span = |index: usize, size: usize| (index * size / GRID, ((index + 1) * size / GRID).min(size));

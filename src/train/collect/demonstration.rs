@@ -194,8 +194,8 @@ struct DisturbedPolicy<'a> {
 impl DisturbedPolicy<'_> {
     fn decide(&mut self, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
         let again = |here: &mut Observation<'_>, policy: &mut dyn Policy| {
-            let Observation { environment, instruction, step } = here;
-            policy.act_in(0, Observation { environment: &mut **environment, instruction, step: *step })
+            let Observation { environment, instruction, step, last } = here;
+            policy.act_in(0, Observation { environment: &mut **environment, instruction, step: *step, last: *last })
         };
         let choice = again(here, self.demonstrator.as_mut()).inspect_err(|_| self.sees_no_way = true)?.action;
         if self.disturbed == 0 && self.rng.random_bool(self.noise) {

@@ -35,15 +35,14 @@ pub(crate) struct PlaceLabels {
 }
 
 impl PlaceLabels {
-    /// The labels of a frame that was drawn of `world`. What the agent holds is left out: it knows of that.
+    /// The labels of a frame that was drawn of `world`. What the agent holds is labelled as everything else.
     pub(crate) fn of(scene: &Scene, world: &World, frame: &Frame) -> PlaceLabels {
         let mut holding: BTreeMap<usize, f32> = BTreeMap::new();
         let mut things = Vec::new();
         for (code, pixels) in pixels_by_place(frame) {
             let Some(instance) = decode(code) else { continue };
-            let in_hand = matches!(instance, crate::domain::Instance::Object(index) if world.in_hand(index));
             let class = world.class_of(scene, instance).unwrap_or_default();
-            if in_hand || !class.in_vocabulary() {
+            if !class.in_vocabulary() {
                 continue;
             }
             let total: u32 = pixels.values().map(|&count| u32::from(count)).sum();

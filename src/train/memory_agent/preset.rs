@@ -5,6 +5,11 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::chooser::ChooserTraining;
+use crate::agent::memory_agent::config::AgentKind;
+use crate::agent::memory_agent::eyes::Sight;
+use crate::agent::memory_agent::features::{ACTION, SITUATION};
+use crate::nets::chooser::ChooserSpec;
 use crate::nets::detector::DetectorSpec;
 use crate::train::detection::DetectorTraining;
 use crate::train::preset::{Preset, extend};
@@ -29,18 +34,36 @@ pub(crate) struct MemoryPreset {
     pub(crate) save_every: u64,
     /// Steps between two lines of training/progress.jsonl.
     pub(crate) report_every: u64,
+    /// What the agent sees with; the simulator's truth is an ablation.
+    pub(crate) sight: Sight,
+    /// Whether the agent never does the same twice in the same place and situation.
+    pub(crate) loop_guard: bool,
     /// The size of the detector.
     pub(crate) detector: DetectorSpec,
     /// How the detector is trained.
     pub(crate) detector_training: DetectorTraining,
+    /// The size of the chooser.
+    pub(crate) chooser: ChooserSize,
+    /// How the chooser is trained.
+    pub(crate) chooser_training: ChooserTraining,
 }
 
-/// The kind of agent that a preset is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum AgentKind {
-    /// One with a memory.
-    Memory,
+/// The part of a chooser's size that is free.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ChooserSize {
+    /// The length of a class's vector.
+    pub(crate) embedding: i64,
+    /// Widths of the hidden layers.
+    pub(crate) hidden: Vec<i64>,
+}
+
+impl ChooserSize {
+    /// The whole size, with as many numbers as the agent makes of a situation and a macro action.
+    pub(crate) fn spec(&self) -> ChooserSpec {
+        let ChooserSize { embedding, hidden } = self.clone();
+        ChooserSpec { situation: SITUATION as i64, action: ACTION as i64, embedding, hidden }
+    }
 }
 
 impl MemoryPreset {
@@ -79,6 +102,8 @@ impl MemoryPreset {
         }
         preset.detector.check()?;
         preset.detector_training.check("detector_training")?;
+        preset.chooser.spec().check()?;
+        preset.chooser_training.check("chooser_training")?;
         Ok(preset)
     }
 }

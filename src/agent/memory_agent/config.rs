@@ -1,0 +1,157 @@
+//! The `config.json` of an agent with a memory, and its networks.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use serde::{Deserialize, Serialize};
+use tch::{Device, Tensor, nn};
+
+use super::eyes::Sight;
+use super::features;
+use crate::agent::config::{CheckpointConfig, Ontology};
+use crate::data::json;
+use crate::nets::chooser::{Chooser, ChooserSpec};
+use crate::nets::detector::{Detector, DetectorSpec};
+use crate::nets::weights::{self, TensorSpec};
+
+/// What tells the checkpoints of these agents from those of the paper's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum AgentKind {
+    /// One with a memory.
+    Memory,
+}
+
+/// How a checkpoint was trained, and from what.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MemoryProvenance {
+    /// The preset's name.
+    pub(crate) preset: String,
+    /// The digest of the trajectories that the detector learned from.
+    pub(crate) detector_dataset: String,
+    /// Steps of the detector's training.
+    pub(crate) detector_steps: u64,
+    /// The digest of the trajectories that the chooser learned from.
+    pub(crate) dataset: String,
+    /// How many those are.
+    pub(crate) trajectories: u64,
+    /// Steps of the chooser's training.
+    pub(crate) chooser_steps: u64,
+    /// The seed of initialisation and data order.
+    pub(crate) seed: u64,
+}
+
+/// A checkpoint's `config.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MemoryConfig {
+    pub(crate) format_version: u32,
+    /// Always `memory`.
+    pub(crate) agent: AgentKind,
+    /// The classes and actions that the networks speak of.
+    pub(crate) ontology: Ontology,
+    /// What it sees with.
+    #[serde(default)]
+    pub(crate) sight: Sight,
+    /// Whether it never does the same twice in the same place and situation.
+    pub(crate) loop_guard: bool,
+    pub(crate) detector: DetectorSpec,
+    pub(crate) chooser: ChooserSpec,
+    /// How it was trained, and from what.
+    pub(crate) provenance: MemoryProvenance,
+}
+
+impl MemoryConfig {
+    /// Whether a folder holds a checkpoint of an agent with a memory.
+    pub(crate) fn is_there(folder: &Path) -> bool {
+        #[derive(Deserialize)]
+        struct Peek {
+            agent: Option<AgentKind>,
+        }
+        let text = std::fs::read_to_string(folder.join("config.json")).unwrap_or_default();
+        serde_json::from_str::<Peek>(&text).is_ok_and(|peek| peek.agent.is_some())
+    }
+
+    /// Reads a checkpoint's configuration.
+    ///
+    /// # Errors
+    /// When the file is missing or malformed, of another format version, or for other classes, actions or features.
+    pub(crate) fn read(folder: &Path) -> anyhow::Result<MemoryConfig> {
+        CheckpointConfig::check_there(folder)?;
+        let path = folder.join("config.json");
+        let config: MemoryConfig = json::read(&path, CheckpointConfig::FORMAT)?.value;
+        config.check().with_context(|| path.display().to_string())?;
+        Ok(config)
+    }
+
+    fn check(&self) -> anyhow::Result<()> {
+        let (found, own) = (&self.ontology, Ontology::current());
+        ensure!(*found == own, "ontology is {found:?}, this program's is {own:?}");
+        self.detector.check()?;
+        self.chooser.check()?;
+        for (field, found, own) in [
+            ("chooser.situation", self.chooser.situation, features::SITUATION),
+            ("chooser.action", self.chooser.action, features::ACTION),
+        ] {
+            ensure!(found == own as i64, "{field} is {found}, and this program counts {own}: train the agent anew");
+        }
+        Ok(())
+    }
+}
+
+/// The networks of an agent with a memory, with the stores that own their weights.
+#[derive(Debug)]
+pub(crate) struct MemoryNetworks {
+    pub(crate) detector: Detector,
+    pub(crate) detector_store: nn::VarStore,
+    pub(crate) chooser: Chooser,
+    pub(crate) chooser_store: nn::VarStore,
+}
+
+impl MemoryNetworks {
+    /// Networks with fresh weights.
+    pub(crate) fn new(detector: &DetectorSpec, chooser: &ChooserSpec, device: Device) -> MemoryNetworks {
+        let (detector_store, chooser_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
+        MemoryNetworks {
+            detector: Detector::new(&detector_store.root(), detector),
+            chooser: Chooser::new(&chooser_store.root(), chooser),
+            detector_store,
+            chooser_store,
+        }
+    }
+
+    fn tensors(&self) -> BTreeMap<String, Tensor> {
+        let stores = [("detector", &self.detector_store), ("chooser", &self.chooser_store)];
+        let named = |(prefix, store): (&'static str, &nn::VarStore)| {
+            store.variables().into_iter().map(move |(name, tensor)| (format!("{prefix}.{name}"), tensor.detach()))
+        };
+        stores.into_iter().flat_map(named).collect()
+    }
+
+    /// Loads a checkpoint's networks.
+    ///
+    /// # Errors
+    /// When `model.safetensors` cannot be read or differs from the configuration; every such tensor is named.
+    pub(crate) fn load(folder: &Path, config: &MemoryConfig, device: Device) -> anyhow::Result<MemoryNetworks> {
+        let path = folder.join("model.safetensors");
+        let tensors = weights::read(&path)?;
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, device);
+        let variables = networks.tensors();
+        let forms = variables.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
+        weights::check(&path, &tensors, &forms)?;
+        weights::copy(&tensors, "detector.", &networks.detector_store)?;
+        weights::copy(&tensors, "chooser.", &networks.chooser_store)?;
+        Ok(networks)
+    }
+
+    /// Writes a checkpoint: the weights first, the configuration last.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to.
+    pub(crate) fn save(&self, folder: &Path, config: &MemoryConfig) -> anyhow::Result<()> {
+        weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
+        json::write_pretty(&folder.join("config.json"), config)
+    }
+}

@@ -1,0 +1,127 @@
+//! What the agent sees with: a trained detector, or for an ablation what the simulator knows to be in view.
+
+use std::collections::BTreeMap;
+
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use tch::Device;
+
+use crate::agent::memory::percept::{GRID, Percept, in_hand, median_depths};
+use crate::domain::{Class, Scene, World};
+use crate::env::Environment;
+use crate::house::view::{Frame, decode};
+use crate::nets::detector::{DetectorSpec, FrozenDetector};
+
+/// What sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Sight {
+    /// A trained detector.
+    #[default]
+    Detector,
+    /// The simulator: an ablation.
+    Simulator,
+}
+
+/// Eyes that are at hand.
+#[derive(Debug)]
+pub(crate) enum Eyes {
+    Detector(Box<FrozenDetector>),
+    Simulator,
+}
+
+/// A frame as it was seen, and what was seen in the hand.
+pub(crate) struct Seen {
+    pub(crate) percept: Percept,
+    pub(crate) held: Option<Class>,
+}
+
+impl Eyes {
+    /// Looks at what an environment shows now.
+    ///
+    /// # Errors
+    /// When the environment shows nothing, or the simulator is asked and is another one than House.
+    pub(crate) fn look(&self, environment: &mut dyn Environment) -> anyhow::Result<Seen> {
+        match self {
+            Eyes::Detector(detector) => Ok(detected(detector, environment.frame()?)),
+            Eyes::Simulator => {
+                let name = environment.name().to_owned();
+                let access = environment.house();
+                let house =
+                    access.with_context(|| format!("the simulator's truth is House's, and this is {name}"))?.house;
+                let frame = house.frame().clone();
+                Ok(true_sight(house.scene(), house.world(), &frame))
+            }
+        }
+    }
+
+    /// Looks at a frame of House that was drawn of `world`.
+    pub(crate) fn look_at(&self, scene: &Scene, world: &World, frame: &Frame) -> Seen {
+        match self {
+            Eyes::Detector(detector) => detected(detector, frame),
+            Eyes::Simulator => true_sight(scene, world, frame),
+        }
+    }
+
+    /// The same eyes for another thread.
+    pub(crate) fn share(&self) -> Eyes {
+        match self {
+            Eyes::Detector(detector) => Eyes::Detector(Box::new(detector.share())),
+            Eyes::Simulator => Eyes::Simulator,
+        }
+    }
+}
+
+fn detected(detector: &FrozenDetector, frame: &Frame) -> Seen {
+    let said = detector.detect(&[DetectorSpec::image(frame)]).flatten(0, -1).to_device(Device::Cpu);
+    let said = Vec::<f32>::try_from(said).unwrap_or_default();
+    let depth = median_depths(frame);
+    let mut detections = Vec::new();
+    for (class, places) in said.chunks_exact(GRID * GRID).take(Class::VOCABULARY).enumerate() {
+        let Some(class) = Class::from_index(class).filter(|class| class.in_vocabulary()) else { continue };
+        let probable = places.iter().enumerate().filter(|(_, probability)| **probability >= Percept::LEAST);
+        detections.extend(probable.map(|(place, &probability)| (class, place as u16, probability)));
+    }
+    let open = said.chunks_exact(GRID * GRID).last().map(<[f32]>::to_vec).unwrap_or_default();
+    seen(Percept { detections, open, depth })
+}
+
+/// What was seen in the hand is the class that is surest there.
+fn seen(percept: Percept) -> Seen {
+    let mut votes: BTreeMap<Class, f32> = BTreeMap::new();
+    for &(class, place, probability) in &percept.detections {
+        if class.info().pickupable && in_hand(place, &percept.depth) && probability >= 0.5 {
+            *votes.entry(class).or_default() += probability;
+        }
+    }
+    let held = votes.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(class, _)| class);
+    Seen { percept, held }
+}
+
+/// What eyes without fault would make of a frame that was drawn of `world`.
+pub(crate) fn true_sight(scene: &Scene, world: &World, frame: &Frame) -> Seen {
+    /// As few pixels of a place show a thing there.
+    const FEWEST: u32 = 4;
+    let mut counts: Vec<BTreeMap<u16, u32>> = vec![BTreeMap::new(); GRID * GRID];
+    for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
+        let down = y * GRID / frame.height * GRID;
+        for (x, &id) in row.iter().enumerate().filter(|(_, id)| **id != 0) {
+            *counts[down + x * GRID / frame.width].entry(id).or_default() += 1;
+        }
+    }
+    let mut percept = Percept { detections: Vec::new(), open: vec![0.0; GRID * GRID], depth: median_depths(frame) };
+    for (place, counts) in counts.iter().enumerate() {
+        for (&id, _) in counts.iter().filter(|(_, pixels)| **pixels >= FEWEST) {
+            let Some(instance) = decode(id) else { continue };
+            let class = world.class_of(scene, instance).unwrap_or_default();
+            if class.in_vocabulary() && !percept.detections.contains(&(class, place as u16, 0.9)) {
+                percept.detections.push((class, place as u16, 0.9));
+            }
+            if world.is_open(instance) || world.is_on(instance) {
+                percept.open[place] = 1.0;
+            }
+        }
+    }
+    let held = world.held.and_then(|index| world.object(index)).map(|object| object.class);
+    Seen { percept, held: held.filter(|class| class.in_vocabulary()) }
+}

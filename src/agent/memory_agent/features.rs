@@ -1,0 +1,208 @@
+//! What the chooser knows of the situation and of each macro action, as numbers.
+
+use super::goal::Goal;
+use super::macro_action::{MacroAction, Purpose};
+use super::progress::Progress;
+use crate::agent::memory::Memory;
+use crate::agent::memory::semantic_map::Thing;
+use crate::domain::{ActionType, Cell, Class};
+
+/// Numbers of a situation.
+pub(crate) const SITUATION: usize = 56;
+/// Numbers of a macro action.
+pub(crate) const ACTION: usize = 44;
+/// Kinds of interaction.
+const INTERACTIONS: usize = ActionType::COUNT - 5;
+
+/// What there is to choose from, and in which situation.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choice {
+    /// [`SITUATION`] numbers.
+    pub(crate) situation: Vec<f32>,
+    /// The classes of the goal's object and receptacle; 0 for none.
+    pub(crate) goal: [u8; 2],
+    /// [`ACTION`] numbers for each macro action, one after the other.
+    pub(crate) actions: Vec<f32>,
+    /// The class that each macro action is about; 0 for none.
+    pub(crate) classes: Vec<u8>,
+}
+
+/// A list of numbers under construction, so that each has its place and none is forgotten.
+struct Numbers(Vec<f32>);
+
+impl Numbers {
+    fn flag(&mut self, holds: bool) {
+        self.0.push(f32::from(u8::from(holds)));
+    }
+
+    fn number(&mut self, number: f32) {
+        self.0.push(if number.is_finite() { number.clamp(-4.0, 4.0) } else { 4.0 });
+    }
+
+    fn one_of(&mut self, count: usize, index: Option<usize>) {
+        (0..count).for_each(|at| self.flag(index == Some(at)));
+    }
+
+    fn exactly(mut self, count: usize) -> Vec<f32> {
+        debug_assert!(self.0.len() <= count, "{} numbers, not {count}", self.0.len());
+        self.0.resize(count, 0.0);
+        self.0
+    }
+}
+
+fn log(count: f32) -> f32 {
+    (1.0 + count.max(0.0)).ln() / 3.0
+}
+
+fn interaction(kind: ActionType) -> usize {
+    kind.index().saturating_sub(5)
+}
+
+impl Choice {
+    /// The numbers of a moment.
+    pub(crate) fn of(memory: &Memory, progress: &Progress, things: &[Thing], actions: &[MacroAction]) -> Choice {
+        let goal = progress.goal();
+        let class = |class: Option<Class>| class.map_or(0, |class| class.index() as u8);
+        let about = |action: &MacroAction| match action.purpose {
+            Purpose::Interact(_, class) => class.index() as u8,
+            _ => 0,
+        };
+        Choice {
+            situation: situation(memory, progress, things),
+            goal: [class(goal.map(|goal| goal.object)), class(goal.and_then(|goal| goal.receptacle))],
+            actions: actions.iter().flat_map(|action| numbers(memory, progress, things, action)).collect(),
+            classes: actions.iter().map(about).collect(),
+        }
+    }
+
+    /// How many macro actions there are.
+    pub(crate) fn len(&self) -> usize {
+        self.classes.len()
+    }
+}
+
+fn situation(memory: &Memory, progress: &Progress, things: &[Thing]) -> Vec<f32> {
+    let mut numbers = Numbers(Vec::with_capacity(SITUATION));
+    let goal = progress.goal();
+    let is = |of: fn(&Goal, Class) -> bool, class: Class| goal.is_some_and(|goal| of(goal, class));
+    let object: fn(&Goal, Class) -> bool = |goal, class| goal.object == class;
+    let receptacle: fn(&Goal, Class) -> bool = |goal, class| goal.receptacle == Some(class);
+    let tool: fn(&Goal, Class) -> bool = Goal::is_tool;
+
+    numbers.one_of(7, goal.map(|goal| goal.skill as usize));
+    numbers.flag(goal.is_some_and(|goal| goal.slice));
+    numbers.flag(goal.is_some_and(|goal| goal.place.is_some()));
+    numbers.flag(progress.is_last());
+    let held = progress.held;
+    numbers.flag(held.is_none());
+    numbers.flag(held.is_some_and(|held| is(object, held)));
+    numbers.flag(held.is_some_and(Class::is_knife));
+    numbers.flag(held.is_some_and(|held| is(receptacle, held)));
+
+    // How often what was done for this goal, and to what of it.
+    for kind in ActionType::ALL.into_iter().filter(|kind| kind.is_interaction()) {
+        let count = progress.done.iter().filter(|done| done.kind == kind).count();
+        numbers.number(count.min(3) as f32 / 2.0);
+    }
+    let did = |kind: ActionType, of: fn(&Goal, Class) -> bool| {
+        progress.done.iter().any(|done| done.kind == kind && is(of, done.class))
+    };
+    numbers.flag(did(ActionType::Pickup, object));
+    numbers.flag(did(ActionType::Put, receptacle));
+    numbers.flag(did(ActionType::Put, tool));
+    numbers.flag(did(ActionType::ToggleOn, tool));
+    numbers.flag(did(ActionType::ToggleOn, object));
+    numbers.flag(did(ActionType::ToggleOff, tool));
+    numbers.flag(did(ActionType::Close, tool));
+    numbers.flag(did(ActionType::Slice, object));
+    let last = progress.done.last();
+    numbers.one_of(INTERACTIONS, last.map(|last| interaction(last.kind)));
+    for of in [object, receptacle, tool] {
+        numbers.flag(last.is_some_and(|last| is(of, last.class)));
+    }
+    // What was put into a tool and came out of it again.
+    let order = |kind: ActionType, of: fn(&Goal, Class) -> bool| {
+        progress.done.iter().rposition(|done| done.kind == kind && is(of, done.class))
+    };
+    let out_again = order(ActionType::Put, tool).is_some_and(|put| order(ActionType::Pickup, object) > Some(put));
+    numbers.flag(out_again);
+    numbers.number(progress.active.len() as f32 / 2.0);
+    numbers.flag(progress.active.iter().any(|(class, _)| class.info().openable));
+
+    let best = |of: fn(&Goal, Class) -> bool| {
+        things.iter().filter(|thing| is(of, thing.class)).map(|thing| thing.score).fold(0.0, f32::max)
+    };
+    let seen_now =
+        |of: fn(&Goal, Class) -> bool| things.iter().any(|thing| is(of, thing.class) && thing.seen == memory.step);
+    for of in [object, receptacle, tool] {
+        numbers.number(best(of));
+        numbers.flag(seen_now(of));
+    }
+    numbers.number(progress.turns.min(5) as f32 / 4.0);
+    numbers.number(f32::from(memory.odometry.pose().horizon) / 60.0);
+    numbers.number(log(progress.steps as f32));
+    numbers.flag(memory.odometry.blocked());
+    numbers.exactly(SITUATION)
+}
+
+fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &MacroAction) -> Vec<f32> {
+    let mut numbers = Numbers(Vec::with_capacity(ACTION));
+    let goal = progress.goal();
+    let (kind, class) = match action.purpose {
+        Purpose::Interact(kind, class) => (Some(kind), class),
+        _ => (None, Class::NONE),
+    };
+    numbers.one_of(INTERACTIONS, kind.map(interaction));
+    numbers.flag(action.purpose == Purpose::Explore);
+    for look in [ActionType::RotateLeft, ActionType::RotateRight, ActionType::LookUp, ActionType::LookDown] {
+        numbers.flag(action.purpose == Purpose::Look(look));
+    }
+    numbers.flag(action.is_immediate());
+    numbers.number(action.steps as f32 / 20.0);
+    numbers.number(log(action.steps as f32));
+    numbers.number((action.cost - action.steps as f32) / 4.0);
+
+    let info = class.info();
+    numbers.flag(goal.is_some_and(|goal| goal.object == class));
+    numbers.flag(goal.is_some_and(|goal| goal.receptacle == Some(class)));
+    numbers.flag(goal.is_some_and(|goal| goal.place == Some(class)));
+    numbers.flag(goal.is_some_and(|goal| goal.is_tool(class)));
+    numbers.flag(class.is_knife());
+    numbers.flag(info.openable);
+    numbers.flag(info.receptacle);
+    numbers.flag(info.basin);
+    numbers.flag(goal.is_some_and(|goal| class.holds(goal.object)));
+    numbers.flag(progress.held.is_some_and(|held| class.holds(held)));
+
+    let thing = action.thing.and_then(|index| things.get(index));
+    numbers.flag(thing.is_some());
+    numbers.number(thing.map_or(0.0, |thing| thing.score));
+    numbers.flag(thing.is_some_and(|thing| thing.seen == memory.step));
+    numbers.number(thing.map_or(0.0, |thing| log((memory.step - thing.seen) as f32)));
+    numbers.number(thing.map_or(0.0, |thing| thing.open));
+    numbers.number(thing.map_or(0.0, |thing| thing.height / 2.0));
+    numbers.number(thing.map_or(0.0, |thing| log(thing.cells.len() as f32)));
+    let at = thing.map(|thing| thing.best).or(action.at);
+    let beside = |wanted: Option<Class>| {
+        let (Some(wanted), Some(thing)) = (wanted, thing) else { return 0.0 };
+        let near = things.iter().filter(|other| other.class == wanted && lie_together(other, thing));
+        near.map(|other| other.score).fold(0.0, f32::max)
+    };
+    numbers.number(beside(goal.map(|goal| goal.object)));
+    numbers.number(beside(goal.and_then(|goal| goal.place)));
+    numbers.number(beside(goal.and_then(|goal| goal.receptacle)));
+    let near = |cell: &Cell| at.is_some_and(|at| (at.x - cell.x).abs().max((at.z - cell.z).abs()) <= 2);
+    let touched = progress.done.iter().filter(|done| done.class == class && near(&done.cell));
+    numbers.number(touched.clone().count().min(4) as f32 / 2.0);
+    numbers.number(touched.filter(|done| Some(done.kind) == kind).count().min(4) as f32 / 2.0);
+    numbers.flag(progress.done.last().is_some_and(|last| last.class == class && near(&last.cell)));
+    numbers.flag(progress.active.iter().any(|(active, cell)| *active == class && near(cell)));
+    numbers.exactly(ACTION)
+}
+
+/// Whether two things share a cell, or lie in neighbouring ones.
+fn lie_together(a: &Thing, b: &Thing) -> bool {
+    let (small, large) = if a.cells.len() < b.cells.len() { (a, b) } else { (b, a) };
+    let beside = |x: Cell, y: Cell| (x.x - y.x).abs().max((x.z - y.z).abs()) <= 1;
+    small.cells.iter().any(|(cell, _)| large.cells.iter().any(|(other, _)| beside(*cell, *other)))
+}

@@ -1,0 +1,196 @@
+//! What the agent could set out to do: an interaction with a thing that it remembers, with the way to where that is possible; a
+//! walk to the edge of what it has seen; a turn or a look. Each begins with one of the 12 actions.
+
+use std::collections::BTreeSet;
+
+use super::goal::Goal;
+use super::progress::Progress;
+use crate::agent::memory::Memory;
+use crate::agent::memory::navigator::{Route, Routes};
+use crate::agent::memory::semantic_map::Thing;
+use crate::domain::{Action, ActionType, Cell, Class, Pose};
+use crate::house::view::{Candidate, nearest};
+
+/// Evidence of at least this score makes a thing.
+pub(crate) const LEAST_SCORE: f32 = 0.3;
+/// What a thing's score is multiplied by when it was looked for from every side in vain.
+const NOT_THERE: f32 = 0.3;
+/// So many ends of ways to one thing are tried at one step.
+const ENDS: usize = 8;
+/// Ways to the edge of what was seen, and how far their ends lie apart at least, in cells.
+const EXPLORATIONS: usize = 2;
+const APART: i16 = 4;
+
+/// What is set out to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Purpose {
+    /// To act on a thing of this class.
+    Interact(ActionType, Class),
+    /// To see more of the house.
+    Explore,
+    /// To turn or look on the spot.
+    Look(ActionType),
+}
+
+/// Something to set out to, and how it begins.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MacroAction {
+    pub(crate) purpose: Purpose,
+    /// Which of the remembered things is acted on, where one is remembered.
+    pub(crate) thing: Option<usize>,
+    /// Steps to where it can be done, with what speaks against the way in steps.
+    pub(crate) steps: u32,
+    pub(crate) cost: f32,
+    /// What is done now.
+    pub(crate) first: Action,
+    /// Where it is acted, as far as is known.
+    pub(crate) at: Option<Cell>,
+}
+
+impl MacroAction {
+    /// Whether it is done by its first action.
+    pub(crate) fn is_immediate(&self) -> bool {
+        self.first.kind.is_interaction() || matches!(self.purpose, Purpose::Look(_))
+    }
+
+    fn along(purpose: Purpose, thing: Option<usize>, at: Cell, route: Route) -> Option<MacroAction> {
+        let first = Action::navigate(route.first?);
+        Some(MacroAction { purpose, thing, steps: route.steps, cost: route.cost, first, at: Some(at) })
+    }
+}
+
+/// What was tried from where in vain.
+pub(crate) type Failed = BTreeSet<(Class, Pose)>;
+
+/// Everything that could be set out to now. `legal` are the interactions that are possible at this moment. Poses from which a
+/// remembered thing cannot be acted on are added to `failed`, and what cannot be acted on from anywhere loses its evidence.
+pub(crate) fn available(
+    memory: &mut Memory,
+    progress: &Progress,
+    legal: &[Candidate],
+    failed: &mut Failed,
+) -> (Vec<Thing>, Vec<MacroAction>) {
+    let things = memory.map.things(LEAST_SCORE);
+    let pose = memory.odometry.pose();
+    let routes = Routes::from(&memory.occupancy, pose);
+    let mut found = Vec::new();
+    for candidate in legal {
+        let (kind, class) = (candidate.kind, candidate.class);
+        let is_nearest = nearest(legal, kind, class) == Some(candidate);
+        if !is_nearest || progress.goal().is_none_or(|goal| !matters(goal, progress, kind, class)) {
+            continue;
+        }
+        let thing = nearest_thing(&things, class, pose.cell);
+        let at = thing.map_or(pose.cell.ahead(pose.heading), |index| things[index].best);
+        let purpose = Purpose::Interact(kind, class);
+        found.push(MacroAction { purpose, thing, steps: 0, cost: 0.0, first: candidate.action(), at: Some(at) });
+    }
+    for (index, thing) in things.iter().enumerate() {
+        let Some(goal) = progress.goal() else { break };
+        let class = thing.class;
+        for kind in kinds(thing, progress).filter(|&kind| matters(goal, progress, kind, class)) {
+            let purpose = Purpose::Interact(kind, class);
+            if found.iter().any(|now| now.purpose == purpose && now.thing == Some(index)) {
+                continue;
+            }
+            match way_to(&routes, thing, failed) {
+                Some(route) => found.extend(MacroAction::along(purpose, Some(index), thing.best, route)),
+                None => memory.map.discredit(class, thing.best, 0.3, NOT_THERE),
+            }
+        }
+    }
+    found.extend(explorations(memory, &routes));
+    for kind in [ActionType::RotateLeft, ActionType::RotateRight, ActionType::LookUp, ActionType::LookDown] {
+        let possible = match kind {
+            ActionType::LookUp => pose.horizon > Pose::UP,
+            ActionType::LookDown => pose.horizon < Pose::DOWN,
+            _ => true,
+        };
+        let look = MacroAction {
+            purpose: Purpose::Look(kind),
+            thing: None,
+            steps: 1,
+            cost: 1.0,
+            first: Action::navigate(kind),
+            at: None,
+        };
+        found.extend(possible.then_some(look));
+    }
+    (things, found)
+}
+
+/// A way that does not end here: what could be done here would be possible already.
+fn way_to(routes: &Routes, thing: &Thing, failed: &mut Failed) -> Option<Route> {
+    let cells: Vec<(Cell, f32)> = thing.cells.iter().map(|(cell, known)| (*cell, known.height)).collect();
+    for _ in 0..ENDS {
+        let route = routes.plan(thing.class, &cells, failed)?;
+        if route.first.is_some() {
+            return Some(route);
+        }
+        failed.insert((thing.class, route.end));
+    }
+    None
+}
+
+fn nearest_thing(things: &[Thing], class: Class, from: Cell) -> Option<usize> {
+    let away = |thing: &Thing| {
+        let (x, z) = (i32::from(thing.best.x - from.x), i32::from(thing.best.z - from.z));
+        x * x + z * z
+    };
+    let of_class = things.iter().enumerate().filter(|(_, thing)| thing.class == class);
+    of_class.min_by_key(|(_, thing)| away(thing)).map(|(index, _)| index)
+}
+
+/// What could be done with a thing as it is remembered.
+fn kinds(thing: &Thing, progress: &Progress) -> impl Iterator<Item = ActionType> {
+    let info = thing.class.info();
+    let near = |cell: &Cell| (cell.x - thing.best.x).abs() <= 2 && (cell.z - thing.best.z).abs() <= 2;
+    let by_own_hand = progress.active.iter().any(|(class, cell)| *class == thing.class && near(cell));
+    let (open, shut) = (by_own_hand || thing.open > 0.4, !by_own_hand && thing.open < 0.6);
+    let empty = progress.held.is_none();
+    let armed = progress.held.is_some_and(Class::is_knife);
+    [
+        (ActionType::Pickup, info.pickupable && empty),
+        (ActionType::Put, info.receptacle && !empty && (!info.openable || open)),
+        (ActionType::Open, info.openable && shut),
+        (ActionType::Close, info.openable && open),
+        (ActionType::ToggleOn, info.toggleable && (shut || info.openable)),
+        (ActionType::ToggleOff, info.toggleable && open),
+        (ActionType::Slice, info.slices > 0 && armed),
+    ]
+    .into_iter()
+    .filter(|(_, possible)| *possible)
+    .map(|(kind, _)| kind)
+}
+
+/// Whether an interaction can have anything to do with the goal.
+fn matters(goal: &Goal, progress: &Progress, kind: ActionType, class: Class) -> bool {
+    let named = class == goal.object || goal.receptacle == Some(class);
+    match kind {
+        ActionType::Pickup => named || goal.is_tool(class),
+        ActionType::Slice => class == goal.object,
+        ActionType::ToggleOn | ActionType::ToggleOff => named || goal.is_tool(class),
+        // Whatever is in the hand may have to be laid down anywhere, and a thing may be in anything that opens.
+        ActionType::Put => progress.held.is_some(),
+        _ => true,
+    }
+}
+
+/// Ways to free cells next to what is not known, the nearest first.
+fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
+    let mut ways: Vec<(Cell, Route)> =
+        memory.occupancy.frontier().filter_map(|cell| Some((cell, routes.to_cell(cell)?))).collect();
+    ways.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost).then(a.0.cmp(&b.0)));
+    let mut chosen: Vec<Cell> = Vec::new();
+    let mut found = Vec::new();
+    for (cell, route) in ways {
+        let apart = |other: &Cell| (other.x - cell.x).abs().max((other.z - cell.z).abs()) >= APART;
+        if found.len() < EXPLORATIONS && chosen.iter().all(apart) {
+            if let Some(way) = MacroAction::along(Purpose::Explore, None, cell, route) {
+                chosen.push(cell);
+                found.push(way);
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,311 @@
+//! The agent with a memory as a policy. Each slot is decided by itself, so that a decision depends on its own episode alone.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use anyhow::Context;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tch::{Device, Kind, Tensor};
+
+use super::config::{MemoryConfig, MemoryNetworks};
+use super::eyes::{Eyes, Sight};
+use super::features::Choice;
+use super::goal::Goal;
+use super::macro_action::{MacroAction, Purpose};
+use super::mind::{Mind, Moment};
+use crate::agent::decision::{ActionDistribution, Decision};
+use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
+use crate::domain::{Action, ActionType, Class, Pose};
+use crate::house::view::Candidate;
+use crate::language::instruction::normalise;
+use crate::language::reader::ReadSubtask;
+use crate::nets::chooser::{Choices, Chooser};
+
+/// From this probability on a goal counts as reached.
+const REACHED: f32 = 0.5;
+
+/// A policy from a checkpoint.
+pub(crate) struct MemoryPolicy {
+    name: String,
+    eyes: Eyes,
+    chooser: Chooser,
+    /// Owns the chooser's weights.
+    _networks: tch::nn::VarStore,
+    loop_guard: bool,
+    samples: bool,
+    slots: Vec<Recollection>,
+}
+
+/// All that is carried from step to step in a slot.
+#[derive(Clone, Debug)]
+pub struct Recollection {
+    mind: Mind,
+    /// The instruction that was read last, and what was read.
+    read: Option<(String, Vec<ReadSubtask>)>,
+    /// The step that was seen last, with what could be done in it.
+    seen_at: Option<u32>,
+    /// What was begun where: a pose, and how much had been done for which goal.
+    tried: BTreeSet<Tried>,
+    rng: ChaCha8Rng,
+}
+
+/// What was begun: where, at which goal, after how many interactions, and how.
+type Tried = (Pose, usize, usize, ActionType, Option<Class>);
+
+impl Default for Recollection {
+    fn default() -> Recollection {
+        Recollection {
+            mind: Mind::default(),
+            read: None,
+            seen_at: None,
+            tried: BTreeSet::new(),
+            rng: ChaCha8Rng::seed_from_u64(0),
+        }
+    }
+}
+
+impl MemoryPolicy {
+    const SLOTS: usize = 8;
+
+    /// Loads a checkpoint; it decides greedily.
+    ///
+    /// # Errors
+    /// When the checkpoint is malformed.
+    pub(crate) fn load(folder: &Path, device: Device) -> anyhow::Result<MemoryPolicy> {
+        let config = MemoryConfig::read(folder)?;
+        let networks = MemoryNetworks::load(folder, &config, device)?;
+        let name = folder.file_name().map_or_else(|| "agent".to_string(), |name| name.to_string_lossy().into_owned());
+        MemoryPolicy::with(name, &config, networks)
+    }
+
+    /// A policy of networks at hand.
+    ///
+    /// # Errors
+    /// When the detector's weights cannot be read.
+    pub(crate) fn with(name: String, config: &MemoryConfig, networks: MemoryNetworks) -> anyhow::Result<MemoryPolicy> {
+        let eyes = match config.sight {
+            Sight::Detector => Eyes::Detector(Box::new(networks.detector.frozen(&networks.detector_store)?)),
+            Sight::Simulator => Eyes::Simulator,
+        };
+        Ok(MemoryPolicy {
+            name,
+            eyes,
+            chooser: networks.chooser,
+            _networks: networks.chooser_store,
+            loop_guard: config.loop_guard,
+            samples: false,
+            slots: (0..MemoryPolicy::SLOTS).map(|_| Recollection::default()).collect(),
+        })
+    }
+
+    fn decide(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        let slots = self.slots.len();
+        let known = self.slots.get_mut(slot).with_context(|| format!("there are {slots} slots, not {slot}"))?;
+        known.read(here.instruction)?;
+        if known.seen_at != Some(here.step) {
+            known.look(&self.eyes, here)?;
+        }
+        let legal = here.environment.legal_actions()?;
+        let (actions, done, probabilities) = known.weigh(&self.chooser, &legal)?;
+        let tried = if self.loop_guard { known.begun_here() } else { Vec::new() };
+        let chosen = known.choose(&actions, &probabilities, &tried, self.samples);
+        let action = chosen.first;
+        known.begin(chosen, here);
+        let distribution = distribution(&actions, &probabilities, &legal, action);
+        Ok(Decision { distribution: Some(distribution), done: Some(done), ..Decision::of(action) })
+    }
+}
+
+impl Recollection {
+    /// Reads the instruction, where it is another one than before.
+    fn read(&mut self, instruction: &str) -> anyhow::Result<()> {
+        let instruction = normalise(instruction);
+        if self.read.as_ref().is_none_or(|(read, _)| *read != instruction) {
+            let before = self.read.take().map(|(_, subtasks)| subtasks).unwrap_or_default();
+            let (goals, subtasks) = Goal::read(&instruction, &before)?;
+            self.mind.set_goals(goals);
+            self.tried.clear();
+            self.read = Some((instruction, subtasks));
+        }
+        Ok(())
+    }
+
+    fn look(&mut self, eyes: &Eyes, here: &mut Observation<'_>) -> anyhow::Result<()> {
+        let environment = &mut *here.environment;
+        let pose = environment.odometry();
+        let pose = pose.with_context(|| format!("a map needs odometry, which {} does not tell", environment.name()))?;
+        if let Some(last) = here.last {
+            let target = last.target.and_then(|target| environment.class_of(target));
+            self.mind.acted(last, target);
+        }
+        let seen = eyes.look(environment)?;
+        self.mind.observe(&Moment { pose, frame: environment.frame()?, seen: &seen });
+        self.seen_at = Some(here.step);
+        Ok(())
+    }
+
+    /// What could be done, how probably the instruction is fulfilled, and how probable each macro action is. Goals that are
+    /// reached are passed.
+    fn weigh(&mut self, chooser: &Chooser, legal: &[Candidate]) -> anyhow::Result<(Vec<MacroAction>, f32, Vec<f32>)> {
+        loop {
+            let (actions, choice) = self.mind.choice(legal);
+            let (log_probabilities, done) = tch::no_grad(|| chooser.forward(&alone(&choice, chooser.device())));
+            let done = done.sigmoid().double_value(&[0]) as f32;
+            let progress = &mut self.mind.progress;
+            if done >= REACHED && !progress.is_last() {
+                progress.advance();
+                continue;
+            }
+            let probabilities = Vec::<f32>::try_from(log_probabilities.exp().squeeze_dim(0).to_device(Device::Cpu))?;
+            let done = if progress.goals.is_empty() { 0.0 } else { done };
+            return Ok((actions, done, probabilities));
+        }
+    }
+
+    fn situation(&self) -> (Pose, usize, usize) {
+        let progress = &self.mind.progress;
+        (self.mind.memory.odometry.pose(), progress.at, progress.done.len())
+    }
+
+    /// What was begun in this very situation before.
+    fn begun_here(&self) -> Vec<(ActionType, Option<Class>)> {
+        let here = self.situation();
+        let begun = self.tried.iter().filter(|(pose, at, done, ..)| (*pose, *at, *done) == here);
+        begun.map(|(.., kind, class)| (*kind, *class)).collect()
+    }
+
+    /// The first action that is likeliest in all, or one by chance; what was begun here before is left out while there is another.
+    fn choose(
+        &mut self,
+        actions: &[MacroAction],
+        probabilities: &[f32],
+        tried: &[(ActionType, Option<Class>)],
+        by_chance: bool,
+    ) -> MacroAction {
+        let is_new = |action: &&MacroAction| !tried.contains(&beginning(action));
+        let any_new = actions.iter().any(|action| is_new(&action));
+        let open: Vec<(usize, &MacroAction)> =
+            actions.iter().enumerate().filter(|(_, action)| !any_new || is_new(action)).collect();
+        let weight = |index: usize| probabilities.get(index).copied().unwrap_or(0.0);
+        let by_chance = by_chance.then(|| self.rng.random::<f32>());
+        let chosen = match by_chance {
+            Some(drawn) => {
+                let mut left = drawn * open.iter().map(|(index, _)| weight(*index)).sum::<f32>();
+                open.iter().find(|(index, _)| {
+                    left -= weight(*index);
+                    left <= 0.0
+                })
+            }
+            None => {
+                let total = |first: Action| {
+                    open.iter().filter(|(_, other)| other.first == first).map(|(index, _)| weight(*index)).sum::<f32>()
+                };
+                let totals = open.iter().map(|(_, action)| total(action.first));
+                let likeliest = totals.enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+                likeliest.and_then(|(at, _)| open.get(at))
+            }
+        };
+        chosen.or(open.first()).map_or_else(turn_right, |(_, action)| (*action).clone())
+    }
+
+    /// Remembers what is about to be done.
+    fn begin(&mut self, chosen: MacroAction, here: &Observation<'_>) {
+        let (pose, at, done) = self.situation();
+        let (kind, class) = beginning(&chosen);
+        self.tried.insert((pose, at, done, kind, class));
+        let class = chosen.first.target.and_then(|target| here.environment.class_of(target));
+        let cell = chosen.at.unwrap_or_else(|| self.mind.ahead());
+        self.mind.attempt(chosen.first, class.map(|class| (class, cell)));
+    }
+}
+
+/// How a macro action begins, as the loop guard tells beginnings apart.
+fn beginning(action: &MacroAction) -> (ActionType, Option<Class>) {
+    let class = match action.purpose {
+        Purpose::Interact(_, class) if action.first.kind.is_interaction() => Some(class),
+        _ => None,
+    };
+    (action.first.kind, class)
+}
+
+fn turn_right() -> MacroAction {
+    let first = Action::navigate(ActionType::RotateRight);
+    MacroAction { purpose: Purpose::Look(first.kind), thing: None, steps: 1, cost: 1.0, first, at: None }
+}
+
+/// A batch of one choice.
+fn alone(choice: &Choice, device: Device) -> Choices {
+    let count = choice.len() as i64;
+    let classes: Vec<i64> = choice.classes.iter().map(|&class| class.into()).collect();
+    Choices {
+        situation: Tensor::from_slice(&choice.situation).unsqueeze(0).to_device(device),
+        goal: Tensor::from_slice(&choice.goal.map(i64::from)).unsqueeze(0).to_device(device),
+        actions: Tensor::from_slice(&choice.actions).view([1, count, -1]).to_device(device),
+        classes: Tensor::from_slice(&classes).unsqueeze(0).to_device(device),
+        present: Tensor::ones([1, count], (Kind::Float, device)),
+    }
+}
+
+/// The probabilities of macro actions as those of what they begin with.
+fn distribution(
+    actions: &[MacroAction],
+    probabilities: &[f32],
+    legal: &[Candidate],
+    greedy: Action,
+) -> ActionDistribution {
+    let mut of_kinds = [None; ActionType::COUNT];
+    let mut choices: Vec<(ActionType, Class, f32)> = Vec::new();
+    let mut objects: Vec<(Class, f32, bool)> = Vec::new();
+    for (action, &probability) in actions.iter().zip(probabilities) {
+        *of_kinds[action.first.kind.index()].get_or_insert(0.0) += probability;
+        let Purpose::Interact(kind, class) = action.purpose else { continue };
+        if action.first.kind.is_interaction() {
+            choices.push((kind, class, probability));
+        }
+        match objects.iter_mut().find(|(known, ..)| *known == class) {
+            Some((_, sum, _)) => *sum += probability,
+            None => {
+                let possible = legal.iter().any(|candidate| candidate.class == class && candidate.kind == kind);
+                objects.push((class, probability, possible));
+            }
+        }
+    }
+    objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let entropy = -of_kinds.iter().flatten().filter(|&&p| p > 0.0).map(|p| p * p.ln()).sum::<f32>();
+    ActionDistribution { actions: of_kinds, objects, choices, entropy, greedy }
+}
+
+impl Policy for MemoryPolicy {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn slots(&self) -> usize {
+        self.slots.len()
+    }
+
+    fn reset(&mut self, slot: usize, seed: u64) {
+        if let Some(known) = self.slots.get_mut(slot) {
+            *known = Recollection { rng: ChaCha8Rng::seed_from_u64(seed), ..Recollection::default() };
+        }
+    }
+
+    fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+        each_alone(observations, |slot, here| self.decide(slot, here))
+    }
+
+    fn state(&self, slot: usize) -> PolicyState {
+        self.slots.get(slot).map_or(PolicyState::Nothing, |known| PolicyState::Recollection(Box::new(known.clone())))
+    }
+
+    fn restore(&mut self, slot: usize, state: PolicyState) {
+        if let (Some(known), PolicyState::Recollection(was)) = (self.slots.get_mut(slot), state) {
+            *known = *was;
+        }
+    }
+
+    fn set_sampling(&mut self, samples: bool) {
+        self.samples = samples;
+    }
+}

@@ -1,0 +1,117 @@
+//! How far the agent believes to be: the subtask it is at, what it holds, and what it has done for it.
+
+use super::goal::Goal;
+use crate::domain::{ActionType, Cell, Class};
+
+/// An interaction that changed what is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interaction {
+    /// What was done.
+    pub(crate) kind: ActionType,
+    /// To what.
+    pub(crate) class: Class,
+    /// Where, in the agent's own frame.
+    pub(crate) cell: Cell,
+}
+
+/// An action that was decided, of which it is not known yet whether it worked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Attempt {
+    pub(crate) kind: ActionType,
+    /// Of an interaction: with what, and where.
+    pub(crate) target: Option<(Class, Cell)>,
+}
+
+/// Where the agent stands with its goals.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Progress {
+    /// What it is after, in order.
+    pub(crate) goals: Vec<Goal>,
+    /// At which of them it is; the number of goals when all are done.
+    pub(crate) at: usize,
+    /// What it holds.
+    pub(crate) held: Option<Class>,
+    /// What it has done for the present goal, oldest first.
+    pub(crate) done: Vec<Interaction>,
+    /// What it opened or switched on and has not closed or switched off since, in the whole episode.
+    pub(crate) active: Vec<(Class, Cell)>,
+    /// Steps since the present goal began.
+    pub(crate) steps: u32,
+    /// Turns on the spot since it last moved or acted.
+    pub(crate) turns: u32,
+}
+
+impl Progress {
+    /// New goals, with what is in the hand and what stands open as it is.
+    pub(crate) fn set_goals(&mut self, goals: Vec<Goal>) {
+        (self.goals, self.at, self.steps, self.turns) = (goals, 0, 0, 0);
+        self.done.clear();
+    }
+
+    /// The present goal; the last one when all are done.
+    pub(crate) fn goal(&self) -> Option<&Goal> {
+        self.goals.get(self.at).or(self.goals.last())
+    }
+
+    /// Whether the present goal is the last one.
+    pub(crate) fn is_last(&self) -> bool {
+        self.at + 1 >= self.goals.len()
+    }
+
+    /// The next goal begins.
+    pub(crate) fn advance(&mut self) {
+        (self.at, self.steps, self.turns) = (self.at + 1, 0, 0);
+        self.done.clear();
+    }
+
+    /// Takes in what came of an action.
+    pub(crate) fn record(&mut self, attempt: Attempt, worked: bool) {
+        self.steps += 1;
+        match attempt.kind {
+            ActionType::RotateLeft | ActionType::RotateRight => self.turns += 1,
+            ActionType::LookUp | ActionType::LookDown => {}
+            _ => self.turns = 0,
+        }
+        let Some((class, cell)) = attempt.target.filter(|_| worked) else { return };
+        self.done.push(Interaction { kind: attempt.kind, class, cell });
+        match attempt.kind {
+            ActionType::Pickup => self.held = Some(class),
+            ActionType::Put => self.held = None,
+            ActionType::Open | ActionType::ToggleOn => self.active.push((class, cell)),
+            ActionType::Close | ActionType::ToggleOff => {
+                // The last one of its class: one shuts what one has just opened.
+                if let Some(at) = self.active.iter().rposition(|(of, _)| *of == class) {
+                    self.active.remove(at);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::SkillKind;
+
+    #[test]
+    fn what_worked_changes_hand_and_doors_and_what_did_not_changes_nothing() {
+        let [mug, fridge] = ["Mug", "Fridge"].map(|name| Class::named(name).unwrap());
+        let at = Cell::new(1, 2);
+        let goal = Goal { skill: SkillKind::Put, object: mug, receptacle: Some(fridge), place: None, slice: false };
+        let mut progress = Progress::default();
+        progress.set_goals(vec![goal.clone(), goal]);
+        let mut act = |kind, class, worked| {
+            progress.record(Attempt { kind, target: Some((class, at)) }, worked);
+            (progress.held, progress.active.len(), progress.done.len())
+        };
+        assert_eq!(act(ActionType::Pickup, mug, false), (None, 0, 0));
+        assert_eq!(act(ActionType::Pickup, mug, true), (Some(mug), 0, 1));
+        assert_eq!(act(ActionType::Open, fridge, true), (Some(mug), 1, 2));
+        assert_eq!(act(ActionType::Put, fridge, true), (None, 1, 3));
+        progress.advance();
+        assert_eq!((progress.at, progress.done.len(), progress.active.len(), progress.is_last()), (1, 0, 1, true));
+        progress.record(Attempt { kind: ActionType::Close, target: Some((fridge, at)) }, true);
+        assert!(progress.active.is_empty());
+    }
+}
