@@ -7,10 +7,10 @@ use crate::house::camera::Camera;
 
 /// The eye's height above the floor, in millimetres.
 const HEIGHT: i32 = 1575;
-/// Where the held thing is drawn: right of this column and below this row of a 300 x 300 frame ...
-const HAND: f32 = 215.0;
-/// ... and no farther than this along the optical axis, in metres.
-const ARM: f32 = 0.75;
+/// Where the held thing is drawn: right of this column and below this row of a 300 x 300 frame, and between these depths in
+/// metres.
+const HAND: (f32, f32) = (205.0, 228.0);
+const ARM: std::ops::Range<f32> = 0.5..0.72;
 
 /// The camera of an agent at `pose`: heights are above the floor.
 pub(crate) fn camera(pose: Pose) -> Camera {
@@ -19,7 +19,7 @@ pub(crate) fn camera(pose: Pose) -> Camera {
 
 /// Whether a pixel of a 300 x 300 frame shows what is in the hand, which says nothing of the room.
 pub(crate) fn is_in_hand(column: f32, row: f32, depth: f32) -> bool {
-    depth < ARM && column > HAND && row > HAND
+    ARM.contains(&depth) && column > HAND.0 && row > HAND.1
 }
 
 /// The cell that a point (metres) lies over.

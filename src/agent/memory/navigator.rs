@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use glam::{Vec2, Vec3};
+
 use super::eye;
 use super::occupancy::{Ground, Occupancy};
 use crate::domain::{ActionType, Cell, Class, Heading, Pose};
@@ -166,26 +168,28 @@ impl Routes {
         nearest_first.sort_by(|a, b| {
             eye::between(a.0, self.start.cell).total_cmp(&eye::between(b.0, self.start.cell)).then(a.0.cmp(&b.0))
         });
+        let horizons = horizons();
         let mut best: Option<Route> = None;
         for (cell, height) in nearest_first {
             for (stand, away) in stands_around(cell) {
                 for heading in Heading::ALL {
                     let Some(reached) = self.reached(stand, heading) else { continue };
-                    let spare = best.map_or(f32::INFINITY, |best| best.cost) - reached.cost as f32 / STEP as f32;
-                    if spare > 0.0 {
-                        for view in views(stand, heading, cell, height) {
-                            let against = OFF_MIDDLE * view.off_middle + BEYOND_EASY * (away - EASY).max(0.0);
-                            let end = Pose { cell: stand, heading, horizon: view.horizon };
-                            let Some(mut route) = self.to_pose(end) else { continue };
-                            route.cost += against;
-                            let better = |route: &Route| best.is_none_or(|best| route.cost < best.cost);
-                            if !better(&route) || failed.contains(&(class, end)) {
-                                continue;
-                            }
-                            route.cost += if self.is_hidden(stand, cell, height) { HIDDEN } else { 0.0 };
-                            if better(&route) {
-                                best = Some(route);
-                            }
+                    let spare = |best: Option<Route>| best.map_or(f32::INFINITY, |best| best.cost);
+                    if reached.cost as f32 / STEP as f32 >= spare(best) {
+                        continue;
+                    }
+                    let Some(level) = faced(stand, heading, cell, height) else { continue };
+                    for &(horizon, turn) in &horizons {
+                        let Some(off_middle) = off_middle(level, turn) else { continue };
+                        let end = Pose { cell: stand, heading, horizon };
+                        let Some(mut route) = self.to_pose(end) else { continue };
+                        route.cost += OFF_MIDDLE * off_middle + BEYOND_EASY * (away - EASY).max(0.0);
+                        if route.cost >= spare(best) || failed.contains(&(class, end)) {
+                            continue;
+                        }
+                        route.cost += if self.is_hidden(stand, cell, height) { HIDDEN } else { 0.0 };
+                        if route.cost < spare(best) {
+                            best = Some(route);
                         }
                     }
                 }
@@ -213,14 +217,6 @@ impl Routes {
     }
 }
 
-/// How a target is seen from a stand.
-#[derive(Clone, Copy, Debug)]
-struct Sight {
-    horizon: i16,
-    /// The square of the distance from the frame's middle; 1 at the middle of an edge.
-    off_middle: f32,
-}
-
 /// The cells from which a cell is in reach, with the distance in metres, but for the cell itself.
 fn stands_around(cell: Cell) -> impl Iterator<Item = (Cell, f32)> {
     const CELLS: i16 = (REACH * 1000.0) as i16 / Cell::SIDE as i16;
@@ -229,20 +225,29 @@ fn stands_around(cell: Cell) -> impl Iterator<Item = (Cell, f32)> {
     stands.map(move |stand| (stand, eye::between(stand, cell))).filter(|(_, away)| *away <= REACH)
 }
 
-/// The horizons at which a target lies well inside the frame of who stands and faces so.
-fn views(stand: Cell, heading: Heading, target: Cell, height: f32) -> impl Iterator<Item = Sight> {
+/// Every horizon, with its cosine and sine.
+fn horizons() -> Vec<(i16, Vec2)> {
+    let all = (Pose::UP..=Pose::DOWN).step_by(usize::from(Pose::LOOK.unsigned_abs()));
+    all.map(|horizon| (horizon, Vec2::from_angle(f32::from(horizon).to_radians()))).collect()
+}
+
+/// The target as seen level by who stands and faces so: right, up and forward from the eye, in metres. `None` when it is so
+/// far to the side that no horizon brings it well into the frame.
+fn faced(stand: Cell, heading: Heading, target: Cell, height: f32) -> Option<Vec3> {
     let level = eye::camera(Pose { cell: stand, heading, horizon: 0 }).local(eye::over(target, height));
-    // At 45 degrees from straight ahead nothing but the floor at one's feet is still inside.
-    let faced = level.z > 0.0 && level.x.abs() <= 1.5 * level.z;
-    let horizons = (Pose::UP..=Pose::DOWN).step_by(usize::from(Pose::LOOK.unsigned_abs())).filter(move |_| faced);
-    horizons.filter_map(move |horizon| {
-        let turn = glam::Vec2::from_angle(f32::from(horizon).to_radians());
-        let ahead = level.z * turn.x - level.y * turn.y;
-        let up = level.y * turn.x + level.z * turn.y;
-        let edge = Camera::SLOPE * ahead;
-        let inside = ahead > Camera::NEAR && level.x.abs().max(up.abs()) <= INSIDE * edge;
-        inside.then(|| Sight { horizon, off_middle: (level.x * level.x + up * up) / (edge * edge) })
-    })
+    // With this tilt it is seen nearest to the frame's middle column.
+    let ahead = Vec2::new(level.z, level.y).length();
+    (level.z > 0.0 && level.x.abs() <= INSIDE * Camera::SLOPE * ahead).then_some(level)
+}
+
+/// The square of the distance from the frame's middle at which the camera of that cosine and sine sees the target; 1 at the
+/// middle of an edge. `None` outside, or near the edge.
+fn off_middle(level: Vec3, turn: Vec2) -> Option<f32> {
+    let ahead = level.z * turn.x - level.y * turn.y;
+    let up = level.y * turn.x + level.z * turn.y;
+    let edge = Camera::SLOPE * ahead;
+    let inside = ahead > Camera::NEAR && level.x.abs().max(up.abs()) <= INSIDE * edge;
+    inside.then(|| (level.x * level.x + up * up) / (edge * edge))
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ pub(crate) struct Clearance {
 
 impl Default for Clearance {
     fn default() -> Clearance {
-        Clearance { floor: 0.08, body: [0.1, 1.7], radius: 0.22, round: false, points: 3, farthest: 8.0 }
+        Clearance { floor: 0.08, body: [0.1, 1.7], radius: 0.215, round: false, points: 2, farthest: 5.0 }
     }
 }
 
@@ -176,5 +176,63 @@ impl Occupancy {
         let unknown = |cell: Cell| self.ground(cell) == Ground::Unknown;
         let beside = move |cell: &Cell| Heading::ALL.into_iter().any(|heading| unknown(cell.ahead(heading)));
         self.known().filter(|(_, ground)| *ground == Ground::Free).map(|(cell, _)| cell).filter(beside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::domain::{Room, Scene, World};
+    use crate::house::generate;
+    use crate::house::render::Renderer;
+
+    fn look_around(map: &mut Occupancy, scene: &Scene, world: &World, cell: Cell) {
+        let mut renderer = Renderer::new(300);
+        for (heading, horizon) in Heading::ALL.into_iter().flat_map(|heading| [(heading, 0), (heading, 30)]) {
+            let agent = Pose { cell, heading, horizon };
+            map.observe(agent, renderer.draw(scene, &World { agent, ..world.clone() }));
+        }
+    }
+
+    #[test]
+    fn a_look_around_tells_most_cells_rightly() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let (mut right, mut wrong, mut found, mut all) = (0, 0, 0, 0);
+        for room in Room::ALL {
+            let (scene, world) = generate::house(room, 41);
+            let mut map = Occupancy::default();
+            for _ in 0..2 {
+                look_around(&mut map, &scene, &world, scene.cells[rng.random_range(0..scene.cells.len())]);
+            }
+            for (cell, ground) in map.known() {
+                let walkable = scene.has_cell(cell);
+                let taken = ground == Ground::Free;
+                right += usize::from(walkable == taken);
+                wrong += usize::from(walkable != taken);
+                found += usize::from(walkable && taken);
+            }
+            all += scene.cells.len();
+        }
+        assert!(wrong * 25 < right, "{wrong} cells wrong, {right} right");
+        assert!(found * 10 > all * 7, "{found} of {all} cells found");
+    }
+
+    #[test]
+    fn where_the_agent_was_stays_free_and_where_it_bumped_stays_blocked() {
+        let mut map = Occupancy::with([Cell::new(0, 1)], [Cell::new(0, 0)]);
+        let empty = Frame { width: 0, height: 0, rgb: vec![], depth: vec![], ids: vec![] };
+        map.observe(Pose::default(), &empty);
+        map.bump(Pose::default());
+        assert_eq!((map.ground(Cell::new(0, 0)), map.ground(Cell::new(0, 1))), (Ground::Free, Ground::Blocked));
+    }
+
+    #[test]
+    fn the_frontier_is_where_the_known_floor_ends() {
+        let free = (0..3).map(|z| Cell::new(0, z));
+        let beside = (0..3).flat_map(|z| [Cell::new(-1, z), Cell::new(1, z)]);
+        let map = Occupancy::with(free, beside.chain([Cell::new(0, -1)]));
+        assert_eq!(map.frontier().collect::<Vec<_>>(), [Cell::new(0, 2)]);
     }
 }

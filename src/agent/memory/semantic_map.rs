@@ -77,7 +77,7 @@ impl SemanticMap {
     /// says nothing.
     pub(crate) fn observe(&mut self, pose: Pose, percept: &Percept, held: Option<Class>, step: u32) {
         let glimpses = glimpses(pose, percept, held);
-        self.miss(pose, percept, &glimpses);
+        self.miss(pose, percept, held.is_some(), &glimpses);
         for (&(class, cell), glimpse) in &glimpses {
             let weight = glimpse.weight.max(f32::EPSILON);
             let (height, open) = (glimpse.height / weight, glimpse.open / weight);
@@ -95,7 +95,7 @@ impl SemanticMap {
     }
 
     /// Weakens what should be in view and is not.
-    fn miss(&mut self, pose: Pose, percept: &Percept, glimpses: &BTreeMap<(Class, Cell), Glimpse>) {
+    fn miss(&mut self, pose: Pose, percept: &Percept, holds: bool, glimpses: &BTreeMap<(Class, Cell), Glimpse>) {
         let camera = eye::camera(pose);
         let mut seen: BTreeMap<Class, Vec<Cell>> = BTreeMap::new();
         for &(class, cell) in glimpses.keys() {
@@ -107,7 +107,7 @@ impl SemanticMap {
             }
             let Some(place) = camera.project(eye::over(cell, known.height)) else { continue };
             let Some(depth) = Percept::cell_at(place.x, place.y).and_then(|at| percept.depth.get(at)) else { continue };
-            let hidden = *depth < place.z - SLACK || eye::is_in_hand(place.x, place.y, *depth);
+            let hidden = *depth < place.z - SLACK || (holds && eye::is_in_hand(place.x, place.y, *depth));
             let again = seen.get(&class).is_some_and(|cells| cells.iter().any(|at| eye::between(*at, cell) <= DRIFT));
             if !hidden && !again {
                 known.score *= MISSED;
@@ -185,7 +185,7 @@ fn glimpses(pose: Pose, percept: &Percept, held: Option<Class>) -> BTreeMap<(Cla
     for &(class, at, probability) in &percept.detections {
         let depth = percept.depth.get(usize::from(at)).copied().unwrap_or(f32::INFINITY);
         let (column, row) = Percept::middle(at);
-        let own = eye::is_in_hand(column, row, depth) || (held == Some(class) && depth < HELD);
+        let own = (held.is_some() && eye::is_in_hand(column, row, depth)) || (held == Some(class) && depth < HELD);
         if own || !depth.is_finite() {
             continue;
         }
@@ -199,4 +199,135 @@ fn glimpses(pose: Pose, percept: &Percept, held: Option<Class>) -> BTreeMap<(Cla
         glimpse.open += probability * percept.open.get(usize::from(at)).copied().unwrap_or(0.0);
     }
     glimpses
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::percept::GRID;
+    use super::*;
+    use crate::agent::memory::testing::{point_in_own_frame, true_percept};
+    use crate::domain::world::Instance;
+    use crate::domain::{Heading, Room};
+    use crate::house::{House, generate};
+
+    fn class(name: &str) -> Class {
+        Class::named(name).unwrap()
+    }
+
+    /// A class in one cell of the raster, before a wall at that depth.
+    fn percept(name: &str, at: u16, probability: f32, depth: f32) -> Percept {
+        let cells = GRID * GRID;
+        Percept { detections: vec![(class(name), at, probability)], open: vec![0.0; cells], depth: vec![depth; cells] }
+    }
+
+    fn nothing(depth: f32) -> Percept {
+        Percept { detections: vec![], ..percept("Mug", 0, 0.0, depth) }
+    }
+
+    /// Right of and below the middle of the frame, which falls between cells.
+    const MIDDLE: u16 = (20 * GRID + 20) as u16;
+
+    #[test]
+    fn what_is_seen_ahead_is_placed_ahead() {
+        for heading in Heading::ALL {
+            let mut map = SemanticMap::default();
+            let pose = Pose { heading, ..Pose::default() };
+            map.observe(pose, &percept("Mug", MIDDLE, 0.9, 2.0), None, 7);
+            let (dx, dz) = heading.step();
+            let [thing] = map.things(0.3).try_into().unwrap();
+            assert_eq!((thing.class, thing.best, thing.seen), (class("Mug"), Cell::new(8 * dx, 8 * dz), 7));
+            assert!((thing.height - 1.55).abs() < 0.05 && (thing.score - 0.63).abs() < 1e-5, "{thing:?}");
+        }
+    }
+
+    #[test]
+    fn a_thing_that_is_gone_fades_and_a_thing_that_is_hidden_does_not() {
+        let mut map = SemanticMap::default();
+        map.observe(Pose::default(), &percept("Mug", MIDDLE, 0.9, 2.0), None, 0);
+        let seen = map.clone();
+        map.observe(Pose::default(), &nothing(1.0), None, 1);
+        assert_eq!(map, seen, "something stands before it");
+        map.observe(Pose { heading: Heading::South, ..Pose::default() }, &nothing(4.0), None, 2);
+        assert_eq!(map, seen, "it is behind the agent");
+        map.observe(Pose::default(), &nothing(4.0), None, 3);
+        assert!((map.things(0.3)[0].score - 0.6 * 0.63).abs() < 1e-5);
+        for step in 4..12 {
+            map.observe(Pose::default(), &nothing(4.0), None, step);
+        }
+        assert_eq!(map, SemanticMap::default());
+    }
+
+    #[test]
+    fn what_is_in_the_hand_is_not_taken_for_a_thing_in_the_room() {
+        let mut map = SemanticMap::default();
+        map.observe(Pose::default(), &percept("Mug", MIDDLE, 0.9, 0.7), Some(class("Mug")), 0);
+        let corner = (35 * GRID + 35) as u16;
+        map.observe(Pose::default(), &percept("Mug", corner, 0.9, 0.6), Some(class("Cup")), 1);
+        assert_eq!(map.things(0.0), []);
+        map.observe(Pose::default(), &percept("Mug", MIDDLE, 0.9, 0.7), Some(class("Cup")), 2);
+        assert_eq!(map.things(0.0).len(), 1);
+    }
+
+    #[test]
+    fn two_things_apart_are_two_and_cells_side_by_side_are_one() {
+        let mut map = SemanticMap::default();
+        let mut both = percept("Mug", MIDDLE, 0.9, 2.0);
+        // 2.6 cm of the scene lie in one cell of the raster at 2 m: these are 0.23 m and 0.92 m to the right.
+        both.detections.extend([(class("Mug"), MIDDLE + 4, 0.5), (class("Mug"), MIDDLE + 16, 0.5)]);
+        map.observe(Pose::default(), &both, None, 0);
+        let things = map.things(0.3);
+        assert_eq!(things.iter().map(|thing| thing.cells.len()).collect::<Vec<_>>(), [2, 1]);
+        assert_eq!(things[0].best, Cell::new(0, 8));
+        map.forget(class("Mug"), Cell::new(0, 8), 0.5);
+        assert_eq!(map.things(0.3), things[1..]);
+        map.discredit(class("Mug"), things[1].best, 0.5, 0.5);
+        assert!((map.things(0.0)[0].score - 0.5 * things[1].score).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_open_door_is_known_to_be_open_and_to_be_shut_again() {
+        let mut map = SemanticMap::default();
+        let mut open = percept("Fridge", MIDDLE, 0.9, 1.0);
+        map.observe(Pose::default(), &open, None, 0);
+        open.open = vec![1.0; GRID * GRID];
+        map.observe(Pose::default(), &open, None, 1);
+        assert!(map.things(0.3)[0].open > 0.5);
+        map.observe(Pose::default(), &percept("Fridge", MIDDLE, 0.9, 1.0), None, 2);
+        assert!(map.things(0.3)[0].open < 0.5);
+    }
+
+    #[test]
+    fn what_one_look_around_shows_is_where_it_stands() {
+        for room in Room::ALL {
+            let (scene, mut world) = generate::house(room, 17);
+            world.agent.horizon = 30;
+            let start = world.agent;
+            let mut house = House::new(scene.into(), world);
+            let mut map = SemanticMap::default();
+            let mut seen = Vec::new();
+            for quarters in 0..4 {
+                let mut world = house.world().clone();
+                world.agent.heading = Heading::from_quarters(start.heading.quarters() + quarters);
+                house.restore(world.clone());
+                let percept = true_percept(&house.scene().clone(), &world, house.frame());
+                let pose = Pose { heading: Heading::from_quarters(quarters), horizon: 30, ..Pose::default() };
+                map.observe(pose, &percept, None, quarters as u32);
+                seen.extend(house.view().sightings.iter().filter(|it| it.pixels > 150).map(|it| it.instance));
+            }
+            let things = map.things(0.3);
+            let mut objects = 0;
+            for instance in seen.into_iter().filter(|instance| matches!(instance, Instance::Object(_))) {
+                let at = house.world().position(house.scene(), instance).unwrap();
+                let cell = Cell::nearest(point_in_own_frame(house.scene(), start, at));
+                let class = house.world().class_of(house.scene(), instance).unwrap();
+                if !class.in_vocabulary() {
+                    continue;
+                }
+                let mut cells = things.iter().filter(|it| it.class == class).flat_map(|it| &it.cells);
+                assert!(cells.any(|(at, _)| eye::between(*at, cell) < 0.4), "{class} at {cell:?}");
+                objects += 1;
+            }
+            assert!(objects > 0 || room == Room::Bathroom, "{room:?}");
+        }
+    }
 }
