@@ -6,7 +6,7 @@ use crate::domain::{Cell, Point, Pose};
 use crate::house::camera::Camera;
 
 /// The eye's height above the floor, in millimetres.
-const HEIGHT: i32 = 1575;
+pub(crate) const HEIGHT: i32 = 1575;
 /// Where the held thing is drawn: right of this column and below this row of a 300 x 300 frame, and between these depths in
 /// metres.
 const HAND: (f32, f32) = (205.0, 228.0);

@@ -234,7 +234,9 @@ fn horizons() -> Vec<(i16, Vec2)> {
 /// The target as seen level by who stands and faces so: right, up and forward from the eye, in metres. `None` when it is so
 /// far to the side that no horizon brings it well into the frame.
 fn faced(stand: Cell, heading: Heading, target: Cell, height: f32) -> Option<Vec3> {
-    let level = eye::camera(Pose { cell: stand, heading, horizon: 0 }).local(eye::over(target, height));
+    let side = Cell::SIDE as f32 / 1000.0;
+    let along = |(x, z): (i16, i16)| f32::from((target.x - stand.x) * x + (target.z - stand.z) * z) * side;
+    let level = Vec3::new(along(heading.right().step()), height - eye::HEIGHT as f32 / 1000.0, along(heading.step()));
     // With this tilt it is seen nearest to the frame's middle column.
     let ahead = Vec2::new(level.z, level.y).length();
     (level.z > 0.0 && level.x.abs() <= INSIDE * Camera::SLOPE * ahead).then_some(level)
