@@ -116,22 +116,25 @@ impl Pretrain {
     }
 
     fn run_memory(self, preset: MemoryPreset) -> anyhow::Result<ExitStatus> {
+        let device = best_device();
+        let folder = self.encoder.unwrap_or_else(default_folder);
+        let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
         let training = MemoryTraining {
             preset,
             data: self.data,
             out: self.out,
             resume: self.resume,
             detector_from: self.visual_from,
-            device: best_device(),
+            device,
         };
         let stop = stop::on_signals()?;
         let mut progress = Progress::new();
-        let trained = training.run(&mut progress, &stop)?;
-        progress.end();
-        if trained == Trained::Stopped {
+        if training.run(&mut progress, &stop)? == Trained::Stopped {
+            progress.end();
             say("stopped; --resume goes on from here");
             return Ok(ExitStatus::Interrupted);
         }
+        validate(&training.out, &training.preset.validation, embedder, progress)?;
         Ok(ExitStatus::Ok)
     }
 }

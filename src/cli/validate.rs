@@ -4,12 +4,13 @@ use std::path::Path;
 
 use super::progress::Progress;
 use super::streams::say;
-use crate::agent::LearnedPolicy;
 use crate::agent::config::CheckpointConfig;
 use crate::agent::learned::SharedEmbedder;
+use crate::agent::memory_agent::config::MemoryConfig;
+use crate::agent::policy_source::load_agent;
 use crate::data::atomic_file;
 use crate::nets::device::best_device;
-use crate::train::model_card::card;
+use crate::train::model_card::{card, memory_card};
 use crate::train::preset::ValidationSpec;
 use crate::train::validation;
 
@@ -23,10 +24,14 @@ pub(crate) fn validate(
     sentences: SharedEmbedder,
     mut progress: Progress,
 ) -> anyhow::Result<()> {
-    let mut policy = LearnedPolicy::load(folder, sentences, best_device())?;
-    let report = validation::validate(&mut policy, spec, &mut progress)?;
+    let mut policy = load_agent(folder, sentences, best_device())?;
+    let report = validation::validate(policy.as_mut(), spec, &mut progress)?;
     progress.end();
-    let text = card(&name(folder), &CheckpointConfig::read(folder)?, &report);
+    let name = name(folder);
+    let text = match MemoryConfig::is_there(folder) {
+        true => memory_card(&name, &MemoryConfig::read(folder)?, &report),
+        false => card(&name, &CheckpointConfig::read(folder)?, &report),
+    };
     atomic_file::write(&folder.join("README.md"), text.as_bytes())?;
     say(text.trim_end());
     Ok(())

@@ -10,7 +10,6 @@ use super::frozen::{FoldedConv, stacked};
 use super::precision::Precision;
 use super::resize::resize_area;
 use super::visual::{ConvNorm, FoldedStage, ResidualStage};
-use super::weights;
 use crate::domain::Class;
 use crate::house::view::Frame;
 
@@ -111,19 +110,15 @@ impl Detector {
     }
 
     /// The detector as it is now, for computing alone.
-    ///
-    /// # Errors
-    /// When the weights cannot be read.
-    pub(crate) fn frozen(&self, store: &nn::VarStore) -> anyhow::Result<FrozenDetector> {
-        Ok(FrozenDetector {
+    pub(crate) fn frozen(&self) -> FrozenDetector {
+        FrozenDetector {
             stem: self.stem.folded(),
             stages: self.stages.iter().map(ResidualStage::folded).collect(),
             laterals: self.laterals.iter().map(ConvNorm::folded).collect(),
             smooth: self.smooth.each_ref().map(ConvNorm::folded),
             labels: (self.labels.ws.detach(), self.labels.bs.as_ref().map(Tensor::detach)),
             device: self.device,
-            digest: weights::digest(store.variables())?,
-        })
+        }
     }
 }
 
@@ -153,7 +148,6 @@ pub(crate) struct FrozenDetector {
     smooth: [FoldedConv; 2],
     labels: (Tensor, Option<Tensor>),
     device: Device,
-    digest: String,
 }
 
 impl FrozenDetector {
@@ -172,11 +166,6 @@ impl FrozenDetector {
         })
     }
 
-    /// Identifies its weights.
-    pub(crate) fn digest(&self) -> &str {
-        &self.digest
-    }
-
     /// The same detector for another thread; the weights are shared.
     pub(crate) fn share(&self) -> FrozenDetector {
         FrozenDetector {
@@ -186,7 +175,6 @@ impl FrozenDetector {
             smooth: self.smooth.each_ref().map(FoldedConv::share),
             labels: (self.labels.0.shallow_clone(), self.labels.1.as_ref().map(Tensor::shallow_clone)),
             device: self.device,
-            digest: self.digest.clone(),
         }
     }
 }
@@ -216,7 +204,7 @@ mod tests {
         let pixels = Tensor::from_slice(&image).view([1, PLANES as i64, IMAGE as i64, IMAGE as i64]);
         let slow = tch::no_grad(|| detector.forward(Precision::Full, &pixels, false)).sigmoid();
         assert_eq!(slow.size(), [1, LABELS as i64, GRID as i64, GRID as i64]);
-        let fast = detector.frozen(&store).unwrap().share().detect(&[image]);
+        let fast = detector.frozen().share().detect(&[image]);
         assert!((slow - fast).abs().max().double_value(&[]) < 1e-5);
     }
 

@@ -8,9 +8,9 @@ use anyhow::Context;
 use tch::Device;
 
 use super::metrics::Scalars;
+use crate::agent::Policy;
 use crate::agent::learned::SharedEmbedder;
-use crate::agent::policy_source::MakePolicy;
-use crate::agent::{LearnedPolicy, Policy};
+use crate::agent::policy_source::{MakePolicy, load_agent};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
@@ -60,9 +60,8 @@ pub(crate) fn run(
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
     let (folder, sentences) = (folder.to_owned(), sentences.clone());
-    let make_policy: Arc<MakePolicy> = Arc::new(move || -> anyhow::Result<Box<dyn Policy>> {
-        Ok(Box::new(LearnedPolicy::load(&folder, sentences.clone(), device)?))
-    });
+    let make_policy: Arc<MakePolicy> =
+        Arc::new(move || -> anyhow::Result<Box<dyn Policy>> { load_agent(&folder, sentences.clone(), device) });
     let (mut episodes, mut successes, mut completed) = (0u32, 0u32, 0u32);
     evaluation.play(&evaluation.all(), &make_policy, stop, &mut |episode| {
         episodes += 1;

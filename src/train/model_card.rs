@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use super::validation::ValidationReport;
 use crate::agent::config::{CheckpointConfig, Provenance, SourceCheckpoint};
+use crate::agent::memory_agent::config::{MemoryConfig, MemoryProvenance};
+use crate::agent::memory_agent::eyes::Sight;
 use crate::nets::precision::Precision;
 
 fn method(config: &CheckpointConfig) -> &'static str {
@@ -111,18 +113,52 @@ pub(crate) fn card(name: &str, config: &CheckpointConfig, report: &ValidationRep
         "# {name}\n\n\
          A household agent that follows typed instructions. It sees the last {history} frames through a frozen visual encoder \
          ({visual_encoder}), {conditioning} and chooses one of 12 actions and one of 82 object classes.{deciding}\n\n\
-         {origin}\n\n\
-         ## Measured in generated houses that no training saw\n\n\
-         `sprint {command}` measures this at its end.\n\n\
-         | | |\n|---|---|\n\
-         | one-skill tasks solved, within twice the expert's steps | {agent} |\n\
-         | the same tasks by chance | {random} |\n",
+         {origin}\n\n",
         history = config.policy.history,
         visual_encoder = visual_encoder(config),
         conditioning = conditioning(config),
         deciding = deciding(config),
         origin = origin(config),
-        command = if config.provenance.averaged_checkpoints.is_some() { "average" } else { "pretrain" },
+    );
+    let command = if config.provenance.averaged_checkpoints.is_some() { "average" } else { "pretrain" };
+    text.push_str(&measured(command, report));
+    text.push_str(
+        "\n## Limits\n\n\
+         It knows only what its last frames show, and the houses and words of its demonstrations. It has no stop \
+         action: it does not say when a task is done.\n",
+    );
+    text
+}
+
+/// The card of an agent with a memory.
+pub(crate) fn memory_card(name: &str, config: &MemoryConfig, report: &ValidationReport) -> String {
+    let MemoryProvenance { preset, detector_dataset, detector_steps, dataset, trajectories, chooser_steps, seed } =
+        &config.provenance;
+    let sight = match config.sight {
+        Sight::Detector => format!(
+            "It finds things with a detector ({detector_steps} steps on datasets `{detector_dataset}`) in a frame with depth"
+        ),
+        Sight::Simulator => "It is told by the simulator what is in view: an ablation".into(),
+    };
+    let text = format!(
+        "# {name}\n\n\
+         A household agent that follows typed instructions. It reads the instruction as subtasks (`sprint read`). {sight}, \
+         keeps them with the floor on a map of its own, and chooses what to set out to: an interaction with something that it \
+         remembers, the edge of what it has seen, a turn or a look. It says when it is done.\n\n\
+         Trained with the preset `{preset}` on {trajectories} demonstrations (datasets `{dataset}`): {chooser_steps} steps of \
+         the chooser, seed {seed}.\n\n"
+    );
+    text + &measured("pretrain", report)
+}
+
+/// The table of what was measured; `command` measured it.
+fn measured(command: &str, report: &ValidationReport) -> String {
+    let mut text = format!(
+        "## Measured in generated houses that no training saw\n\n\
+         `sprint {command}` measures this at its end.\n\n\
+         | | |\n|---|---|\n\
+         | one-skill tasks solved, within twice the expert's steps | {agent} |\n\
+         | the same tasks by chance | {random} |\n",
         agent = report.agent,
         random = report.random,
     );
@@ -138,10 +174,5 @@ pub(crate) fn card(name: &str, config: &CheckpointConfig, report: &ValidationRep
             report.instructed_first, report.other_first, report.follows_both
         );
     }
-    text.push_str(
-        "\n## Limits\n\n\
-         It knows only what its last frames show, and the houses and words of its demonstrations. It has no stop \
-         action: it does not say when a task is done.\n",
-    );
     text
 }

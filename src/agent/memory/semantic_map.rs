@@ -18,6 +18,8 @@ const SLACK: f32 = 0.25;
 const DRIFT: f32 = 0.4;
 /// What is left of the score of a thing that is missed.
 const MISSED: f32 = 0.6;
+/// The score of what the agent put somewhere itself.
+const OWN_HAND: f32 = 0.9;
 /// Weaker evidence is dropped.
 const WEAKEST: f32 = 0.05;
 
@@ -142,6 +144,12 @@ impl SemanticMap {
     /// The evidence for a class in a cell.
     pub(crate) fn evidence(&self, class: Class, cell: Cell) -> Option<&Evidence> {
         self.evidence.get(&(class, cell))
+    }
+
+    /// A thing was put there by the agent itself, which need not see it to know.
+    pub(crate) fn place(&mut self, class: Class, cell: Cell, height: f32, step: u32) {
+        let near = Evidence { score: OWN_HAND, height, seen: step, open: 0.0, near: 0.0 };
+        self.evidence.insert((class, cell), near);
     }
 
     /// Multiplies the scores of a class around a cell, up to `radius` metres from it: it turned out not to be there.

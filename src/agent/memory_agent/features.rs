@@ -85,7 +85,7 @@ fn situation(memory: &Memory, progress: &Progress, things: &[Thing]) -> Vec<f32>
     let mut numbers = Numbers(Vec::with_capacity(SITUATION));
     let goal = progress.goal();
     let is = |of: fn(&Goal, Class) -> bool, class: Class| goal.is_some_and(|goal| of(goal, class));
-    let object: fn(&Goal, Class) -> bool = |goal, class| goal.object == class;
+    let object: fn(&Goal, Class) -> bool = Goal::is_object;
     let receptacle: fn(&Goal, Class) -> bool = |goal, class| goal.receptacle == Some(class);
     let tool: fn(&Goal, Class) -> bool = Goal::is_tool;
 
@@ -163,7 +163,7 @@ fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &Macr
     numbers.number((action.cost - action.steps as f32) / 4.0);
 
     let info = class.info();
-    numbers.flag(goal.is_some_and(|goal| goal.object == class));
+    numbers.flag(goal.is_some_and(|goal| goal.is_object(class)));
     numbers.flag(goal.is_some_and(|goal| goal.receptacle == Some(class)));
     numbers.flag(goal.is_some_and(|goal| goal.place == Some(class)));
     numbers.flag(goal.is_some_and(|goal| goal.is_tool(class)));
@@ -183,14 +183,14 @@ fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &Macr
     numbers.number(thing.map_or(0.0, |thing| thing.height / 2.0));
     numbers.number(thing.map_or(0.0, |thing| log(thing.cells.len() as f32)));
     let at = thing.map(|thing| thing.best).or(action.at);
-    let beside = |wanted: Option<Class>| {
-        let (Some(wanted), Some(thing)) = (wanted, thing) else { return 0.0 };
-        let near = things.iter().filter(|other| other.class == wanted && lie_together(other, thing));
+    let beside = |wanted: &dyn Fn(Class) -> bool| {
+        let Some(thing) = thing else { return 0.0 };
+        let near = things.iter().filter(|other| wanted(other.class) && lie_together(other, thing));
         near.map(|other| other.score).fold(0.0, f32::max)
     };
-    numbers.number(beside(goal.map(|goal| goal.object)));
-    numbers.number(beside(goal.and_then(|goal| goal.place)));
-    numbers.number(beside(goal.and_then(|goal| goal.receptacle)));
+    numbers.number(beside(&|class| goal.is_some_and(|goal| goal.is_object(class))));
+    numbers.number(beside(&|class| goal.is_some_and(|goal| goal.place == Some(class))));
+    numbers.number(beside(&|class| goal.is_some_and(|goal| goal.receptacle == Some(class))));
     let near = |cell: &Cell| at.is_some_and(|at| (at.x - cell.x).abs().max((at.z - cell.z).abs()) <= 2);
     let touched = progress.done.iter().filter(|done| done.class == class && near(&done.cell));
     numbers.number(touched.clone().count().min(4) as f32 / 2.0);

@@ -3,6 +3,9 @@
 use crate::domain::{Class, SkillKind};
 use crate::language::reader::{Context, ReadSubtask, Reader};
 
+/// What a word may mean beside the likeliest with at least this probability will do as well.
+const AS_WELL: f32 = 0.2;
+
 /// One subtask, as the agent understands it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Goal {
@@ -10,6 +13,8 @@ pub(crate) struct Goal {
     pub(crate) skill: SkillKind,
     /// With what.
     pub(crate) object: Class,
+    /// What else may be meant by the word: a lamp is a desk lamp or a floor lamp. Whichever is found will do.
+    pub(crate) others: Vec<Class>,
     /// For Put, into or onto what.
     pub(crate) receptacle: Option<Class>,
     /// Where the thing is said to be.
@@ -33,7 +38,20 @@ impl Goal {
     pub(crate) fn of(read: &ReadSubtask) -> Option<Goal> {
         let complete = read.skill != SkillKind::Put || read.receptacle.is_some();
         let object = read.object.filter(|_| complete)?;
-        Some(Goal { skill: read.skill, object, receptacle: read.receptacle, place: read.place, slice: read.slice })
+        let others = read.alternatives.iter().filter(|other| !other.is_receptacle && other.probability >= AS_WELL);
+        Some(Goal {
+            skill: read.skill,
+            object,
+            others: others.map(|other| other.class).collect(),
+            receptacle: read.receptacle,
+            place: read.place,
+            slice: read.slice,
+        })
+    }
+
+    /// Whether a thing of the class will do for the object.
+    pub(crate) fn is_object(&self, class: Class) -> bool {
+        class == self.object || self.others.contains(&class)
     }
 
     /// What the skill needs besides the object and the receptacle: a knife, a microwave, a fridge, a faucet, a basin.

@@ -20,6 +20,8 @@ const ENDS: usize = 8;
 /// Ways to the edge of what was seen, and how far their ends lie apart at least, in cells.
 const EXPLORATIONS: usize = 2;
 const APART: i16 = 4;
+/// Turns after which one has looked all around.
+const AROUND: u32 = 3;
 
 /// What is set out to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +106,8 @@ pub(crate) fn available(
         let possible = match kind {
             ActionType::LookUp => pose.horizon > Pose::UP,
             ActionType::LookDown => pose.horizon < Pose::DOWN,
-            _ => true,
+            // With what was in view at first, three turns show everything around.
+            _ => progress.turns < AROUND,
         };
         let look = MacroAction {
             purpose: Purpose::Look(kind),
@@ -165,10 +168,10 @@ fn kinds(thing: &Thing, progress: &Progress) -> impl Iterator<Item = ActionType>
 
 /// Whether an interaction can have anything to do with the goal.
 fn matters(goal: &Goal, progress: &Progress, kind: ActionType, class: Class) -> bool {
-    let named = class == goal.object || goal.receptacle == Some(class);
+    let named = goal.is_object(class) || goal.receptacle == Some(class);
     match kind {
         ActionType::Pickup => named || goal.is_tool(class),
-        ActionType::Slice => class == goal.object,
+        ActionType::Slice => goal.is_object(class),
         ActionType::ToggleOn | ActionType::ToggleOff => named || goal.is_tool(class),
         // Whatever is in the hand may have to be laid down anywhere, and a thing may be in anything that opens.
         ActionType::Put => progress.held.is_some(),

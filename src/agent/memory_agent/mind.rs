@@ -10,6 +10,9 @@ use crate::agent::memory::{Glance, Memory};
 use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::house::view::{Candidate, Frame};
 
+/// The height of a counter in metres: where things are taken to be put when it is not known.
+const COUNTER: f32 = 0.9;
+
 /// Memory, progress, and what was tried.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Mind {
@@ -33,17 +36,24 @@ pub(crate) struct Moment<'a> {
 impl Mind {
     /// Takes in the next moment, and what came of the last action in it.
     pub(crate) fn observe(&mut self, moment: &Moment<'_>) {
+        let before = self.memory.odometry.pose();
         let picture = Some(fingerprint(&moment.frame.rgb));
         let changed = picture != self.picture;
         let first = std::mem::replace(&mut self.picture, picture).is_none();
         let attempt = self.attempt.take();
         if let Some(attempt) = attempt {
+            let held = self.progress.held;
             self.progress.record(attempt, changed);
             if let Some((class, cell)) = attempt.target.filter(|_| changed) {
                 // What was in vain may work now: a door stands open, the hand is empty.
                 self.failed.clear();
-                if attempt.kind == ActionType::Pickup {
-                    self.memory.map.forget(class, cell, 0.4);
+                match (attempt.kind, held) {
+                    (ActionType::Pickup, _) => self.memory.map.forget(class, cell, 0.4),
+                    (ActionType::Put, Some(held)) => {
+                        let height = self.memory.map.evidence(class, cell).map_or(COUNTER, |known| known.height);
+                        self.memory.map.place(held, cell, height, self.memory.step);
+                    }
+                    _ => {}
                 }
             }
         }
@@ -52,7 +62,7 @@ impl Mind {
         }
         self.memory.observe(Glance {
             pose: moment.pose,
-            blocked: !changed && attempt.is_some_and(|it| it.kind == ActionType::MoveAhead),
+            blocked: attempt.is_some_and(|it| it.kind == ActionType::MoveAhead) && moment.pose == before,
             frame: moment.frame,
             percept: &moment.seen.percept,
             held: self.progress.held,

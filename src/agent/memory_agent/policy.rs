@@ -76,19 +76,16 @@ impl MemoryPolicy {
         let config = MemoryConfig::read(folder)?;
         let networks = MemoryNetworks::load(folder, &config, device)?;
         let name = folder.file_name().map_or_else(|| "agent".to_string(), |name| name.to_string_lossy().into_owned());
-        MemoryPolicy::with(name, &config, networks)
+        Ok(MemoryPolicy::with(name, &config, networks))
     }
 
     /// A policy of networks at hand.
-    ///
-    /// # Errors
-    /// When the detector's weights cannot be read.
-    pub(crate) fn with(name: String, config: &MemoryConfig, networks: MemoryNetworks) -> anyhow::Result<MemoryPolicy> {
+    pub(crate) fn with(name: String, config: &MemoryConfig, networks: MemoryNetworks) -> MemoryPolicy {
         let eyes = match config.sight {
-            Sight::Detector => Eyes::Detector(Box::new(networks.detector.frozen(&networks.detector_store)?)),
+            Sight::Detector => Eyes::Detector(Box::new(networks.detector.frozen())),
             Sight::Simulator => Eyes::Simulator,
         };
-        Ok(MemoryPolicy {
+        MemoryPolicy {
             name,
             eyes,
             chooser: networks.chooser,
@@ -96,7 +93,7 @@ impl MemoryPolicy {
             loop_guard: config.loop_guard,
             samples: false,
             slots: (0..MemoryPolicy::SLOTS).map(|_| Recollection::default()).collect(),
-        })
+        }
     }
 
     fn decide(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Decision> {

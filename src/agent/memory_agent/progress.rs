@@ -37,7 +37,7 @@ pub(crate) struct Progress {
     pub(crate) active: Vec<(Class, Cell)>,
     /// Steps since the present goal began.
     pub(crate) steps: u32,
-    /// Turns on the spot since it last moved or acted.
+    /// Turns on the spot since it last moved, looked up or down, or acted.
     pub(crate) turns: u32,
 }
 
@@ -69,7 +69,6 @@ impl Progress {
         self.steps += 1;
         match attempt.kind {
             ActionType::RotateLeft | ActionType::RotateRight => self.turns += 1,
-            ActionType::LookUp | ActionType::LookDown => {}
             _ => self.turns = 0,
         }
         let Some((class, cell)) = attempt.target.filter(|_| worked) else { return };
@@ -98,7 +97,14 @@ mod tests {
     fn what_worked_changes_hand_and_doors_and_what_did_not_changes_nothing() {
         let [mug, fridge] = ["Mug", "Fridge"].map(|name| Class::named(name).unwrap());
         let at = Cell::new(1, 2);
-        let goal = Goal { skill: SkillKind::Put, object: mug, receptacle: Some(fridge), place: None, slice: false };
+        let goal = Goal {
+            skill: SkillKind::Put,
+            object: mug,
+            others: Vec::new(),
+            receptacle: Some(fridge),
+            place: None,
+            slice: false,
+        };
         let mut progress = Progress::default();
         progress.set_goals(vec![goal.clone(), goal]);
         let mut act = |kind, class, worked| {

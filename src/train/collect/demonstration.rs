@@ -7,7 +7,6 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::agent::experts::scanning::ScanningExpert;
-use crate::agent::learned::LearnedPolicy;
 use crate::agent::policy::each_alone;
 use crate::agent::{Decision, Decisions, ExpertPolicy, Observation, Policy};
 use crate::domain::trajectory::Annotation;
@@ -111,7 +110,7 @@ impl Demonstration<'_> {
     /// Plays a task to its end; `None` when the demonstrator sees no way or takes too long.
     pub(crate) fn play(
         self,
-        mut learner: Option<&mut LearnedPolicy>,
+        mut learner: Option<&mut Box<dyn Policy>>,
         rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<Option<Trajectory>> {
         let Task { roles, subtasks, .. } = self.task;
@@ -120,7 +119,7 @@ impl Demonstration<'_> {
         let house = House::new(self.setting.scene.clone(), self.setting.world.clone());
         let mut rollout = Rollout::new(HouseEnvironment::of_task(self.task, house, Grading::Class), instruction, None);
         rollout.horizon = Some(3 * self.task.expert_steps + SLACK + 1);
-        if let Some(learner) = learner.as_deref_mut() {
+        if let Some(learner) = learner.as_mut() {
             learner.reset(0, rng.random());
             // Half of the episodes it acts as when it is measured.
             learner.set_sampling(rng.random());
@@ -178,7 +177,7 @@ impl Demonstration<'_> {
 struct DisturbedPolicy<'a> {
     demonstrator: Box<dyn Policy>,
     /// Acts in the demonstrator's stead, where there is one.
-    learner: Option<&'a mut LearnedPolicy>,
+    learner: Option<&'a mut Box<dyn Policy>>,
     /// The step from which the learner acts no more.
     learner_until: u32,
     /// The share of steps at which chance takes over for a few steps.
@@ -201,12 +200,12 @@ impl DisturbedPolicy<'_> {
         if self.disturbed == 0 && self.rng.random_bool(self.noise) {
             self.disturbed = self.rng.random_range(1..=LONGEST);
         }
-        let action = match self.learner.as_deref_mut().filter(|_| here.step < self.learner_until) {
+        let action = match self.learner.as_mut().filter(|_| here.step < self.learner_until) {
             _ if self.disturbed > 0 => {
                 self.disturbed -= 1;
                 disturbance(&here.environment.legal_actions()?, self.rng)
             }
-            Some(learner) => again(here, learner)?.action,
+            Some(learner) => again(here, learner.as_mut())?.action,
             None => choice,
         };
         self.choices.push(choice);

@@ -19,7 +19,9 @@ pub use self::demonstration::{DemonstrationSettings, ExpertKind};
 use self::task_source::PER_HOUSE;
 pub use self::task_source::TaskSource;
 use super::metrics::{ProgressLogger, Scalars};
-use crate::agent::learned::{LearnedPolicy, SharedEmbedder};
+use crate::agent::Policy;
+use crate::agent::learned::SharedEmbedder;
+use crate::agent::policy_source;
 use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter};
 use crate::data::ensure_free;
 use crate::domain::task::SceneRef;
@@ -74,7 +76,7 @@ impl Collection {
             next = numbers.end;
             let endless = matches!(self.tasks, TaskSource::Generated { .. }) && next >= HOUSES;
             anyhow::ensure!(!endless, "too few of the generated tasks could be demonstrated");
-            let collect = |learner: &mut anyhow::Result<Option<LearnedPolicy>>, number: u64| {
+            let collect = |learner: &mut anyhow::Result<Option<Box<dyn Policy>>>, number: u64| {
                 let learner = learner.as_mut().map_err(|error| anyhow::anyhow!("{error:#}"))?;
                 if stop.load(Ordering::Relaxed) { Ok(Vec::new()) } else { self.house_or_task(number, learner.as_mut()) }
             };
@@ -119,13 +121,13 @@ impl Collection {
         Ok(())
     }
 
-    fn load(&self) -> anyhow::Result<Option<LearnedPolicy>> {
+    fn load(&self) -> anyhow::Result<Option<Box<dyn Policy>>> {
         let Some((folder, sentences)) = &self.learner else { return Ok(None) };
-        LearnedPolicy::load(folder, sentences.clone(), Device::Cpu).map(Some)
+        policy_source::load_agent(folder, sentences.clone(), Device::Cpu).map(Some)
     }
 
     /// The trajectories of one house, or of one given task.
-    fn house_or_task(&self, number: u64, learner: Option<&mut LearnedPolicy>) -> anyhow::Result<Vec<Trajectory>> {
+    fn house_or_task(&self, number: u64, learner: Option<&mut Box<dyn Policy>>) -> anyhow::Result<Vec<Trajectory>> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(number + 1);
         match &self.tasks {
@@ -146,7 +148,7 @@ impl Collection {
         &self,
         number: u64,
         (lengths, annotations): (&[usize], usize),
-        mut learner: Option<&mut LearnedPolicy>,
+        mut learner: Option<&mut Box<dyn Policy>>,
         rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<Vec<Trajectory>> {
         let room = Room::ALL[(number % 4) as usize];

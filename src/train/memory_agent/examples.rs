@@ -99,6 +99,7 @@ fn skill(trajectory: &Trajectory, at: usize) -> Option<Goal> {
     Some(Goal {
         skill: subtask.skill,
         object: role.class,
+        others: Vec::new(),
         receptacle: receptacle.map(|role| role.class),
         place: None,
         slice: role.slice,

@@ -118,7 +118,7 @@ impl MemoryTraining {
     ) -> anyhow::Result<Option<ExampleSets>> {
         let eyes = match self.preset.sight {
             Sight::Simulator => Eyes::Simulator,
-            Sight::Detector => Eyes::Detector(Box::new(networks.detector.frozen(&networks.detector_store)?)),
+            Sight::Detector => Eyes::Detector(Box::new(networks.detector.frozen())),
         };
         let apart = frame_store.kept_apart(self.preset.hold_out);
         let mut sets = ExampleSets { training: Vec::new(), held_out: Vec::new() };

@@ -12,7 +12,7 @@ use crate::agent::memory_agent::features::{ACTION, SITUATION};
 use crate::nets::chooser::ChooserSpec;
 use crate::nets::detector::DetectorSpec;
 use crate::train::detection::DetectorTraining;
-use crate::train::preset::{Preset, extend};
+use crate::train::preset::{Preset, ValidationSpec, extend};
 
 const SHIPPED: &str = include_str!("../../../assets/presets/sprint-memory.toml");
 const NAME: &str = "sprint-memory";
@@ -46,6 +46,8 @@ pub(crate) struct MemoryPreset {
     pub(crate) chooser: ChooserSize,
     /// How the chooser is trained.
     pub(crate) chooser_training: ChooserTraining,
+    /// How the trained agent is measured.
+    pub(crate) validation: ValidationSpec,
 }
 
 /// The part of a chooser's size that is free.
