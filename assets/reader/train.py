@@ -46,7 +46,7 @@ def trajectories(folder):
                 role = roles[skill["object"]]
                 place = roles[skill["receptacle"]]["class"] if skill.get("receptacle") is not None else None
                 skills.append((skill["skill"], role["class"], role["slice"], place))
-            yield one["id"], skills, one["annotations"], one["goal"]
+            yield one["id"], skills, one["annotations"], one.get("goal")
 
 
 def is_held_out(name):
@@ -303,7 +303,7 @@ def text_bytes(text):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("data")
+    parser.add_argument("data", nargs="+", help="dataset folders: ALFRED's, and generated houses for the grammar's own words")
     parser.add_argument("--sprint", default=str(ROOT / "target/release/sprint"))
     parser.add_argument("--features", default="read --features", help=argparse.SUPPRESS)
     parser.add_argument("--out", default=str(ROOT / "assets/reader/model.bin"))
@@ -313,7 +313,7 @@ def main():
     parser.add_argument("--small", type=float, default=0.04, help="weights below this are left out")
     options = parser.parse_args()
     chance = random.Random(7)
-    rows = list(examples(options.data, chance))
+    rows = [row for folder in options.data for row in examples(folder, chance)]
     counts = collections.Counter(word for row in rows if row[1] in ("step", "goal") for word in set(re.findall(r"[^\W_]+(?:'[^\W_]+)?", row[2].lower())))
     words = [word for word, count in counts.most_common() if count >= 6 and len(word.encode()) < 60]
     rows += [(False, "made up", text, {}, named) for text, named in made_up(chance, options.made_up)]

@@ -22,7 +22,6 @@ pub(crate) mod value_estimates;
 
 pub(crate) use decision::{ActionDistribution, Decision};
 pub(crate) use experts::expert::ExpertPolicy;
-pub(crate) use learned::LearnedPolicy;
 pub(crate) use policy::{Decisions, Observation, Policy, PolicyState, Reading};
 pub use random::RandomPolicy;
 pub(crate) use value_estimates::Values;

@@ -117,7 +117,8 @@ mod tests {
         let spec = ChooserSpec { situation: 5, action: 4, embedding: 3, hidden: vec![8, 8] };
         spec.check().unwrap();
         let chooser = Chooser::new(&store.root(), &spec);
-        let (situation, goal) = (Tensor::rand([1, 5], (Kind::Float, Device::Cpu)), Tensor::from_slice(&[[7i64, 0]]));
+        let (situation, goal) =
+            (Tensor::rand([1, 5], (Kind::Float, Device::Cpu)), Tensor::from_slice(&[7i64, 0]).view([1, 2]));
         let actions = Tensor::rand([1, 3, 4], (Kind::Float, Device::Cpu));
         let choices = |count: i64| Choices {
             situation: situation.shallow_clone(),

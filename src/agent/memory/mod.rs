@@ -8,6 +8,8 @@ pub(crate) mod occupancy;
 pub(crate) mod odometry;
 pub(crate) mod percept;
 pub(crate) mod semantic_map;
+#[cfg(test)]
+pub(crate) mod testing;
 
 use occupancy::Occupancy;
 use odometry::Odometry;
@@ -57,5 +59,45 @@ impl Memory {
         }
         self.occupancy.observe(pose, frame);
         self.map.observe(pose, percept, held, self.step);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::{Action, ActionType, Room};
+    use crate::house::{House, generate};
+
+    #[test]
+    fn the_same_walk_is_remembered_in_the_same_way_and_from_a_copy_too() {
+        use ActionType::{LookUp, MoveAhead, RotateLeft, RotateRight};
+        let (scene, world) = generate::house(Room::Kitchen, 5);
+        let start = world.agent;
+        let walk = |mut memory: Memory, from: usize| {
+            let mut house = House::new(scene.clone().into(), world.clone());
+            let kinds = [RotateRight, MoveAhead, MoveAhead, LookUp, MoveAhead, RotateLeft, MoveAhead, MoveAhead];
+            let mut halfway = Memory::default();
+            for (step, last) in std::iter::once(None).chain(kinds.map(Some)).enumerate() {
+                let before = house.world().agent;
+                if let Some(kind) = last {
+                    house.step(Action::navigate(kind));
+                }
+                let now = house.world().clone();
+                let (pose, blocked) = (now.agent.relative_to(start), last == Some(MoveAhead) && now.agent == before);
+                let frame = house.frame();
+                let percept = Percept::of_truth(&scene, &now, frame);
+                if step >= from {
+                    memory.observe(Glance { pose, blocked, frame, percept: &percept, held: None });
+                }
+                if step == 3 {
+                    halfway = memory.clone();
+                }
+            }
+            (halfway, memory)
+        };
+        let (halfway, whole) = walk(Memory::default(), 0);
+        assert_eq!(whole.step, 8);
+        assert!(whole.map.things(0.3).len() > 3 && whole.occupancy.known().count() > 20);
+        assert_eq!(walk(halfway, 4).1, whole);
     }
 }

@@ -1,7 +1,9 @@
 //! What the eyes make of one frame: which classes show where, what stands open, how far it is.
 
-use crate::domain::Class;
-use crate::house::view::Frame;
+use std::collections::BTreeMap;
+
+use crate::domain::{Class, Scene, World};
+use crate::house::view::{Frame, decode};
 
 /// Cells of a percept's raster in a row, and rows.
 pub(crate) const GRID: usize = 40;
@@ -23,6 +25,35 @@ impl Percept {
 
     /// The side of a cell in pixels of a 300 x 300 frame.
     pub(crate) const CELL: f32 = 300.0 / GRID as f32;
+
+    /// What eyes without fault would make of a frame that was drawn of `world`.
+    pub(crate) fn of_truth(scene: &Scene, world: &World, frame: &Frame) -> Percept {
+        /// As few pixels of a cell show a thing there.
+        const FEWEST: u32 = 4;
+        /// Even the simulator's word leaves a doubt, as every other evidence does.
+        const SURE: f32 = 0.9;
+        let mut counts: Vec<BTreeMap<u16, u32>> = vec![BTreeMap::new(); GRID * GRID];
+        for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
+            let down = y * GRID / frame.height * GRID;
+            for (x, &id) in row.iter().enumerate().filter(|(_, id)| **id != 0) {
+                *counts[down + x * GRID / frame.width].entry(id).or_default() += 1;
+            }
+        }
+        let mut percept = Percept { detections: vec![], open: vec![0.0; GRID * GRID], depth: median_depths(frame) };
+        for (place, counts) in counts.iter().enumerate() {
+            for (&id, _) in counts.iter().filter(|(_, pixels)| **pixels >= FEWEST) {
+                let Some(instance) = decode(id) else { continue };
+                let class = world.class_of(scene, instance).unwrap_or_default();
+                if class.in_vocabulary() && !percept.detections.contains(&(class, place as u16, SURE)) {
+                    percept.detections.push((class, place as u16, SURE));
+                }
+                if world.is_open(instance) || world.is_on(instance) {
+                    percept.open[place] = 1.0;
+                }
+            }
+        }
+        percept
+    }
 
     /// Column and row of a cell's middle in pixels of a 300 x 300 frame.
     pub(crate) fn middle(cell: u16) -> (f32, f32) {

@@ -18,6 +18,8 @@ const SLACK: f32 = 0.25;
 const DRIFT: f32 = 0.4;
 /// What is left of the score of a thing that is missed.
 const MISSED: f32 = 0.6;
+/// The same for what the agent put there: a sink is large, and it did not look where exactly.
+const MISSED_WHERE_PUT: f32 = 0.93;
 /// The score of what the agent put somewhere itself.
 const OWN_HAND: f32 = 0.9;
 /// Weaker evidence is dropped.
@@ -36,6 +38,8 @@ pub(crate) struct Evidence {
     pub(crate) open: f32,
     /// The least distance over the floor that it was ever seen from, in metres.
     pub(crate) near: f32,
+    /// The agent put it there, and has not seen it since: it is somewhere near.
+    pub(crate) put: bool,
 }
 
 /// Cells side by side that hold the same class.
@@ -84,14 +88,14 @@ impl SemanticMap {
             let weight = glimpse.weight.max(f32::EPSILON);
             let (height, open) = (glimpse.height / weight, glimpse.open / weight);
             let away = eye::between(pose.cell, cell);
-            let fresh = Evidence { score: 0.0, height, seen: step, open, near: away };
+            let fresh = Evidence { score: 0.0, height, seen: step, open, near: away, put: false };
             let known = self.evidence.entry((class, cell)).or_insert(fresh);
             let towards = WEIGHTS[usize::from(glimpse.depth > NEAR)];
             known.score += towards * (glimpse.probability - known.score);
             known.height += towards * (height - known.height);
             known.open += WEIGHTS[0] * (open - known.open);
             known.near = known.near.min(away);
-            known.seen = step;
+            (known.seen, known.put) = (step, false);
         }
         self.evidence.retain(|_, known| known.score >= WEAKEST);
     }
@@ -112,7 +116,7 @@ impl SemanticMap {
             let hidden = *depth < place.z - SLACK || (holds && eye::is_in_hand(place.x, place.y, *depth));
             let again = seen.get(&class).is_some_and(|cells| cells.iter().any(|at| eye::between(*at, cell) <= DRIFT));
             if !hidden && !again {
-                known.score *= MISSED;
+                known.score *= if known.put { MISSED_WHERE_PUT } else { MISSED };
             }
         }
     }
@@ -148,7 +152,7 @@ impl SemanticMap {
 
     /// A thing was put there by the agent itself, which need not see it to know.
     pub(crate) fn place(&mut self, class: Class, cell: Cell, height: f32, step: u32) {
-        let near = Evidence { score: OWN_HAND, height, seen: step, open: 0.0, near: 0.0 };
+        let near = Evidence { score: OWN_HAND, height, seen: step, open: 0.0, near: 0.0, put: true };
         self.evidence.insert((class, cell), near);
     }
 
@@ -213,7 +217,7 @@ fn glimpses(pose: Pose, percept: &Percept, held: Option<Class>) -> BTreeMap<(Cla
 mod tests {
     use super::super::percept::GRID;
     use super::*;
-    use crate::agent::memory::testing::{point_in_own_frame, true_percept};
+    use crate::agent::memory::testing::point_in_own_frame;
     use crate::domain::world::Instance;
     use crate::domain::{Heading, Room};
     use crate::house::{House, generate};
@@ -317,7 +321,7 @@ mod tests {
                 let mut world = house.world().clone();
                 world.agent.heading = Heading::from_quarters(start.heading.quarters() + quarters);
                 house.restore(world.clone());
-                let percept = true_percept(&house.scene().clone(), &world, house.frame());
+                let percept = Percept::of_truth(&house.scene().clone(), &world, house.frame());
                 let pose = Pose { heading: Heading::from_quarters(quarters), horizon: 30, ..Pose::default() };
                 map.observe(pose, &percept, None, quarters as u32);
                 seen.extend(house.view().sightings.iter().filter(|it| it.pixels > 150).map(|it| it.instance));

@@ -155,3 +155,62 @@ impl MemoryNetworks {
         json::write_pretty(&folder.join("config.json"), config)
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// An agent of no use that the simulator tells what is in view.
+    pub(crate) fn small() -> MemoryConfig {
+        MemoryConfig {
+            format_version: CheckpointConfig::FORMAT,
+            agent: AgentKind::Memory,
+            ontology: Ontology::current(),
+            sight: Sight::Simulator,
+            loop_guard: true,
+            detector: DetectorSpec { channels: vec![2, 2, 2, 2], pyramid: 2 },
+            chooser: ChooserSpec {
+                situation: features::SITUATION as i64,
+                action: features::ACTION as i64,
+                embedding: 2,
+                hidden: vec![8],
+            },
+            provenance: MemoryProvenance {
+                preset: "test".into(),
+                detector_dataset: String::new(),
+                detector_steps: 0,
+                dataset: "none".into(),
+                trajectories: 0,
+                chooser_steps: 0,
+                seed: 1,
+            },
+        }
+    }
+
+    #[test]
+    fn a_saved_checkpoint_is_known_by_its_kind_and_loads_with_equal_weights() {
+        let _chance = crate::nets::testing::chance();
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!MemoryConfig::is_there(folder.path()));
+        let config = small();
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        networks.save(folder.path(), &config).unwrap();
+        assert!(MemoryConfig::is_there(folder.path()));
+        let read = MemoryConfig::read(folder.path()).unwrap();
+        assert_eq!(read, config);
+        let loaded = MemoryNetworks::load(folder.path(), &read, Device::Cpu).unwrap().tensors();
+        assert!(networks.tensors().iter().all(|(name, tensor)| *tensor == loaded[name]));
+    }
+
+    #[test]
+    fn an_agent_that_counts_other_features_is_refused_with_the_field() {
+        let _chance = crate::nets::testing::chance();
+        let folder = tempfile::tempdir().unwrap();
+        let mut config = small();
+        config.chooser.action += 1;
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        networks.save(folder.path(), &config).unwrap();
+        let error = format!("{:#}", MemoryConfig::read(folder.path()).unwrap_err());
+        assert!(error.contains("config.json: chooser.action is") && error.contains("train the agent anew"), "{error}");
+    }
+}

@@ -9,7 +9,7 @@ use tch::Device;
 use crate::agent::memory::percept::{GRID, Percept, in_hand, median_depths};
 use crate::domain::{Class, Scene, World};
 use crate::env::Environment;
-use crate::house::view::{Frame, decode};
+use crate::house::view::Frame;
 use crate::nets::detector::{DetectorSpec, FrozenDetector};
 
 /// What sees.
@@ -99,29 +99,7 @@ fn seen(percept: Percept) -> Seen {
 }
 
 /// What eyes without fault would make of a frame that was drawn of `world`.
-pub(crate) fn true_sight(scene: &Scene, world: &World, frame: &Frame) -> Seen {
-    /// As few pixels of a place show a thing there.
-    const FEWEST: u32 = 4;
-    let mut counts: Vec<BTreeMap<u16, u32>> = vec![BTreeMap::new(); GRID * GRID];
-    for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
-        let down = y * GRID / frame.height * GRID;
-        for (x, &id) in row.iter().enumerate().filter(|(_, id)| **id != 0) {
-            *counts[down + x * GRID / frame.width].entry(id).or_default() += 1;
-        }
-    }
-    let mut percept = Percept { detections: Vec::new(), open: vec![0.0; GRID * GRID], depth: median_depths(frame) };
-    for (place, counts) in counts.iter().enumerate() {
-        for (&id, _) in counts.iter().filter(|(_, pixels)| **pixels >= FEWEST) {
-            let Some(instance) = decode(id) else { continue };
-            let class = world.class_of(scene, instance).unwrap_or_default();
-            if class.in_vocabulary() && !percept.detections.contains(&(class, place as u16, 0.9)) {
-                percept.detections.push((class, place as u16, 0.9));
-            }
-            if world.is_open(instance) || world.is_on(instance) {
-                percept.open[place] = 1.0;
-            }
-        }
-    }
+fn true_sight(scene: &Scene, world: &World, frame: &Frame) -> Seen {
     let held = world.held.and_then(|index| world.object(index)).map(|object| object.class);
-    Seen { percept, held: held.filter(|class| class.in_vocabulary()) }
+    Seen { percept: Percept::of_truth(scene, world, frame), held: held.filter(|class| class.in_vocabulary()) }
 }

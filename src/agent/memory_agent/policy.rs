@@ -16,7 +16,7 @@ use super::macro_action::{MacroAction, Purpose};
 use super::mind::{Mind, Moment};
 use crate::agent::decision::{ActionDistribution, Decision};
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
-use crate::domain::{Action, ActionType, Class, Pose};
+use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::house::view::Candidate;
 use crate::language::instruction::normalise;
 use crate::language::reader::ReadSubtask;
@@ -24,6 +24,9 @@ use crate::nets::chooser::{Choices, Chooser};
 
 /// From this probability on a goal counts as reached.
 const REACHED: f32 = 0.5;
+
+/// So many times as likely is what goes on with what was set out to last: of two equally good ends, one is reached.
+const COMMITMENT: f32 = 2.5;
 
 /// A policy from a checkpoint.
 pub(crate) struct MemoryPolicy {
@@ -47,6 +50,8 @@ pub struct Recollection {
     seen_at: Option<u32>,
     /// What was begun where: a pose, and how much had been done for which goal.
     tried: BTreeSet<Tried>,
+    /// What was set out to last, and where.
+    aim: Option<(Purpose, Option<Cell>)>,
     rng: ChaCha8Rng,
 }
 
@@ -60,6 +65,7 @@ impl Default for Recollection {
             read: None,
             seen_at: None,
             tried: BTreeSet::new(),
+            aim: None,
             rng: ChaCha8Rng::seed_from_u64(0),
         }
     }
@@ -184,7 +190,11 @@ impl Recollection {
         let any_new = actions.iter().any(|action| is_new(&action));
         let open: Vec<(usize, &MacroAction)> =
             actions.iter().enumerate().filter(|(_, action)| !any_new || is_new(action)).collect();
-        let weight = |index: usize| probabilities.get(index).copied().unwrap_or(0.0);
+        let aim = self.aim;
+        let weight = |index: usize| {
+            let goes_on = actions.get(index).is_some_and(|action| goes_on(aim, action));
+            probabilities.get(index).copied().unwrap_or(0.0) * if goes_on { COMMITMENT } else { 1.0 }
+        };
         let by_chance = by_chance.then(|| self.rng.random::<f32>());
         let chosen = match by_chance {
             Some(drawn) => {
@@ -211,10 +221,20 @@ impl Recollection {
         let (pose, at, done) = self.situation();
         let (kind, class) = beginning(&chosen);
         self.tried.insert((pose, at, done, kind, class));
+        self.aim = Some((chosen.purpose, chosen.at));
         let class = chosen.first.target.and_then(|target| here.environment.class_of(target));
         let cell = chosen.at.unwrap_or_else(|| self.mind.ahead());
         self.mind.attempt(chosen.first, class.map(|class| (class, cell)));
     }
+}
+
+/// Whether a macro action goes on with what was set out to last.
+fn goes_on(aim: Option<(Purpose, Option<Cell>)>, action: &MacroAction) -> bool {
+    let near = |a: Cell, b: Cell| (a.x - b.x).abs().max((a.z - b.z).abs()) <= 2;
+    let same = |(purpose, at): (Purpose, Option<Cell>)| {
+        purpose == action.purpose && at.zip(action.at).is_some_and(|(was, is)| near(was, is))
+    };
+    aim.is_some_and(same)
 }
 
 /// How a macro action begins, as the loop guard tells beginnings apart.
@@ -304,5 +324,107 @@ impl Policy for MemoryPolicy {
 
     fn set_sampling(&mut self, samples: bool) {
         self.samples = samples;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::memory_agent::config::tests::small;
+    use crate::domain::skill::SkillKind;
+    use crate::env::{Environment, HouseEnvironment};
+    use crate::episode::rollout::Rollout;
+    use crate::house::grading::{Grader, Grading};
+    use crate::house::testing::{kitchen_house, role, subtask};
+
+    fn policy() -> MemoryPolicy {
+        tch::manual_seed(4);
+        let config = small();
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        MemoryPolicy::with("small".into(), &config, networks)
+    }
+
+    fn episode() -> Rollout {
+        let grader = Grader::new(Grading::Class, &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
+        Rollout::new(HouseEnvironment::new(kitchen_house(), Some(grader)), "pick up the mug".into(), Some(12))
+    }
+
+    /// Plays on for some steps in a slot: what was decided in each.
+    fn play(policy: &mut MemoryPolicy, rollout: &mut Rollout, slot: usize, steps: usize) -> Vec<Decision> {
+        rollout.slot = slot;
+        let mut decided = Vec::new();
+        for _ in 0..steps {
+            let decision = rollout.decide(policy).unwrap();
+            rollout.carry_out(decision.clone()).unwrap();
+            decided.push(decision);
+        }
+        decided
+    }
+
+    #[test]
+    fn what_is_decided_depends_on_the_episode_alone_not_on_the_slot_or_on_others() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        (0..2).for_each(|slot| policy.reset(slot, 7));
+        let alone = play(&mut policy, &mut episode(), 0, 8);
+        policy.reset(0, 7);
+        let (mut first, mut second) = (episode(), episode());
+        for decision in &alone {
+            assert_eq!(play(&mut policy, &mut first, 0, 1), [decision.clone()]);
+            assert_eq!(play(&mut policy, &mut second, 1, 1), [decision.clone()]);
+        }
+        assert!(alone.iter().all(|decision| decision.done.is_some_and(|done| (0.0..=1.0).contains(&done))));
+    }
+
+    #[test]
+    fn restored_it_goes_on_as_it_did_and_deciding_twice_looks_once() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        policy.set_sampling(true);
+        policy.reset(0, 7);
+        let mut rollout = episode();
+        play(&mut policy, &mut rollout, 0, 4);
+        let (state, world) = (policy.state(0), rollout.env.snapshot().unwrap());
+        let went_on = play(&mut policy, &mut rollout, 0, 6);
+        policy.restore(0, state.clone());
+        rollout.env.restore(&world).unwrap();
+        rollout.set_steps(4);
+        assert_eq!(play(&mut policy, &mut rollout, 0, 6), went_on);
+        policy.set_sampling(false);
+        policy.restore(0, state);
+        rollout.env.restore(&world).unwrap();
+        rollout.set_steps(4);
+        let distributions = [rollout.decide(&mut policy), rollout.decide(&mut policy)];
+        let [once, twice] = distributions.map(|decision| decision.unwrap().distribution.unwrap());
+        assert_eq!(once.actions, twice.actions);
+    }
+
+    #[test]
+    fn probabilities_of_all_that_could_be_done_add_up_to_one() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        policy.reset(0, 1);
+        let mut rollout = episode();
+        for decision in play(&mut policy, &mut rollout, 0, 6) {
+            let total: f32 = decision.distribution.unwrap().actions.iter().flatten().sum();
+            assert!((total - 1.0).abs() < 1e-4, "{total}");
+        }
+    }
+
+    #[test]
+    fn another_instruction_is_another_goal_and_what_was_seen_is_kept() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        policy.reset(0, 1);
+        let mut rollout = episode();
+        play(&mut policy, &mut rollout, 0, 3);
+        let seen = policy.slots[0].mind.memory.map.clone();
+        rollout.instruction = "put the mug in the sink".into();
+        rollout.decide(&mut policy).unwrap();
+        let mind = &policy.slots[0].mind;
+        let goal = mind.progress.goal().unwrap();
+        assert_eq!((goal.skill, goal.receptacle), (SkillKind::Put, Class::named("Sink")));
+        let kept = seen.things(0.5).len();
+        assert!(kept > 0 && mind.memory.map.things(0.3).len() >= kept);
     }
 }

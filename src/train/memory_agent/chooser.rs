@@ -192,3 +192,53 @@ fn measure(chooser: &Chooser, held_out: &[Example], scalars: &mut Scalars) {
     scalars.set("held_out_end_precision", hits / said.max(1.0));
     scalars.set("held_out_end_recall", hits / reached.max(1.0));
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::super::examples::{examples, tests::demonstrations};
+    use super::super::preset::MemoryPreset;
+    use super::*;
+    use crate::agent::memory_agent::eyes::Eyes;
+    use crate::train::visual::testing::RecordedScalars;
+
+    #[test]
+    fn it_learns_a_few_demonstrations_and_a_resumed_training_is_the_same_training() {
+        let _chance = crate::nets::testing::chance();
+        let (_folder, frame_store) = demonstrations(6);
+        let all: Vec<usize> = (0..frame_store.trajectories.len()).collect();
+        let training: Vec<Example> =
+            examples(&frame_store, &Eyes::Simulator, 1, &all).unwrap().into_iter().flatten().collect();
+        let sets = ExampleSets { training, held_out: Vec::new() };
+        let mut preset = MemoryPreset::named("sprint-memory").unwrap().unwrap();
+        preset.chooser.hidden = vec![32];
+        let learning = &mut preset.chooser_training.optimisation;
+        (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (60, 24, 5);
+        let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 20, report_every: 1 };
+        let folder = tempfile::tempdir().unwrap();
+        let run = |name: &str, stop_at: Option<u64>| {
+            tch::manual_seed(9);
+            let store = nn::VarStore::new(Device::Cpu);
+            let chooser = Chooser::new(&store.root(), &preset.chooser.spec());
+            let path = folder.path().join(name);
+            let state = TrainingState { path: &path, identity: &BTreeMap::new() };
+            let mut recorded = RecordedScalars(Vec::new());
+            let stop = AtomicBool::new(false);
+            let save = |step: u64| {
+                stop.store(Some(step) == stop_at, Ordering::Relaxed);
+                Ok(())
+            };
+            let how = (&preset.chooser_training, rhythm);
+            train((&store, &chooser), &sets, how, state, &mut recorded, &stop, &save).unwrap();
+            let losses: Vec<f64> = recorded.0.iter().map(|scalars| scalars.values["right_loss"]).collect();
+            let weights = store.variables().into_iter().collect::<BTreeMap<_, _>>();
+            (losses, weights)
+        };
+        let (losses, whole) = run("whole", None);
+        assert!(losses[59] < 0.5 * losses[0], "{} then {}", losses[0], losses[59]);
+        assert_eq!(run("parts", Some(20)).0.len(), 20);
+        let (_, resumed) = run("parts", None);
+        assert!(whole.iter().all(|(name, tensor)| *tensor == resumed[name]));
+    }
+}

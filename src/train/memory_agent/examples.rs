@@ -209,3 +209,59 @@ fn place(scene: &Scene, world: &World, origin: Pose, target: Instance) -> Option
     let cell = Cell::nearest(world.position(scene, target)?);
     Some(Pose { cell, ..origin }.relative_to(origin).cell)
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::data::dataset::Dataset;
+    use crate::train::collect::{Collection, DemonstrationSettings, ExpertKind, TaskSource};
+    use crate::train::metrics::{ProgressLogger, Scalars};
+
+    struct Silent;
+
+    impl ProgressLogger for Silent {
+        fn log(&mut self, _: &Scalars) -> anyhow::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Demonstrations of generated tasks.
+    pub(crate) fn demonstrations(episodes: usize) -> (tempfile::TempDir, FrameStore) {
+        let folder = tempfile::tempdir().unwrap();
+        let collection = Collection {
+            out: folder.path().join("D"),
+            tasks: TaskSource::Generated { lengths: vec![1, 2], episodes, annotations: 2 },
+            seed: 3,
+            settings: DemonstrationSettings {
+                expert: ExpertKind::Scanning,
+                turn_timing: crate::house::expert::TurnTiming::Late,
+                noise: 0.0,
+            },
+            learner: None,
+        };
+        collection.run(&mut Silent, &std::sync::atomic::AtomicBool::new(false)).unwrap();
+        let frame_store = FrameStore::open(&[Dataset::open(&collection.out).unwrap()]).unwrap();
+        (folder, frame_store)
+    }
+
+    #[test]
+    fn nearly_every_step_of_a_demonstration_is_the_beginning_of_something_and_goals_are_reached_at_its_end() {
+        let (_folder, frame_store) = demonstrations(8);
+        let all: Vec<usize> = (0..frame_store.trajectories.len()).collect();
+        let made = examples(&frame_store, &Eyes::Simulator, 1, &all).unwrap();
+        assert_eq!(made, examples(&frame_store, &Eyes::Simulator, 1, &all).unwrap(), "whatever the threads do");
+        let (mut steps, mut explained) = (0, 0);
+        for (examples, trajectory) in made.iter().zip(&frame_store.trajectories) {
+            assert!(examples.last().unwrap().reached, "{}", trajectory.id);
+            let acting: Vec<&Example> = examples.iter().filter(|example| !example.reached).collect();
+            assert_eq!(acting.len(), trajectory.actions.len());
+            steps += acting.len();
+            explained += acting.iter().filter(|example| example.right.contains(&true)).count();
+            for example in examples {
+                assert!(example.aim.is_none_or(|aim| example.right[aim]));
+                assert_eq!(example.choice.actions.len() % example.choice.len(), 0);
+            }
+        }
+        assert!(explained * 10 >= steps * 9, "{explained} of {steps}");
+    }
+}

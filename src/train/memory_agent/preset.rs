@@ -109,3 +109,34 @@ impl MemoryPreset {
         Ok(preset)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_preset_is_read_by_name_and_a_file_may_change_it() {
+        let shipped = MemoryPreset::named(NAME).unwrap().unwrap();
+        assert_eq!((shipped.name.as_str(), shipped.sight), (NAME, Sight::Detector));
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let named = |text: &str| {
+            std::fs::write(file.path(), text).unwrap();
+            MemoryPreset::named(file.path().to_str().unwrap())
+        };
+        let ablation = named("extends = \"sprint-memory\"\nsight = \"simulator\"\n[chooser]\nhidden = [8]").unwrap();
+        let ablation = ablation.unwrap();
+        assert_eq!((ablation.sight, ablation.chooser.hidden), (Sight::Simulator, vec![8]));
+        let refused = |text: &str| format!("{:#}", named(text).unwrap_err());
+        assert!(refused("extends = \"sprint-memory\"\n[chooser]\nheight = 8").contains("height"));
+        assert!(refused("extends = \"sprint-memory\"\nsave_every = 0").contains("save_every is 0"));
+        assert!(refused("extends = \"sprint-memory\"\n[detector_training]\nanywhere = 2.0").contains("anywhere is 2"));
+    }
+
+    #[test]
+    fn presets_of_the_papers_agents_are_left_to_others() {
+        assert_eq!(MemoryPreset::named("sprint").unwrap(), None);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "extends = \"l-bc\"").unwrap();
+        assert_eq!(MemoryPreset::named(file.path().to_str().unwrap()).unwrap(), None);
+    }
+}
