@@ -22,6 +22,8 @@ use crate::train::training_state::TrainingState;
 pub(crate) struct ChooserTraining {
     /// Steps, batch size, learning rate and optimiser.
     pub(crate) optimisation: Optimisation,
+    /// The most trajectories that are replayed, of each dataset as many.
+    pub(crate) trajectories: usize,
     /// How much it counts to name what the demonstrator had set out to, beside going on as it did.
     pub(crate) aim_weight: f64,
 }
@@ -214,8 +216,9 @@ mod tests {
         let mut preset = MemoryPreset::named("sprint-memory").unwrap().unwrap();
         preset.chooser.hidden = vec![32];
         let learning = &mut preset.chooser_training.optimisation;
-        (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (60, 24, 5);
-        let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 20, report_every: 1 };
+        (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (150, 24, 5);
+        learning.schedule.learning_rate = 1e-2;
+        let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 50, report_every: 1 };
         let folder = tempfile::tempdir().unwrap();
         let run = |name: &str, stop_at: Option<u64>| {
             tch::manual_seed(9);
@@ -236,8 +239,8 @@ mod tests {
             (losses, weights)
         };
         let (losses, whole) = run("whole", None);
-        assert!(losses[59] < 0.5 * losses[0], "{} then {}", losses[0], losses[59]);
-        assert_eq!(run("parts", Some(20)).0.len(), 20);
+        assert!(losses[149] < 0.6 * losses[0], "{} then {}", losses[0], losses[149]);
+        assert_eq!(run("parts", Some(50)).0.len(), 50);
         let (_, resumed) = run("parts", None);
         assert!(whole.iter().all(|(name, tensor)| *tensor == resumed[name]));
     }

@@ -5,6 +5,7 @@ mod examples;
 pub(crate) mod preset;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -122,7 +123,7 @@ impl MemoryTraining {
         };
         let apart = frame_store.kept_apart(self.preset.hold_out);
         let mut sets = ExampleSets { training: Vec::new(), held_out: Vec::new() };
-        let all: Vec<usize> = (0..apart.len()).collect();
+        let all = self.drawn(frame_store);
         for (chunk, done) in all.chunks(CHUNK).zip(1u64..) {
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
@@ -138,6 +139,16 @@ impl MemoryTraining {
         Ok(Some(sets))
     }
 
+    /// The trajectories that the chooser learns from: of each dataset as many, evenly spread.
+    fn drawn(&self, frame_store: &FrameStore) -> Vec<usize> {
+        let each = self.preset.chooser_training.trajectories.div_ceil(frame_store.parts.len().max(1)).max(1);
+        let of = |part: &Range<usize>| -> Vec<usize> {
+            let count = part.len().min(each);
+            (0..count).map(|at| part.start + at * part.len() / count).collect()
+        };
+        frame_store.parts.iter().flat_map(of).collect()
+    }
+
     fn config(&self, data: &str, frame_store: &FrameStore) -> anyhow::Result<MemoryConfig> {
         let preset = &self.preset;
         let (detector_dataset, detector_steps) = match (&self.detector_from, preset.sight) {
@@ -149,6 +160,7 @@ impl MemoryTraining {
             (None, _) => (data.to_string(), preset.detector_training.optimisation.steps),
         };
         let apart = frame_store.kept_apart(preset.hold_out);
+        let learned_from = self.drawn(frame_store).into_iter().filter(|&trajectory| !apart[trajectory]).count();
         Ok(MemoryConfig {
             format_version: CheckpointConfig::FORMAT,
             agent: AgentKind::Memory,
@@ -162,7 +174,7 @@ impl MemoryTraining {
                 detector_dataset,
                 detector_steps,
                 dataset: data.to_string(),
-                trajectories: apart.iter().filter(|apart| !**apart).count() as u64,
+                trajectories: learned_from as u64,
                 chooser_steps: 0,
                 seed: preset.seed,
             },
