@@ -20,4 +20,5 @@ mod faults;
 mod scenarios;
 mod training;
 mod terminal;
+mod wishes;
 mod workbench;

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::exit_status::ExitStatus;
 use super::policies::PolicyChoice;
 use super::streams::say;
 use super::{jobs, progress, stop, streams};
 use crate::data::taskset;
+use crate::episode::rollout::EndedBy;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
 use crate::eval::options::Options;
@@ -62,6 +63,10 @@ pub(crate) struct Eval {
     /// How subtasks are graded: class, or strict as the released code does
     #[arg(long, value_name = "class|strict", default_value_t = Grading::Class)]
     grader: Grading,
+    /// Whose word ends an episode before its time: the grader's, as in the paper, or the agent's own. An agent's counts as a
+    /// success only where everything that was asked holds then
+    #[arg(long, value_enum, default_value = "grader")]
+    end: EndName,
     /// Begin an episode that ends with an error anew, at most so often; episodes of an earlier run in --out too
     #[arg(long, value_name = "N", default_value_t = 0)]
     retries: u32,
@@ -76,13 +81,19 @@ pub(crate) struct Eval {
     fail_below: Vec<Threshold>,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum EndName {
+    Agent,
+    Grader,
+}
+
 impl Eval {
     /// Plays what is not in the run folder yet, and prints the summary.
     ///
     /// # Errors
     /// When the tasks, the policy or the folder cannot be used. An episode's own errors are counted instead.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let set = taskset::read(&self.tasks)?;
+        let set = taskset::read_told(&self.tasks)?;
         let scenes = Scenes::of(&self.tasks, &set.value);
         let chosen = self.policy.open(self.sample)?;
         let evaluation =
@@ -106,6 +117,10 @@ impl Eval {
     fn options(&self) -> Options {
         Options {
             grading: self.grader,
+            end: match self.end {
+                EndName::Agent => EndedBy::Agent,
+                EndName::Grader => EndedBy::Grader,
+            },
             seeds: self.seeds,
             limit: self.limit.map(|limit| limit as usize),
             jobs: jobs::threads(self.jobs),

@@ -15,6 +15,7 @@ use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
+use crate::episode::wish::Expect;
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::explore::plain;
@@ -56,6 +57,9 @@ struct Origin {
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
+    /// What is made of typed instructions: read ones are graded like tasks, or nothing is expected of them
+    #[arg(long, value_enum, default_value = "read")]
+    expect: ExpectName,
     /// The seed of the house and of chance
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -146,6 +150,12 @@ enum GraphicsName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum ExpectName {
+    Read,
+    None,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum PolicyName {
     Agent,
     Expert,
@@ -186,13 +196,17 @@ impl Origin {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed, scenes);
         let policies = Policies::new(policy_source::agents(self.checkpoint.as_deref()));
-        Exploration::new(source, policies, kind, self.instruction.as_deref())
+        let expect = match self.expect {
+            ExpectName::Read => Expect::Read,
+            ExpectName::None => Expect::None,
+        };
+        Exploration::new(source, policies, kind, None)?.expecting(expect, self.instruction.as_deref())
     }
 
     fn start(&self) -> anyhow::Result<(EpisodeOrigin, Scenes)> {
         if let Some(task) = &self.task {
             let (path, wanted) = taskset::split_reference(task);
-            let set = taskset::read(&path)?.value;
+            let set = taskset::read_told(&path)?.value;
             let scenes = Scenes::of(&path, &set);
             let index = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
             return Ok((EpisodeOrigin::Tasks { tasks: set.tasks, index }, scenes));

@@ -35,7 +35,7 @@ impl ReportArgs {
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let out = self.out.as_ref().unwrap_or(&self.folder);
         if self.folder.join(MANIFEST).exists() {
-            let run = RecordedRun::open_evaluated(&self.folder)?;
+            let run = RecordedRun::open(&self.folder, None)?;
             let path = self.folder.join(SUMMARY);
             let summary = json::read::<RunSummary>(&path, RunSummary::FORMAT)
                 .context("the same eval command writes the summary")?

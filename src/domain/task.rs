@@ -42,8 +42,9 @@ pub struct Task {
     /// The parts that instances play.
     #[schemars(length(max = 100))]
     pub roles: Vec<Role>,
-    /// The steps, in order.
-    #[schemars(length(min = 1, max = 100))]
+    /// The steps, in order. Without any the instruction is read and graded as it was read, where a task is played or explored;
+    /// all else needs them.
+    #[schemars(length(max = 100))]
     pub subtasks: Vec<Subtask>,
     /// How many actions the expert takes; 0 where that is not known.
     #[serde(default)]

@@ -18,6 +18,12 @@ pub(crate) enum Failure {
     NeverReached,
     /// None of these: the thing was in reach and the time ran out.
     Timeout,
+    /// The agent said that it was done, and was not.
+    StoppedEarly,
+    /// Everything was done, and the agent undid some of it before it said so.
+    Undone,
+    /// Everything was done, and the agent never said so.
+    NeverStopped,
 }
 
 impl Failure {
@@ -30,6 +36,9 @@ impl Failure {
             Failure::Stuck => "stuck",
             Failure::NeverReached => "never reached the object",
             Failure::Timeout => "timeout",
+            Failure::StoppedEarly => "said done too early",
+            Failure::Undone => "done, and undone again",
+            Failure::NeverStopped => "done, and never said so",
         }
     }
 }

@@ -8,6 +8,7 @@ use anyhow::ensure;
 use super::record::{Episode, TraceStep};
 use super::rollout::{AfterEach, Rollout, Tick};
 use super::scenes::Setting;
+use super::wish::Wish;
 use crate::domain::{Scene, Task, World};
 use crate::house::grading::describe;
 use crate::house::view::Frame;
@@ -22,6 +23,8 @@ pub(crate) struct FrameSequence {
     pub(crate) scene: Arc<Scene>,
     /// What the task asked, in words.
     pub(crate) subtasks: Vec<String>,
+    /// What was told one after the other, with what came of it, where there was more than one task.
+    pub(crate) wishes: Vec<String>,
     /// The start, and the state after each step.
     pub(crate) shots: Vec<Shot>,
 }
@@ -109,7 +112,11 @@ impl FrameSequence {
                 did: Some(format!("{}{class}", step.kind)),
                 outcome,
                 possible: outcome.is_done(),
-                done: step.subtask.map(|at| subtasks.get(at as usize).cloned().unwrap_or_default()),
+                done: step.subtask.map(|at| {
+                    let wish = episode.wishes.iter().rev().find(|wish| wish.began < number);
+                    let read = wish.filter(|wish| !wish.subtasks.is_empty()).map(Wish::subtasks_in_words);
+                    read.as_ref().unwrap_or(&subtasks).get(at as usize).cloned().unwrap_or_default()
+                }),
             });
             Ok(ControlFlow::Continue(()))
         });
@@ -120,7 +127,10 @@ impl FrameSequence {
             (false, of) => format!("{} of {of} subtasks", episode.completed),
         };
         let title = format!("{} in {}, {} steps: {result}", episode.task, setting.scene.name, episode.steps);
-        Ok(FrameSequence { title, scene: setting.scene.clone(), subtasks, shots })
+        let row = |wish: &Wish| format!("at step {}: {} {}", wish.began, wish.instruction, wish.verdict_in_words());
+        let is_told = episode.wishes.iter().any(Wish::is_told);
+        let wishes = if is_told { episode.wishes.iter().map(row).collect() } else { Vec::new() };
+        Ok(FrameSequence { title, scene: setting.scene.clone(), subtasks, wishes, shots })
     }
 
     /// What the agent was told first.

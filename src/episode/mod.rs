@@ -9,3 +9,4 @@ pub(crate) mod record;
 pub(crate) mod rollout;
 pub mod scenes;
 pub(crate) mod seed;
+pub(crate) mod wish;

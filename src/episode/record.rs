@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::failure::Failure;
 use super::instruction_variant::InstructionVariant;
-use super::rollout::{Rollout, Tick};
+use super::rollout::{EndedBy, Rollout, Tick};
+use super::wish::Wish;
 use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Class};
 use crate::env::Environment;
@@ -41,12 +42,20 @@ pub(crate) struct Episode {
     /// What kept it from success, where it ended in its time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) failure: Option<Failure>,
+    /// The agent ended it by its own end: whether everything that was asked held in that state. Only in runs in which the agent's
+    /// word ends an episode.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) agent_end: Option<bool>,
     /// How often it was begun; more than once where an error made it begin anew.
     #[serde(default = "once", skip_serializing_if = "is_one")]
     pub(crate) attempts: u32,
     /// How many of the trace's steps the expert took first.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(crate) prefix_steps: u32,
+    /// What the agent was told, one after the other, and what came of each; only where a person explored, or a task that says
+    /// no subtasks was read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) wishes: Vec<Wish>,
     /// What was done, step by step.
     pub(crate) trace: Vec<TraceStep>,
 }
@@ -91,6 +100,19 @@ impl Episode {
     /// Whether it was played as the task asks: from its start, with its own instruction.
     pub(crate) fn is_plain(&self) -> bool {
         self.variant.is_original() && self.start_subtask == 0
+    }
+
+    /// Whether its own record makes it a success, where that word ended it.
+    pub(crate) fn is_success(&self, ended_by: EndedBy) -> bool {
+        let is_complete = self.error.is_none() && self.of > 0 && self.completed == self.of;
+        is_complete && (ended_by.is_grader() || self.agent_end == Some(true))
+    }
+
+    /// The trace's steps that the agent took for what it was told at the start.
+    pub(crate) fn own_steps(&self) -> &[TraceStep] {
+        let first = (self.prefix_steps as usize).min(self.trace.len());
+        let told_else = self.wishes.get(1).map_or(self.trace.len(), |next| next.began as usize);
+        &self.trace[first..told_else.clamp(first, self.trace.len())]
     }
 
     /// 1 for a success, else 0.

@@ -18,6 +18,8 @@ pub(crate) struct Rollout<E = HouseEnvironment> {
     pub(crate) instruction: String,
     /// After how many steps it ends; `None` for no limit.
     pub(crate) horizon: Option<u32>,
+    /// Whose word ends it before that. An agent's is heard by whoever asks it to decide.
+    pub(crate) ended_by: EndedBy,
     /// In which of its slots a policy decides here.
     pub(crate) slot: usize,
     steps: u32,
@@ -40,11 +42,37 @@ pub(crate) struct Tick {
 /// Why an episode is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum End {
+pub(crate) enum End {
     /// Every subtask is done.
     Success,
     /// The horizon is reached.
     Timeout,
+}
+
+/// Whose word ends an episode before its time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EndedBy {
+    /// The grader's: every subtask is done.
+    #[default]
+    Grader,
+    /// The agent's own: it says that it is done.
+    Agent,
+}
+
+impl EndedBy {
+    /// Whether it is the grader's word, as in the paper.
+    pub(crate) fn is_grader(&self) -> bool {
+        *self == EndedBy::Grader
+    }
+
+    /// For whoever reads a result: nothing for the paper's way.
+    pub(crate) fn in_words(self) -> &'static str {
+        match self {
+            EndedBy::Grader => "",
+            EndedBy::Agent => "; ended by the agent's own word",
+        }
+    }
 }
 
 /// Looks on while a rollout goes its way, and may end it.
@@ -93,7 +121,7 @@ impl Rollout {
 impl<E: Environment> Rollout<E> {
     /// An episode at its start.
     pub(crate) fn new(env: E, instruction: String, horizon: Option<u32>) -> Rollout<E> {
-        Rollout { env, instruction, horizon, slot: 0, steps: 0, last: None }
+        Rollout { env, instruction, horizon, ended_by: EndedBy::Grader, slot: 0, steps: 0, last: None }
     }
 
     /// How many steps were taken.
@@ -117,7 +145,7 @@ impl<E: Environment> Rollout<E> {
 
     /// Whether it is over, and why.
     pub(crate) fn end(&self) -> Option<End> {
-        if self.env.grading().is_some_and(|(completed, of)| completed == of) {
+        if self.ended_by.is_grader() && self.env.grading().is_some_and(|(completed, of)| completed == of) {
             return Some(End::Success);
         }
         self.horizon.is_some_and(|horizon| self.steps >= horizon).then_some(End::Timeout)

@@ -13,7 +13,10 @@ use crate::domain::{Task, TaskSet};
 use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::Scenes;
+use crate::episode::wish;
+use crate::episode::wish::Wish;
 use crate::house::grading::Grading;
+use crate::language::instruction;
 use crate::report::summary::RunSummary;
 use crate::report::summary_files;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
@@ -62,8 +65,9 @@ impl Evaluation {
     ) -> anyhow::Result<Evaluation> {
         let mut tasks = set.value.tasks.clone();
         tasks.truncate(options.limit.unwrap_or(usize::MAX));
-        check(&tasks, options)?;
         let scenes_hash = scenes.check(&tasks)?;
+        let read = read_untold(&mut tasks, &scenes)?;
+        check(&tasks, options)?;
         let manifest = RunManifest {
             format_version: RunManifest::FORMAT,
             sprint_version: env!("CARGO_PKG_VERSION").into(),
@@ -75,6 +79,7 @@ impl Evaluation {
             tasks: tasks.len(),
             seeds: options.seeds,
             grader: options.grading,
+            end: options.end,
             step_by_step: options.step_by_step,
             sampling: options.sampling,
             instruction_variants: options.language,
@@ -82,7 +87,7 @@ impl Evaluation {
             shard: options.shard,
         };
         manifest.check()?;
-        let plan = EvaluationPlan { tasks: tasks.into(), scenes: Arc::new(scenes), options };
+        let plan = EvaluationPlan { tasks: tasks.into(), scenes: Arc::new(scenes), options, read: Arc::new(read) };
         Ok(Evaluation { plan, manifest })
     }
 
@@ -128,6 +133,26 @@ impl Evaluation {
     ) -> anyhow::Result<()> {
         worker_pool::play(&self.plan, wanted, make_policy, stop, sink)
     }
+}
+
+/// Gives the tasks that only say an instruction the subtasks as which it is read; what was read, by the tasks' places.
+fn read_untold(tasks: &mut [Task], scenes: &Scenes) -> anyhow::Result<BTreeMap<usize, Wish>> {
+    let mut found = BTreeMap::new();
+    for (i, task) in tasks.iter_mut().enumerate().filter(|(_, task)| task.subtasks.is_empty()) {
+        let setting = scenes.setting(task)?;
+        let text = instruction::normalise(&task.instruction);
+        let wish = wish::read(&text, 0, std::iter::empty(), &setting.scene, &setting.world);
+        if let Some(why) = &wish.ungraded {
+            anyhow::bail!(
+                "tasks[{i}].subtasks: none, and {:?} cannot be graded as it is read: {why}",
+                task.instruction
+            );
+        }
+        (task.roles, task.subtasks) = (wish.roles.clone(), wish.subtasks.clone());
+        task.expert_steps = wish.expert_steps.unwrap_or(task.expert_steps);
+        found.insert(i, wish);
+    }
+    Ok(found)
 }
 
 /// Checks that the tasks have what the options need.

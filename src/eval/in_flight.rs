@@ -5,7 +5,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::EvaluationPlan;
+use crate::episode::failure::Failure;
 use crate::episode::record::Episode;
+use crate::episode::wish::{Wish, WishVerdict};
 use crate::episode::{diagnosis, instruction_variant};
 use crate::run_dir::episode_spec::EpisodeSpec;
 
@@ -65,7 +67,8 @@ impl InFlight {
         let own = &episode.trace[(episode.prefix_steps as usize).min(episode.trace.len())..];
         episode.steps = own.len() as u32;
         episode.completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        episode.success = episode.error.is_none() && episode.completed == episode.of;
+        let end = evaluation.options.end;
+        episode.success = episode.is_success(end);
         if !episode.success && episode.error.is_none() {
             let task = &evaluation.tasks[self.spec.task];
             // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
@@ -73,7 +76,23 @@ impl InFlight {
                 let setting = evaluation.scenes.setting(task)?;
                 diagnosis::classify(task, evaluation.options.grading, &setting, &episode.trace)
             });
-            episode.failure = class.ok();
+            episode.failure = match (episode.completed == episode.of, episode.agent_end) {
+                _ if end.is_grader() => class.ok(),
+                (true, Some(_)) => Some(Failure::Undone),
+                (true, None) => Some(Failure::NeverStopped),
+                (false, Some(_)) => Some(Failure::StoppedEarly),
+                (false, None) => class.ok(),
+            };
+        }
+        if let Some(wish) = evaluation.read.get(&self.spec.task) {
+            let verdict = match (episode.success, episode.error.is_some()) {
+                (true, _) => Some(WishVerdict::Done),
+                (false, false) => Some(WishVerdict::OutOfTime),
+                (false, true) => None,
+            };
+            let (steps, completed, failure) = (episode.steps, episode.completed, episode.failure);
+            let instruction = episode.instruction.clone();
+            episode.wishes = vec![Wish { instruction, steps, completed, verdict, failure, ..wish.clone() }];
         }
         self.episode
     }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::episode::rollout::EndedBy;
 use crate::house::grading::Grading;
 use crate::run_dir::shard::Shard;
 
@@ -10,6 +11,8 @@ use crate::run_dir::shard::Shard;
 pub struct Options {
     /// How subtasks are graded.
     pub grading: Grading,
+    /// Whose word ends an episode before its time.
+    pub end: EndedBy,
     /// Each task is played this often, with the seeds 0, 1, ...
     pub seeds: u64,
     /// Only that many tasks, from the first.
@@ -37,6 +40,7 @@ impl Options {
     pub fn plain(grading: Grading) -> Options {
         Options {
             grading,
+            end: EndedBy::Grader,
             seeds: 1,
             limit: None,
             jobs: 1,

@@ -1,10 +1,12 @@
 //! What an evaluation plays: the same for all of its workers.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::options::Options;
 use crate::domain::Task;
 use crate::episode::scenes::Scenes;
+use crate::episode::wish::Wish;
 
 /// Tasks that fit their scenes, and how they are played. Copies share tasks and scenes.
 #[derive(Clone)]
@@ -12,4 +14,6 @@ pub(crate) struct EvaluationPlan {
     pub(crate) tasks: Arc<[Task]>,
     pub(crate) scenes: Arc<Scenes>,
     pub(crate) options: Options,
+    /// What tasks without subtasks were read as, by their places.
+    pub(crate) read: Arc<BTreeMap<usize, Wish>>,
 }

@@ -88,7 +88,10 @@ impl Worker {
         let ended = |slot: usize| self.rollouts[slot].as_ref().is_none_or(|rollout| rollout.end().is_some());
         self.record(|slots| {
             let is_over = |slot: &usize| {
-                slots[*slot].as_ref().is_some_and(|in_flight| in_flight.episode.error.is_some() || ended(*slot))
+                slots[*slot].as_ref().is_some_and(|in_flight| {
+                    let episode = &in_flight.episode;
+                    episode.error.is_some() || episode.agent_end.is_some() || ended(*slot)
+                })
             };
             (0..slots.len()).filter(is_over).collect()
         })
@@ -176,6 +179,27 @@ impl Worker {
     /// Carries out what was decided in a slot.
     fn carry_out(&mut self, slot: usize, decision: anyhow::Result<Decision>) -> Result<(), Abandoned> {
         let Some(rollout) = self.rollouts[slot].as_mut() else { return Ok(()) };
+        if !rollout.ended_by.is_grader()
+            && let Ok(decision) = &decision
+        {
+            match decision.says_done() {
+                Some(true) => {
+                    let held = guarded(|| Ok(holds(rollout)));
+                    return self.record(|slots| {
+                        let Some(in_flight) = &mut slots[slot] else { return };
+                        match held {
+                            Ok(held) => in_flight.episode.agent_end = Some(held),
+                            Err(problem) => in_flight.fail(&problem),
+                        }
+                    });
+                }
+                Some(false) => {}
+                None => {
+                    let problem = "the policy never says that it is done: use --end grader";
+                    return self.record(|slots| slots[slot].iter_mut().for_each(|in_flight| in_flight.fail(problem)));
+                }
+            }
+        }
         let taken = guarded(|| {
             let tick = rollout.carry_out(decision?)?;
             Ok(TraceStep::of(&tick, rollout))
@@ -207,11 +231,21 @@ fn start(executor: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyho
     let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));
     episode.start_hash = env.fingerprint().unwrap_or_default();
     let mut rollout = Rollout::new(env, episode.instruction.clone(), Some(task.horizon));
+    rollout.ended_by = evaluation.options.end;
     if spec.start_subtask > 0 {
         lead(&mut rollout, spec.start_subtask, episode)?;
         rollout.horizon = Some(episode.prefix_steps + task.horizon);
     }
     Ok(rollout)
+}
+
+/// Whether everything that is asked holds in the present state.
+fn holds(rollout: &mut AnyRollout) -> bool {
+    let graded = rollout.env.grading().is_some_and(|(completed, of)| completed == of);
+    let house = rollout.env.house();
+    let held = house.and_then(|access| Some(access.grader?.still_holds(access.house.world())));
+    // What an environment does not show, its grader's word stands for.
+    held.unwrap_or(graded)
 }
 
 /// Lets the expert act until `from` subtasks are done.
@@ -232,3 +266,6 @@ fn lead(rollout: &mut AnyRollout, from: u32, episode: &mut Episode) -> anyhow::R
     );
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

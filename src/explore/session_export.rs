@@ -12,7 +12,7 @@ use crate::data::{atomic_file, json, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
 use crate::episode::record::Episode;
-use crate::episode::rollout::{End, Rollout};
+use crate::episode::rollout::{End, EndedBy, Rollout};
 use crate::episode::scenes::Scenes;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
@@ -65,6 +65,7 @@ pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()>
         tasks: set.tasks.len(),
         seeds: 1,
         grader: Grading::Class,
+        end: EndedBy::Grader,
         step_by_step: false,
         sampling: false,
         instruction_variants: false,

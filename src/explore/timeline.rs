@@ -69,7 +69,10 @@ impl TimelineStep {
             done: taken.step.outcome.is_done(),
             completed: taken.step.subtask.map(|subtask| subtask + 1),
             by_hand: taken.author.is_hand(),
-            instructed: before.is_some_and(|before| before.instruction != taken.instruction),
+            instructed: before.is_some_and(|before| match (&before.wish, &taken.wish) {
+                (Some(before), Some(wish)) => !before.is_same(wish),
+                _ => before.instruction != taken.instruction,
+            }),
             forks,
             entropy: distribution.map(|distribution| distribution.entropy),
             chosen: distribution.and_then(|distribution| distribution.actions[kind.index()]),

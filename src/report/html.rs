@@ -16,6 +16,7 @@ use super::summary::RunSummary;
 use crate::domain::Task;
 use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::{AfterEach, Rollout, Tick};
+use crate::episode::wish::{Wish, WishGrading, WishVerdict};
 use crate::house::House;
 use crate::house::grading::describe;
 use crate::run_dir::reader::RecordedRun;
@@ -36,6 +37,7 @@ pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -
             (Some(_), _) => "error",
             (None, _) if episode.success => "success",
             (None, Some(failure)) => failure.words(),
+            (None, None) if episode.of == 0 => "not graded",
             (None, None) => "failure",
         };
         Ok(json!({
@@ -51,6 +53,7 @@ pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -
             "expert_steps": task.expert_steps,
             "outcome": outcome,
             "error": episode.error,
+            "wishes": episode.wishes.iter().map(wish_row).collect::<Vec<_>>(),
             "subtasks": task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect::<Vec<_>>(),
             "open": format!("sprint open {}#{}", run.path.display(), number + 1),
             "frames": frames_of(run, task, episode, frames)?,
@@ -64,6 +67,25 @@ pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -
         .replace("{{plot}}", &progress_by_length::draw(&[summary]).svg())
         .replace("{{summary}}", &escape(&summary.markdown()))
         .replace("{{episodes}}", &data))
+}
+
+/// What was told, and what came of it.
+fn wish_row(wish: &Wish) -> serde_json::Value {
+    let graded = match wish.grading {
+        WishGrading::Task => "the task".to_string(),
+        WishGrading::Read => format!("understood: {}", wish.understood),
+        WishGrading::Nobody => format!("not graded: {}", wish.ungraded.as_deref().unwrap_or_default()),
+    };
+    json!({
+        "instruction": wish.instruction,
+        "graded": graded,
+        "verdict": wish.verdict_in_words(),
+        "fulfilled": wish.verdict.is_some_and(WishVerdict::is_fulfilled),
+        "began": wish.began,
+        "steps": wish.steps,
+        "expert_steps": wish.expert_steps,
+        "advice": wish.advice,
+    })
 }
 
 /// A value as JSON that stands inside a script element: without a `<` nothing can end it, or begin a comment.

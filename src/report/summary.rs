@@ -13,6 +13,7 @@ use crate::domain::{SkillKind, Task};
 use crate::episode::failure::Failure;
 use crate::episode::instruction_variant::InstructionVariant;
 use crate::episode::record::Episode;
+use crate::episode::rollout::EndedBy;
 use crate::house::grading::Grading;
 use crate::run_dir::manifest::RunManifest;
 
@@ -40,6 +41,9 @@ pub struct RunSummary {
     pub(crate) policy: String,
     /// The rules by which subtasks counted as completed.
     pub(crate) grader: Grading,
+    /// Whose word ended an episode before its time.
+    #[serde(default, skip_serializing_if = "EndedBy::is_grader")]
+    pub(crate) end: EndedBy,
     /// The run was interrupted; only some of its episodes are in.
     pub(crate) partial: bool,
     /// Tasks with at least one episode.
@@ -114,6 +118,7 @@ impl RunSummary {
             task_set: manifest.task_set.clone(),
             policy: manifest.policy.clone(),
             grader: manifest.grader,
+            end: manifest.end,
             partial,
             tasks: plain.tasks(),
             episodes: all.len(),

@@ -56,8 +56,12 @@ impl RunSummary {
             parts.push(table(["errored", "seed", "attempts", "reported"], rows));
         }
         parts.push(format!(
-            "Grader: {}. Intervals: rates by {}; means by {}.\nEpisodes: sha256 {}.\n",
-            self.grader, self.interval_methods.rates, self.interval_methods.means, self.episodes_hash
+            "Grader: {}{}. Intervals: rates by {}; means by {}.\nEpisodes: sha256 {}.\n",
+            self.grader,
+            self.end.in_words(),
+            self.interval_methods.rates,
+            self.interval_methods.means,
+            self.episodes_hash
         ));
         parts.join("\n")
     }

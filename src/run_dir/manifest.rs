@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::shard::Shard;
 use crate::data::json;
+use crate::episode::rollout::EndedBy;
 use crate::house::grading::Grading;
 
 /// What a run was made from; two runs with equal manifests measure the same thing.
@@ -33,6 +34,9 @@ pub struct RunManifest {
     pub(crate) seeds: u64,
     /// The rules by which subtasks count as completed.
     pub(crate) grader: Grading,
+    /// Whose word ends an episode before its time.
+    #[serde(default, skip_serializing_if = "EndedBy::is_grader")]
+    pub(crate) end: EndedBy,
     /// The agent is told all steps instead of the task's instruction.
     pub(crate) step_by_step: bool,
     /// The agent draws its actions by chance instead of taking the likeliest.
@@ -110,6 +114,7 @@ pub(crate) mod tests {
             tasks: 2,
             seeds: 1,
             grader: Grading::Class,
+            end: EndedBy::Grader,
             step_by_step: false,
             sampling: false,
             instruction_variants: false,

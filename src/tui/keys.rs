@@ -126,7 +126,7 @@ mod tests {
         check(Mode::Typing, Char('q'), None);
         check(Mode::Typing, Enter, Some(Verb::Apply));
         check(Mode::Help, Char('q'), Some(Verb::Cancel));
-        check(Mode::Watch, Char('z'), None);
+        check(Mode::Watch, Char('f'), None);
     }
 
     #[test]

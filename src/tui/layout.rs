@@ -21,6 +21,7 @@ pub(crate) const LEGEND: u16 = 3;
 /// |                        |             |            |
 /// time: the steps of the branch in hand
 /// instruction
+/// meaning: how it is understood
 /// status: keys, graphics
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +46,8 @@ pub(crate) struct ScreenLayout {
     pub(crate) page: Rect,
     /// The instruction, or the line that is typed.
     pub(crate) instruction: Rect,
+    /// How the instruction is understood.
+    pub(crate) meaning: Rect,
     /// The last row.
     pub(crate) status: Rect,
 }
@@ -54,6 +57,8 @@ pub(crate) struct ScreenLayout {
 pub(crate) struct BranchesLayout {
     /// The tree of branches.
     pub(crate) list: Rect,
+    /// What was told on the branch in hand.
+    pub(crate) wishes: Rect,
     /// Everything under it.
     pub(crate) below: Rect,
     /// The steps of two branches.
@@ -73,7 +78,7 @@ impl ScreenLayout {
         }
         let rect = |x: u16, y: u16, width: u16, height: u16| Rect { x: screen.x + x, y: screen.y + y, width, height };
         let (width, height) = (screen.width, screen.height);
-        let body = height - 4;
+        let body = height - 5;
         // The picture is square, two columns to a row; what remains of its column lists the interactions.
         let listed = if body < 30 { 5 } else { 8 };
         let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
@@ -93,9 +98,10 @@ impl ScreenLayout {
             task: rect(x, 1 + distribution, words, task),
             log: rect(x, 1 + distribution + task, words, below - task),
             map: rect(x + words + 2, 1 + distribution, map, below),
-            time: rect(0, height - 3, width, 1),
+            time: rect(0, height - 4, width, 1),
             page: rect(0, 1, width, body),
-            instruction: rect(0, height - 2, width, 1),
+            instruction: rect(0, height - 3, width, 1),
+            meaning: rect(0, height - 2, width, 1),
             status: rect(0, height - 1, width, 1),
         })
     }
@@ -112,12 +118,15 @@ impl ScreenLayout {
         Rect { x: inner.x + (inner.width - width) / 2, y: inner.y, width, height }
     }
 
-    /// The parts of the page of branches: the list of so many branches, the steps side by side, and two square pictures.
-    pub(crate) fn branches(&self, many: usize, cell_pixels: (u16, u16)) -> BranchesLayout {
+    /// The parts of the page of branches: the list of so many branches, so many wishes, the steps side by side, and two square
+    /// pictures.
+    pub(crate) fn branches(&self, many: usize, wishes: usize, cell_pixels: (u16, u16)) -> BranchesLayout {
         let page = self.page;
-        let tall = (many as u16).saturating_add(2).clamp(4, page.height / 2);
+        let told = (wishes as u16).saturating_add(1).clamp(2, page.height / 4);
+        let tall = (many as u16).saturating_add(1).clamp(2, page.height / 2 - told);
         let list = Rect { height: tall, ..page };
-        let below = Rect { y: page.y + tall, height: page.height - tall, ..page };
+        let wishes = Rect { y: page.y + tall, height: told, ..page };
+        let below = Rect { y: page.y + tall + told, height: page.height - tall - told, ..page };
         let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
         // Twice a square and a gap; the title and the names take two rows.
         let widest = u32::from(page.width) * if page.width < 110 { 4 } else { 5 } / 10;
@@ -125,7 +134,7 @@ impl ScreenLayout {
         let columns = (2 * rows * down / across).min(widest);
         let (rows, columns) = (rows as u16, columns as u16);
         let frames = Rect { x: below.right() - columns, y: below.y + 2, width: columns, height: rows };
-        BranchesLayout { list, below, steps: Rect { width: below.width - columns - 2, ..below }, frames }
+        BranchesLayout { list, wishes, below, steps: Rect { width: below.width - columns - 2, ..below }, frames }
     }
 
     /// How many interactions the list shows at a time.
@@ -154,6 +163,7 @@ mod tests {
                 layout.map,
                 layout.time,
                 layout.instruction,
+                layout.meaning,
                 layout.status,
             ];
             for (at, panel) in panels.iter().enumerate() {
@@ -164,8 +174,9 @@ mod tests {
                 }
             }
             for (many, pixels) in [(1, (8, 16)), (7, (10, 20)), (90, (9, 20)), (3, (20, 20))] {
-                let parts = layout.branches(many, pixels);
+                let parts = layout.branches(many, many, pixels);
                 assert!(!parts.list.intersects(parts.below) && !parts.steps.intersects(parts.frames), "{parts:?}");
+                assert!(!parts.wishes.intersects(parts.below) && !parts.wishes.intersects(parts.list), "{parts:?}");
                 assert!(parts.below.union(parts.frames) == parts.below && parts.frames.height >= 4, "{parts:?}");
             }
             assert!(layout.interactions() >= 4);

@@ -8,4 +8,4 @@ mod tree;
 
 pub(crate) use saved_state::{FRAMES, SavedState, look_back};
 pub(crate) use taken_step::TakenStep;
-pub(crate) use tree::{Growth, Tree};
+pub(crate) use tree::{Branch, Growth, Tree};

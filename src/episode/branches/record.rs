@@ -3,17 +3,19 @@
 use super::SavedState;
 use super::tree::Tree;
 use crate::episode::record::{Author, Episode};
+use crate::episode::wish::{Wish, Wishes};
 
 impl Tree {
-    /// The start as a branch left it: since the tree began, a reset may have begun to grade what is told there.
+    /// The start as a branch left it: since the tree began, something else may have been told there, or a reset may have begun
+    /// to grade it.
     pub(crate) fn beginning(&self, branch: usize) -> SavedState {
         let mut start = self.start().clone();
         if let Some((next, Some(taken))) = self.story(branch).get(1)
-            && start.grader.is_none()
-            && next.grader.is_some()
+            && let Some(wish) = &taken.wish
         {
             start.instruction = taken.instruction.to_string();
             start.grader.clone_from(&next.grader);
+            start.wishes = vec![wish.clone()];
         }
         start
     }
@@ -32,19 +34,26 @@ impl Tree {
             (told, by) = (&taken.instruction, Some(&taken.author));
             trace.push(step);
         }
-        let completed = trace.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let of = start.grader.as_ref().map_or(0, |grader| grader.total() as u32);
-        Episode {
+        let wishes: Vec<Wish> = story.last().map_or_else(Vec::new, |(tip, _)| owned(&tip.wishes));
+        let already = start.wishes.first().map_or(0, |wish| wish.already);
+        let of = start.grader.as_ref().map_or(0, |grader| (grader.total() as u32).saturating_sub(already));
+        let mut episode = Episode {
             task: task.into(),
             seed: 0,
             start_hash: start.world.digest(),
             instruction: start.instruction.clone(),
-            completed,
             of,
-            success: of > 0 && completed == of,
             steps: trace.len() as u32,
+            wishes,
             trace,
             ..Episode::default()
-        }
+        };
+        episode.completed = episode.own_steps().iter().filter(|step| step.subtask.is_some()).count() as u32;
+        episode.success = of > 0 && episode.completed == of;
+        episode
     }
+}
+
+fn owned(wishes: &Wishes) -> Vec<Wish> {
+    wishes.iter().map(|wish| (**wish).clone()).collect()
 }

@@ -6,6 +6,7 @@ use crate::agent::{Policy, PolicyState};
 use crate::domain::World;
 use crate::episode::record::Author;
 use crate::episode::rollout::Rollout;
+use crate::episode::wish::Wishes;
 use crate::house::grading::Grader;
 
 /// A state with everything that decides what follows from it.
@@ -19,6 +20,8 @@ pub(crate) struct SavedState {
     pub(crate) horizon: Option<u32>,
     /// What the agent is told.
     pub(crate) instruction: String,
+    /// What the agent was told so far, and what came of it; only where a person explores.
+    pub(crate) wishes: Wishes,
     /// Who decides.
     pub(crate) author: Author,
     /// What the policy carries.
@@ -33,6 +36,7 @@ impl SavedState {
             grader: rollout.env.grader.clone(),
             horizon: rollout.horizon,
             instruction: rollout.instruction.clone(),
+            wishes: Wishes::new(),
             author: author.clone(),
             carried,
         }

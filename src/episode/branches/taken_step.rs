@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::agent::{Decision, Values};
 use crate::episode::record::{Author, TraceStep};
+use crate::episode::wish::Wish;
 
 #[derive(Clone, Debug)]
 pub(crate) struct TakenStep {
@@ -13,6 +14,8 @@ pub(crate) struct TakenStep {
     pub(crate) step: TraceStep,
     /// What the agent was told.
     pub(crate) instruction: Arc<str>,
+    /// For which wish it was taken; only where a person explores.
+    pub(crate) wish: Option<Arc<Wish>>,
     /// Who chose.
     pub(crate) author: Author,
     /// What the critics made of the state before it.
@@ -25,5 +28,9 @@ impl TakenStep {
         self.decision.action == other.decision.action
             && self.instruction == other.instruction
             && self.author == other.author
+            && match (&self.wish, &other.wish) {
+                (Some(wish), Some(other)) => wish.is_same(other),
+                (wish, other) => wish.is_none() && other.is_none(),
+            }
     }
 }

@@ -3,6 +3,7 @@
 use super::saved_state::SavedState;
 use super::taken_step::TakenStep;
 use crate::agent::PolicyState;
+use crate::episode::wish::Wishes;
 
 /// A state's place in the tree.
 pub(crate) type Place = usize;
@@ -81,6 +82,17 @@ impl Tree {
     pub(crate) fn begin_with(&mut self, start: SavedState) {
         if self.twigs.len() == 1 {
             self.twigs[0].moment = start;
+        }
+    }
+
+    /// Replaces what is known of the wishes in the state in hand, where the last of them is the one that is told there.
+    pub(crate) fn judge(&mut self, wishes: &Wishes) {
+        let place = self.line[self.at as usize];
+        let known = &mut self.twigs[place].moment.wishes;
+        if let (Some(known_last), Some(last)) = (known.last(), wishes.last())
+            && known_last.is_same(last)
+        {
+            known.clone_from(wishes);
         }
     }
 
@@ -256,6 +268,7 @@ mod tests {
             grader: None,
             horizon: None,
             instruction: "go".into(),
+            wishes: Wishes::new(),
             author: Author::hand(),
             carried: PolicyState::Nothing,
         }
@@ -275,6 +288,7 @@ mod tests {
             decision: Decision::of(Action::navigate(kind)),
             step,
             instruction: told.into(),
+            wish: None,
             author: Author::hand(),
             values: None,
         }

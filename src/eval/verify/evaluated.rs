@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use super::verdict::{Agreement, Mismatch};
 use crate::agent::policy_source::PolicySource;
 use crate::episode::record::{Episode, EpisodeKey};
+use crate::episode::rollout::EndedBy;
 use crate::eval::options::Options;
 use crate::eval::plan::EvaluationPlan;
 use crate::eval::worker_pool;
@@ -30,8 +31,10 @@ pub(super) fn play_again(
     let plan = EvaluationPlan {
         tasks: run.set.tasks.clone().into(),
         scenes: Arc::new(run.scenes.clone()),
+        read: Arc::default(),
         options: Options {
             jobs,
+            end: run.manifest.end,
             step_by_step: run.manifest.step_by_step,
             sampling: run.manifest.sampling,
             ..Options::plain(run.manifest.grader)
@@ -42,7 +45,7 @@ pub(super) fn play_again(
     worker_pool::play(&plan, specs, &source.make, &stop, &mut |found| {
         let key = found.key();
         if let Some(recorded) = recorded.get(&key) {
-            compared.insert(key, compare(recorded, &found));
+            compared.insert(key, compare(recorded, &found, run.manifest.end));
         }
         progress(compared.len());
         Ok(())
@@ -51,13 +54,13 @@ pub(super) fn play_again(
 }
 
 /// How far a record agrees with the same episode played again.
-fn compare(recorded: &Episode, found: &Episode) -> Agreement {
+fn compare(recorded: &Episode, found: &Episode, end: EndedBy) -> Agreement {
     let mut agreement = Agreement::default();
-    agreement.mismatch = first_mismatch(recorded, found, &mut agreement);
+    agreement.mismatch = first_mismatch(recorded, found, end, &mut agreement);
     agreement
 }
 
-fn first_mismatch(recorded: &Episode, found: &Episode, agreed: &mut Agreement) -> Option<Mismatch> {
+fn first_mismatch(recorded: &Episode, found: &Episode, end: EndedBy, agreed: &mut Agreement) -> Option<Mismatch> {
     if recorded.start_hash != found.start_hash {
         return Some(Mismatch::at(0, "start", &recorded.start_hash, &found.start_hash));
     }
@@ -79,5 +82,5 @@ fn first_mismatch(recorded: &Episode, found: &Episode, agreed: &mut Agreement) -
         }
         agreed.steps += 1;
     }
-    Mismatch::of_counts(recorded).or_else(|| Mismatch::of_results(recorded, found))
+    Mismatch::of_counts(recorded, end).or_else(|| Mismatch::of_results(recorded, found))
 }

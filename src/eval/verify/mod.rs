@@ -47,7 +47,8 @@ pub fn verify(
                 let index =
                     if is_explored(episode) { 0 } else { specs.get(&episode.key()).map_or(0, |spec| spec.index) };
                 let author = run.author(task_index, episode);
-                let recorded = RecordedEpisode { episode, task, setting, author, grading: run.manifest.grader, index };
+                let (grading, end) = (run.manifest.grader, run.manifest.end);
+                let recorded = RecordedEpisode { episode, task, setting, author, grading, end, index };
                 recorded.retrace(&mut sources).with_context(|| format!("episode {number}"))?
             }
         };

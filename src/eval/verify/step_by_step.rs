@@ -9,8 +9,9 @@ use crate::agent::{Decision, Policy, PolicyState};
 use crate::domain::Task;
 use crate::episode::branches::{FRAMES, SavedState, look_back};
 use crate::episode::record::{Author, Episode, TraceStep};
-use crate::episode::rollout::Rollout;
+use crate::episode::rollout::{EndedBy, Rollout};
 use crate::episode::scenes::Setting;
+use crate::episode::wish::WishGrading;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
 use crate::language::instruction;
@@ -23,6 +24,8 @@ pub(super) struct RecordedEpisode<'a> {
     /// Who acted where the record does not say so.
     pub(super) author: Author,
     pub(super) grading: Grading,
+    /// Whose word ended it.
+    pub(super) end: EndedBy,
     /// The place of the episode in its run, from which the policy's slot follows.
     pub(super) index: usize,
 }
@@ -39,7 +42,7 @@ impl RecordedEpisode<'_> {
     }
 
     fn first_mismatch(self, sources: &mut Sources<'_, '_>, agreed: &mut Agreement) -> anyhow::Result<Option<Mismatch>> {
-        let RecordedEpisode { episode, task, setting, mut author, grading, index } = self;
+        let RecordedEpisode { episode, task, setting, mut author, grading, end, index } = self;
         let start = setting.world.digest();
         if start != episode.start_hash {
             return Ok(Some(Mismatch::at(0, "start", &episode.start_hash, start)));
@@ -66,7 +69,13 @@ impl RecordedEpisode<'_> {
                 agreed.steps += 1;
                 continue;
             }
-            if let Some(text) = &recorded.instruction {
+            if let Some(wish) = episode.wishes.iter().rev().find(|wish| wish.began + 1 == number) {
+                // What a wish was read as is in the record: a later reader may read it otherwise.
+                if wish.grading != WishGrading::Task {
+                    rollout.instruction.clone_from(&wish.instruction);
+                    rollout.env.grader = wish.grader(rollout.env.house.scene(), rollout.env.house.world());
+                }
+            } else if let Some(text) = recorded.instruction.as_ref().filter(|_| episode.wishes.is_empty()) {
                 let own = instruction::normalise(&task.instruction) == instruction::normalise(text);
                 rollout.instruction.clone_from(text);
                 if !own {
@@ -105,7 +114,7 @@ impl RecordedEpisode<'_> {
             }
             agreed.steps += 1;
         }
-        Ok(Mismatch::of_counts(episode))
+        Ok(Mismatch::of_counts(episode, end))
     }
 }
 

@@ -51,6 +51,7 @@ fn walked() -> SessionExport {
             decision,
             step: TraceStep::of(&tick, &rollout),
             instruction: rollout.instruction.as_str().into(),
+            wish: None,
             author: if by_hand { Author::hand() } else { random.clone() },
             values: None,
         };

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::episode::record::{Episode, TraceStep};
+use crate::episode::rollout::EndedBy;
 
 /// What came of verifying.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -79,11 +80,11 @@ impl Mismatch {
     }
 
     /// The difference between what an episode says that it came to and what its own steps come to.
-    pub(super) fn of_counts(episode: &Episode) -> Option<Mismatch> {
+    pub(super) fn of_counts(episode: &Episode, ended_by: EndedBy) -> Option<Mismatch> {
         let own = episode.trace.get(episode.prefix_steps as usize..).unwrap_or_default();
-        let completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
-        let success = episode.error.is_none() && episode.of > 0 && completed == episode.of;
-        let counted = Episode { completed, steps: own.len() as u32, success, ..Episode::default() };
+        let completed = episode.own_steps().iter().filter(|step| step.subtask.is_some()).count() as u32;
+        let mut counted = Episode { completed, steps: own.len() as u32, trace: Vec::new(), ..episode.clone() };
+        counted.success = counted.is_success(ended_by);
         let (recorded, found) = (counts(episode), counts(&counted));
         (recorded != found).then(|| Mismatch::at(0, "result", recorded, found))
     }
@@ -96,5 +97,7 @@ impl Mismatch {
 }
 
 fn counts(episode: &Episode) -> String {
-    format!("{} subtasks, {} steps, success {}", episode.completed, episode.steps, episode.success)
+    let own =
+        episode.agent_end.map_or(String::new(), |held| format!(", ended by the agent with everything held {held}"));
+    format!("{} subtasks, {} steps, success {}{own}", episode.completed, episode.steps, episode.success)
 }

@@ -9,6 +9,7 @@ mod snapshot;
 mod state;
 mod step;
 mod time;
+mod wishes;
 
 pub(crate) use snapshot::{SessionSnapshot, TaskProgress};
 pub(crate) use step::StepTaken;
@@ -21,7 +22,8 @@ use crate::agent::registry::{Policies, PolicyKind};
 use crate::domain::Task;
 use crate::episode::branches::{SavedState, Tree};
 use crate::episode::record::Author;
-use crate::episode::rollout::{End, Rollout};
+use crate::episode::rollout::Rollout;
+use crate::episode::wish::{Expect, WishVerdict, Wishes};
 use state::{ActingPolicy, CurrentEpisode, Frames};
 
 /// The episode under exploration.
@@ -34,6 +36,10 @@ pub struct Exploration {
     rollout: Rollout,
     tree: Tree,
     frames: Frames,
+    /// What is made of typed wishes.
+    expect: Expect,
+    /// What was told on the way to the present state.
+    wishes: Wishes,
 }
 
 impl Exploration {
@@ -66,13 +72,29 @@ impl Exploration {
             },
             source,
             frames: Frames::default(),
+            expect: Expect::default(),
+            wishes: Wishes::new(),
         };
-        exploration.episode.examples = Arc::new(exploration.suggest());
+        exploration.begin_wishes();
         if let Some(text) = instruction {
             exploration.instruct(text)?;
             exploration.make_start();
         }
         Ok(exploration)
+    }
+
+    /// Reads typed wishes, or leaves them to a person's judgement.
+    ///
+    /// # Errors
+    /// When the instruction is unfit.
+    pub(crate) fn expecting(mut self, expect: Expect, instruction: Option<&str>) -> anyhow::Result<Exploration> {
+        self.expect = expect;
+        self.begin_wishes();
+        if let Some(text) = instruction {
+            self.instruct(text)?;
+            self.make_start();
+        }
+        Ok(self)
     }
 
     /// The present state becomes the start, while nothing was tried.
@@ -82,12 +104,13 @@ impl Exploration {
 
     fn saved_state(&self) -> SavedState {
         let carried = self.acting.policy.as_ref().map_or(PolicyState::Nothing, |policy| policy.state(0));
-        SavedState::of(&self.rollout, &self.acting.author, carried)
+        let wishes = self.wishes.clone();
+        SavedState { wishes, ..SavedState::of(&self.rollout, &self.acting.author, carried) }
     }
 
-    /// Whether the episode is over, and why.
-    pub fn end(&self) -> Option<End> {
-        self.rollout.end()
+    /// Whether the wish in force is over, and how.
+    pub fn end(&self) -> Option<WishVerdict> {
+        self.wishes.last().and_then(|wish| wish.verdict)
     }
 
     /// What the agent is told.
@@ -141,7 +164,7 @@ mod tests {
                 break;
             }
         }
-        assert_eq!(exploration.end(), Some(End::Success));
+        assert_eq!(exploration.end(), Some(WishVerdict::Done));
         assert_eq!(exploration.progress().unwrap().completed_at.len(), 2);
         exploration.reset();
         exploration.instruct("dance").unwrap();

@@ -1,10 +1,7 @@
-//! Which episode is explored, and what the agent is told in it.
-
-use std::sync::Arc;
+//! Which episode is explored.
 
 use super::Exploration;
 use crate::episode::branches::Tree;
-use crate::language::instruction;
 
 impl Exploration {
     /// Opens the next house, or the next task of the set.
@@ -40,7 +37,7 @@ impl Exploration {
             policy.reset(0, self.episode.seed);
         }
         self.tree = Tree::new(self.saved_state());
-        self.episode.examples = Arc::new(self.suggest());
+        self.begin_wishes();
         Ok(())
     }
 
@@ -49,28 +46,5 @@ impl Exploration {
         self.episode.limited = false;
         self.rollout.horizon = None;
         self.make_start();
-    }
-
-    /// Tells the agent something else, from the next step on; says what that means for the task.
-    ///
-    /// # Errors
-    /// When the text is empty, too long, or holds control characters.
-    pub(crate) fn instruct(&mut self, text: &str) -> anyhow::Result<&'static str> {
-        let text = instruction::parse(text)?;
-        self.rollout.instruction = text;
-        self.acting.decision = None;
-        let asked = self.episode.task.as_ref().is_some_and(|task| {
-            instruction::normalise(&task.instruction) == instruction::normalise(&self.rollout.instruction)
-        });
-        Ok(match (self.rollout.env.grader.is_some(), asked) {
-            (true, true) => "the task's own words",
-            (true, false) => {
-                self.rollout.env.grader = None;
-                self.rollout.horizon = None;
-                "the task no longer applies"
-            }
-            (false, true) => "the task's words again: reset to be graded",
-            (false, false) => "applies from the next step",
-        })
     }
 }

@@ -21,6 +21,14 @@ impl Exploration {
         Ok(())
     }
 
+    /// Lets a policy of a test's own decide from here on.
+    #[cfg(test)]
+    pub(crate) fn act_by(&mut self, policy: Box<dyn Policy>) {
+        self.acting.policy = Some(policy);
+        self.look_back();
+        self.make_start();
+    }
+
     /// Lets another checkpoint be the agent, by name or number, and loads it.
     ///
     /// # Errors

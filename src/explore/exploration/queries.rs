@@ -8,6 +8,7 @@ use crate::analysis::chain::Chain;
 use crate::analysis::instruction_ab::Contrast;
 use crate::analysis::{chain, instruction_ab};
 use crate::domain::{Role, Subtask};
+use crate::episode::wish::WishGrading;
 use crate::explore::breakpoints::{Facts, gap};
 use crate::language::{instruction, nouns, phrases};
 
@@ -65,7 +66,8 @@ impl Exploration {
             let (roles, subtasks) = left.as_ref().filter(|(_, subtasks)| !subtasks.is_empty()).ok_or_else(|| {
                 anyhow::anyhow!("there is no task whose steps would be a chain: type one, with ; between the links")
             })?;
-            let task = self.episode.task.as_ref().filter(|task| !task.sentences.is_empty());
+            let told = self.wishes.last().filter(|wish| wish.grading == WishGrading::Task);
+            let task = self.episode.task.as_ref().filter(|task| told.is_some() && !task.sentences.is_empty());
             let mut rng = ChaCha8Rng::seed_from_u64(0);
             links = match task {
                 Some(task) => task.sentences.iter().rev().take(subtasks.len()).rev().cloned().collect(),

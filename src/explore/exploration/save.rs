@@ -6,9 +6,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::Exploration;
 use crate::domain::{Scene, Task};
-use crate::episode::branches::SavedState;
+use crate::episode::branches::{Branch, SavedState};
 use crate::episode::frames::FrameSequence;
 use crate::episode::scenes::Setting;
+use crate::episode::wish::WishGrading;
 use crate::explore::session_export;
 use crate::explore::session_export::SessionExport;
 use crate::report::export;
@@ -19,10 +20,11 @@ impl Exploration {
     pub(crate) fn explored(&self) -> SessionExport {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
+        let episode = |(at, branch): (usize, &Branch)| self.with_open_wishes(at, self.tree.episode(at, &branch.name));
         SessionExport {
             scene: self.rollout.env.house.scene().clone(),
             tasks,
-            episodes: branches().map(|(at, branch)| self.tree.episode(at, &branch.name)).collect(),
+            episodes: branches().map(episode).collect(),
         }
     }
 
@@ -50,8 +52,16 @@ impl Exploration {
 
     /// The task that begins at a moment; without subtasks where nobody grades the instruction.
     fn task_at(&self, moment: &SavedState, id: &str) -> Task {
-        let graded = self.episode.task.as_ref().filter(|_| moment.grader.is_some());
+        let wish = moment.wishes.last();
+        let is_task = wish.is_some_and(|wish| wish.grading == WishGrading::Task);
+        let graded = self.episode.task.as_ref().filter(|_| moment.grader.is_some() && is_task);
         let mut task = graded.cloned().unwrap_or_else(|| session_export::ungraded(self.episode.reference.clone()));
+        if let Some(wish) = wish.filter(|wish| wish.grading == WishGrading::Read) {
+            task.roles.clone_from(&wish.roles);
+            task.subtasks.clone_from(&wish.subtasks);
+            task.expert_steps = wish.expert_steps.unwrap_or(0);
+            task.horizon = wish.limit().unwrap_or(0);
+        }
         task.id = id.into();
         task.start = Some((*moment.world).clone());
         task.instruction.clone_from(&moment.instruction);

@@ -7,7 +7,7 @@ use crate::agent::Reading;
 use crate::agent::registry::PolicyKind;
 use crate::domain::{Cell, Scene, World};
 use crate::episode::branches::FRAMES;
-use crate::episode::rollout::End;
+use crate::episode::wish::{WishVerdict, Wishes};
 use crate::explore::timeline::Timeline;
 use crate::house::House;
 use crate::house::grading::describe;
@@ -36,12 +36,14 @@ pub struct SessionSnapshot {
     pub(crate) step: u32,
     /// After how many it ends.
     pub(crate) horizon: Option<u32>,
-    /// How many the expert takes for the task.
+    /// How many the expert takes for the wish in force, from where it was told.
     pub(crate) expert_steps: Option<u32>,
     /// The task, where one applies.
     pub(crate) progress: Option<TaskProgress>,
-    /// Why the episode is over, if it is.
-    pub(crate) end: Option<End>,
+    /// What was told on the way here, the wish in force last.
+    pub(crate) wishes: Wishes,
+    /// What the wish in force came to, if it is over.
+    pub(crate) end: Option<WishVerdict>,
     /// Where the agent has been.
     pub(crate) path: Vec<Cell>,
     /// Which policy decides.
@@ -94,14 +96,10 @@ impl Exploration {
             instruction: self.rollout.instruction.clone(),
             step: self.rollout.steps(),
             horizon: self.rollout.horizon,
-            expert_steps: self
-                .episode
-                .task
-                .as_ref()
-                .filter(|_| self.rollout.env.grader.is_some())
-                .map(|task| task.expert_steps),
+            expert_steps: self.wishes.last().and_then(|wish| wish.expert_steps),
             progress,
-            end: self.rollout.end(),
+            wishes: self.wishes.clone(),
+            end: self.end(),
             path,
             policy: self.acting.kind,
             acts: self.acting.author.policy.clone(),
@@ -115,10 +113,12 @@ impl Exploration {
     /// How far the task has come, where one applies.
     pub(crate) fn progress(&self) -> Option<TaskProgress> {
         let (grader, house) = (self.rollout.env.grader.as_ref()?, &self.rollout.env.house);
-        let steps = (1..=self.tree.at()).zip(self.tree.steps());
+        let (began, already) = self.wishes.last().map_or((0, 0), |wish| (wish.began, wish.already));
+        let own = (1..=self.tree.at()).zip(self.tree.steps()).filter(|&(step, _)| step > began);
+        let own = own.filter(|(_, taken)| taken.step.subtask.is_some()).map(|(step, _)| step);
         Some(TaskProgress {
             subtasks: grader.subtasks().iter().map(|subtask| describe(grader.roles(), subtask)).collect(),
-            completed_at: steps.filter(|(_, taken)| taken.step.subtask.is_some()).map(|(step, _)| step).collect(),
+            completed_at: std::iter::repeat_n(began, already as usize).chain(own).collect(),
             waits_for: grader.waits_for(house.scene(), house.world()),
         })
     }

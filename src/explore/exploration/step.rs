@@ -6,7 +6,8 @@ use crate::agent::{ActionDistribution, Decision, Values};
 use crate::domain::Action;
 use crate::episode::branches::{Growth, TakenStep};
 use crate::episode::record::{Author, TraceStep};
-use crate::episode::rollout::{End, Tick};
+use crate::episode::rollout::Tick;
+use crate::episode::wish::WishVerdict;
 use crate::house::Outcome;
 use crate::house::grading::describe;
 
@@ -29,8 +30,8 @@ pub struct StepTaken {
     pub(crate) distribution: Option<ActionDistribution>,
     /// How far the task is after it, where one applies.
     pub(crate) progress: Option<TaskProgress>,
-    /// Why the episode is over after it, if it is.
-    pub(crate) end: Option<End>,
+    /// What the wish came to, if it is over after it.
+    pub(crate) end: Option<WishVerdict>,
 }
 
 impl Exploration {
@@ -48,6 +49,7 @@ impl Exploration {
                 }
                 let decision = self.rollout.decide(policy)?;
                 let values = self.rollout.values(policy, &decision)?;
+                self.hear(&decision);
                 (decision, values)
             }
         };
@@ -85,6 +87,7 @@ impl Exploration {
             },
             step: TraceStep::of(&tick, &self.rollout),
             instruction: self.rollout.instruction.as_str().into(),
+            wish: self.wishes.last().cloned(),
             author,
             values,
         };
@@ -93,10 +96,12 @@ impl Exploration {
         let by_hand = taken.author.is_hand();
         let distribution = taken.decision.distribution.clone().filter(|_| !by_hand);
         let why = self.why(&taken, &words);
+        self.count_step(taken.decision.action);
         let moment = self.saved_state();
         let growth = self.tree.grow(taken, || moment, || why);
         if growth == Growth::Known {
             self.tree.saved_state().restore(&mut self.rollout, step);
+            self.wishes.clone_from(&self.tree.saved_state().wishes);
         }
         let forked = match growth {
             Growth::Forked(branch) => self.tree.branches().get(branch).map(|b| format!("{}: {}", b.name, b.why)),
@@ -111,14 +116,18 @@ impl Exploration {
             forked,
             distribution,
             progress: self.progress(),
-            end: self.rollout.end(),
+            end: self.end(),
         })
     }
 
     /// What is new about a step that is not the one which is there already.
     fn why(&self, taken: &TakenStep, words: &str) -> String {
         let Some(next) = self.tree.next() else { return "went on".into() };
-        if next.instruction != taken.instruction {
+        let another = match (&next.wish, &taken.wish) {
+            (Some(next), Some(taken)) => !next.is_same(taken),
+            _ => next.instruction != taken.instruction,
+        };
+        if another {
             format!("told: {}", taken.instruction)
         } else if next.decision.action != taken.decision.action {
             format!("{words} ({})", who(&taken.author))

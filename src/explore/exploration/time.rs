@@ -79,6 +79,7 @@ impl Exploration {
     fn settle(&mut self) {
         let moment = self.tree.saved_state().clone();
         moment.restore(&mut self.rollout, self.tree.at());
+        self.wishes.clone_from(&moment.wishes);
         self.frames.present = None;
         self.acting.decision = None;
         if moment.author == self.acting.author && !matches!(moment.carried, PolicyState::Nothing) {
@@ -112,6 +113,7 @@ impl Exploration {
         let fresh = start.rollout();
         self.rollout.env.grader = fresh.env.grader;
         self.rollout.horizon = fresh.horizon;
+        self.wishes = vec![Arc::new(self.first_wish())];
         // The text was checked when it came in.
         let _ = self.instruct(&instruction);
         self.make_start();
@@ -131,8 +133,9 @@ impl Exploration {
         let mut author = author.clone();
         let mut parted = None;
         for (number, recorded) in (1..).zip(&episode.trace) {
-            if let Some(told) = &recorded.instruction {
-                self.instruct(told)?;
+            self.tell_again(&episode.wishes, number - 1);
+            if let Some(told) = recorded.instruction.as_ref().filter(|_| episode.wishes.is_empty()) {
+                self.tell_ungraded(told)?;
             }
             if let Some(by) = &recorded.author {
                 author = by.clone();
@@ -153,6 +156,10 @@ impl Exploration {
                 found.map(|outcome| outcome.to_string()).unwrap_or_default(),
                 recorded.outcome.to_string()
             );
+        }
+        self.tell_again(&episode.wishes, episode.trace.len() as u32);
+        if let Some(last) = episode.wishes.last() {
+            self.recall(last);
         }
         Ok(parted)
     }

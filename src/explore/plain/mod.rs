@@ -18,7 +18,7 @@ use super::verb::{Verb, parse};
 use crate::agent::{Decision, Values};
 use crate::analysis::value_map::ValueMap;
 use crate::domain::Heading;
-use render::{at, compare, divergence, opening, step_line};
+use render::{at, compare, divergence, opening, reading, step_line, verdict};
 
 /// A session without a screen, and what was last told of it.
 struct Plain<W> {
@@ -155,7 +155,7 @@ impl<W: Write> Plain<W> {
             }
             SessionEvent::AlreadyOver(_) => {
                 *answer = Answer::Refused;
-                writeln!(out, "error: the episode is over; `back`, `reset` or `next`")?;
+                writeln!(out, "error: the wish is over; `instruct` tells the next one, or `back`, `reset`, `next`")?;
             }
             SessionEvent::State(now) => self.state = Some(now),
             SessionEvent::Decided(decision, words, values) => self.decided = Some((decision, words, values)),
@@ -184,8 +184,15 @@ impl<W: Write> Plain<W> {
                 self.compared = Some(contrast.sides[1].instruction.clone());
             }
             SessionEvent::Noted(what) => writeln!(out, "{what}")?,
-            // A step's own line says that the episode is over, and what is slow is waited for.
-            SessionEvent::Ended(_) | SessionEvent::Running(_) | SessionEvent::Busy(_) | SessionEvent::Working(_) => {}
+            SessionEvent::Read(wish) => reading(&wish, out)?,
+            SessionEvent::AgentDone(wish, likely) => {
+                let (done, of) = (wish.completed, wish.subtasks.len());
+                let grader = if of > 0 { format!("the grader: {done} of {of}") } else { "nobody grades it".into() };
+                writeln!(out, "the agent says that it is done ({likely:.2}); {grader}")?;
+            }
+            SessionEvent::Ended(wish) => verdict(&wish, out)?,
+            // What is slow is waited for.
+            SessionEvent::Running(_) | SessionEvent::Busy(_) | SessionEvent::Working(_) => {}
         }
         Ok(())
     }

@@ -38,6 +38,11 @@ impl<W: Write> Plain<W> {
             Verb::Look => look(&self.state()?, &mut self.out)?,
             Verb::Candidates => candidates(&self.state()?, &mut self.out)?,
             Verb::Branches => branches(&self.state()?.time, &mut self.out)?,
+            Verb::Wishes => {
+                for wish in &self.state()?.wishes {
+                    writeln!(self.out, "{}", serde_json::to_string(&**wish)?)?;
+                }
+            }
             Verb::Think => {
                 if let Some((decision, words, values)) = self.decision()? {
                     next(&decision, &words, values.as_ref(), &mut self.out)?;

@@ -5,12 +5,44 @@ use std::io::Write;
 use crate::agent::{ActionDistribution, Decision, Values};
 use crate::analysis::instruction_ab::Contrast;
 use crate::domain::{ActionType, Instance};
-use crate::episode::rollout::End;
+use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::choices::{Sort, choices as table};
 use crate::explore::exploration::{SessionSnapshot, StepTaken};
 use crate::explore::inspect;
 use crate::explore::inspect::state;
 use crate::explore::timeline::{BranchPosition, Divergence, Timeline};
+
+/// How what was told is understood, and what is open.
+pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
+    if !wish.understood.is_empty() {
+        let sure = wish.confidence.map_or(String::new(), |confidence| format!(" ({:.0} % sure)", 100.0 * confidence));
+        writeln!(out, "understood: {}{sure}", wish.understood)?;
+    }
+    if !wish.unread.is_empty() {
+        writeln!(out, "not understood: {}", wish.unread.join(" "))?;
+    }
+    match &wish.ungraded {
+        Some(why) => writeln!(out, "not graded: {why}; say `done` or `failed` when it is")?,
+        None => {
+            let expert = wish.expert_steps.map_or("sees no way".into(), |steps| format!("{steps} steps"));
+            let limit = wish.limit().map_or(String::new(), |limit| format!(", at most {limit}"));
+            writeln!(out, "graded: {} (expert: {expert}{limit})", wish.subtasks_in_words().join("; "))?;
+        }
+    }
+    for (number, words) in wish.alternatives() {
+        writeln!(out, "or meant {number}: {words}")?;
+    }
+    Ok(())
+}
+
+/// What a wish came to, in a line or two.
+pub(super) fn verdict(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
+    writeln!(out, "wish: {} | {}, {} steps", wish.instruction, wish.verdict_in_words(), wish.steps)?;
+    if let Some(advice) = &wish.advice {
+        writeln!(out, "why: {advice}")?;
+    }
+    Ok(())
+}
 
 /// Where the explorer is in what was tried.
 pub(super) fn at(position: &BranchPosition, out: &mut impl Write) -> anyhow::Result<()> {
@@ -72,8 +104,8 @@ pub(super) fn step_line(taken: &StepTaken, out: &mut impl Write) -> anyhow::Resu
         }
     }
     match taken.end {
-        Some(End::Success) => writeln!(out, " | success")?,
-        Some(End::Timeout) => writeln!(out, " | out of time")?,
+        Some(WishVerdict::Done) => writeln!(out, " | success")?,
+        Some(verdict) => writeln!(out, " | {}", verdict.words())?,
         None => writeln!(out)?,
     }
     Ok(())

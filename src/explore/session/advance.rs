@@ -18,6 +18,9 @@ impl Session {
 
     /// Takes the next step of the run that is under way.
     pub(crate) fn advance(&mut self) {
+        if matches!(self.run.mode, Some(RunMode::Policy | RunMode::Steps(_))) && self.agent_is_done() {
+            return;
+        }
         match self.run.mode {
             None => {}
             Some(RunMode::Policy) => self.step(),
@@ -57,13 +60,44 @@ impl Session {
         self.set_mode(can_run.then_some(mode));
     }
 
-    /// Whether the episode is over; says so if it is.
+    /// Whether the wish in force is over; says so if it is.
     pub(super) fn is_over(&self) -> bool {
-        let end = self.exploration.end();
-        if let Some(end) = end {
-            self.emit(SessionEvent::AlreadyOver(end));
+        let over = self.exploration.wish().filter(|wish| wish.verdict.is_some());
+        if let Some(wish) = over {
+            self.emit(SessionEvent::AlreadyOver(wish.clone()));
         }
-        end.is_some()
+        over.is_some()
+    }
+
+    /// Whether the run pauses here because the agent says that it is done. Whoever goes on from there is not held up again.
+    fn agent_is_done(&mut self) -> bool {
+        let here = (self.exploration.tree().branch(), self.exploration.tree().at());
+        // What fails here is told by the step.
+        let is_done = self.run.heard != Some(here) && self.exploration.comes_to_its_end().unwrap_or(false);
+        if is_done {
+            self.run.heard = Some(here);
+            self.set_mode(None);
+            let likely = self.exploration.decide().ok().and_then(|(decision, _)| decision.done);
+            if let (Some(wish), Some(likely)) = (self.exploration.wish().cloned(), likely) {
+                self.emit(SessionEvent::AgentDone(wish, likely));
+            }
+            if self.live {
+                self.show();
+            }
+        }
+        is_done
+    }
+
+    /// The wish in force is over: says so, with what the agent itself says of the state.
+    pub(super) fn ended(&mut self) {
+        self.exploration.ask_at_the_end();
+        if self.live {
+            self.show();
+        }
+        if let Some(wish) = self.exploration.wish() {
+            self.emit(SessionEvent::Ended(wish.clone()));
+        }
+        self.set_mode(None);
     }
 
     pub(super) fn step(&mut self) {
@@ -83,13 +117,7 @@ impl Session {
     pub(super) fn stepped(&mut self, taken: StepTaken) {
         self.emit(SessionEvent::Stepped(Box::new(taken)));
         match self.exploration.end() {
-            Some(end) => {
-                if self.live {
-                    self.show();
-                }
-                self.emit(SessionEvent::Ended(end));
-                self.set_mode(None);
-            }
+            Some(_) => self.ended(),
             None => self.changed(),
         }
     }
@@ -120,5 +148,87 @@ impl Session {
             self.set_mode(None);
             self.emit(SessionEvent::Stopped(why));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, channel};
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::agent::policy::each_alone;
+    use crate::agent::{Decision, Decisions, Observation, Policy};
+    use crate::domain::{Action, ActionType};
+    use crate::episode::wish::WishVerdict;
+    use crate::explore::session::SessionCommand;
+    use crate::explore::testing;
+
+    /// Turns around, and from a step on says that it is done.
+    struct Turning(u32);
+
+    impl Policy for Turning {
+        fn name(&self) -> &str {
+            "turning"
+        }
+
+        fn slots(&self) -> usize {
+            1
+        }
+
+        fn reset(&mut self, _slot: usize, _seed: u64) {}
+
+        fn act(&mut self, observations: &mut [Option<Observation<'_>>]) -> anyhow::Result<Decisions> {
+            each_alone(observations, |_, here| {
+                let done = Some(if here.step >= self.0 { 0.9 } else { 0.2 });
+                Ok(Decision { done, ..Decision::of(Action::navigate(ActionType::RotateLeft)) })
+            })
+        }
+    }
+
+    fn session(says_done_from: u32, told: &str) -> (Session, Receiver<SessionEvent>) {
+        let mut exploration = testing::exploration();
+        exploration.act_by(Box::new(Turning(says_done_from)));
+        exploration.instruct(told).unwrap();
+        let (tell, events) = channel();
+        let tell = Mutex::new(tell);
+        (Session::on_request(exploration, Arc::new(move |event| drop(tell.lock().unwrap().send(event)))), events)
+    }
+
+    fn run(session: &mut Session, steps: u32) {
+        session.apply(SessionCommand::Run { mode: RunMode::Steps(steps), until: None });
+        while session.interval().is_some() {
+            session.advance();
+        }
+    }
+
+    fn last_word(events: &Receiver<SessionEvent>) -> String {
+        let words = events.try_iter().filter_map(|event| match event {
+            SessionEvent::AgentDone(wish, likely) => Some(format!("agent {likely}: {}", wish.instruction)),
+            SessionEvent::Ended(wish) => Some(wish.verdict_in_words()),
+            _ => None,
+        });
+        words.last().unwrap_or_default()
+    }
+
+    #[test]
+    fn a_run_pauses_once_where_the_agent_says_that_it_is_done_and_a_person_has_the_last_word() {
+        let (mut session, events) = session(3, "dance");
+        run(&mut session, 10);
+        assert_eq!((session.exploration.tree().at(), last_word(&events).as_str()), (3, "agent 0.9: Dance."));
+        run(&mut session, 4);
+        assert_eq!((session.exploration.tree().at(), last_word(&events).as_str()), (7, ""));
+        session.apply(SessionCommand::Say { fulfilled: true });
+        assert_eq!(last_word(&events), "done, you say; the agent: done at step 3");
+        assert_eq!(session.exploration.end(), Some(WishVerdict::SaidDone));
+    }
+
+    #[test]
+    fn where_the_wish_fails_the_agents_own_word_stands_beside_the_verdict() {
+        let (mut session, events) = session(999, "pick up the mug");
+        run(&mut session, 999);
+        assert_eq!(session.exploration.end(), Some(WishVerdict::OutOfTime));
+        let said = last_word(&events);
+        assert!(said.starts_with("out of time (") && said.ends_with("; the agent: not done (0.20)"), "{said}");
     }
 }

@@ -29,9 +29,21 @@ impl Session {
                 }
             }
             SessionCommand::Instruct(text) => drop(self.instruct(&text)),
+            SessionCommand::Say { fulfilled } => {
+                self.set_mode(None);
+                match self.exploration.say(fulfilled) {
+                    Ok(_) => self.ended(),
+                    Err(error) => self.refuse(&error),
+                }
+            }
+            SessionCommand::Mean(wanted) => match self.exploration.mean(wanted) {
+                Ok(()) => self.told(),
+                Err(error) => self.refuse(&error),
+            },
             SessionCommand::Reset => {
                 self.exploration.reset();
                 self.set_mode(None);
+                self.emit_reading();
                 self.changed();
             }
             SessionCommand::Next => {
@@ -181,13 +193,24 @@ impl Session {
             Ok(note) => {
                 let new = self.exploration.instruction().to_string();
                 self.emit(SessionEvent::Instructed { old, new, note });
-                self.changed();
+                self.told();
                 true
             }
             Err(error) => {
                 self.refuse(&error);
                 false
             }
+        }
+    }
+
+    /// A wish came into force.
+    fn told(&mut self) {
+        self.run.heard = None;
+        self.emit_reading();
+        match self.exploration.end() {
+            // It holds already, or what was done before fulfils it as it is meant.
+            Some(_) => self.ended(),
+            None => self.changed(),
         }
     }
 

@@ -26,6 +26,13 @@ pub enum SessionCommand {
     Act(Action),
     /// Tell the agent something else.
     Instruct(String),
+    /// The wish in force is fulfilled, or it failed, a person says.
+    Say {
+        /// It is fulfilled.
+        fulfilled: bool,
+    },
+    /// The wish in force is meant as another of its readings: that of a number from 1, or the next.
+    Mean(Option<usize>),
     /// Back to the start, with the present instruction.
     Reset,
     /// The next house or task.

@@ -7,7 +7,7 @@ use crate::agent::registry::PolicyKind;
 use crate::agent::{Decision, Values};
 use crate::analysis::instruction_ab::Contrast;
 use crate::analysis::value_map::ValueMap;
-use crate::episode::rollout::End;
+use crate::episode::wish::Wish;
 use crate::explore::breakpoints::Condition;
 use crate::explore::chain_report::ChainReport;
 use crate::explore::exploration::{SessionSnapshot, StepTaken};
@@ -46,10 +46,14 @@ pub enum SessionEvent {
     Sampling(Option<u64>),
     /// Another place on the branches is in hand.
     At(BranchPosition),
-    /// The episode is over.
-    Ended(End),
-    /// Nothing was done, because the episode is over.
-    AlreadyOver(End),
+    /// How what was told is understood.
+    Read(Arc<Wish>),
+    /// The agent says that it is done; the grader does not, or there is none.
+    AgentDone(Arc<Wish>, f32),
+    /// The wish in force is over.
+    Ended(Arc<Wish>),
+    /// Nothing was done, because the wish in force is over.
+    AlreadyOver(Arc<Wish>),
     /// A condition stopped the run.
     Stopped(String),
     /// Where runs stop.

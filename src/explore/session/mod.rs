@@ -48,11 +48,19 @@ impl Session {
         if self.live {
             self.show();
         }
+        self.emit_reading();
         if self.exploration.has_policy() {
             self.emit(SessionEvent::Busy(None));
             self.changed_decision();
         } else {
             self.choose(self.exploration.policy());
+        }
+    }
+
+    /// Tells how the wish in force is understood, where a person told it.
+    fn emit_reading(&self) {
+        if let Some(wish) = self.exploration.wish().filter(|wish| wish.is_told()) {
+            self.emit(SessionEvent::Read(wish.clone()));
         }
     }
 

@@ -13,6 +13,8 @@ pub(super) struct Run {
     pub(super) breakpoints: Vec<Condition>,
     /// Where this run alone stops.
     pub(super) until: Option<Condition>,
+    /// The branch and step at which the agent was last heard to say that it is done.
+    pub(super) heard: Option<(usize, u32)>,
 }
 
 impl Run {

@@ -27,6 +27,11 @@ impl VerbLine<'_> {
         if self.rest.is_empty() { Ok(1) } else { self.number() }
     }
 
+    /// A number, where there is one.
+    pub(super) fn optional_count(&self) -> Result<Option<usize>, String> {
+        if self.rest.is_empty() { Ok(None) } else { Ok(Some(self.number()? as usize)) }
+    }
+
     /// A large number, which complaints call so.
     pub(super) fn seed(&self, called: &str) -> Result<u64, String> {
         self.rest.parse().map_err(|_| format!("{}: {:?} is not {called}", self.verb, self.rest))

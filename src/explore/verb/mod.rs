@@ -101,6 +101,8 @@ pub(crate) enum Verb {
     Think,
     /// Plain mode: the branches.
     Branches,
+    /// What was told, and what came of it.
+    Wishes,
 }
 
 /// A page in place of the panels.

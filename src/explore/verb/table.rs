@@ -30,9 +30,15 @@ pub(crate) const VERBS: &[VerbEntry] = &[
         key(Common, "tab", &["tab"], "more interactions", ""),
     ]),
     key_verb("edit", "type an instruction", |_| Ok(Verb::Edit), &[
-        key(Common, "i /", &["i", "/"], "tell the agent something", ""),
+        key(Common, "i / z", &["i", "/"], "tell it; z: other reading", ""),
     ]),
     verb("instruct", "TEXT", "tell the agent something else", |line| ask(Command::Instruct(line.text()?))).or(&["i"]),
+    verb("meant", "[N]", "the wish is meant as its reading N (the next one); it is graded anew",
+        |line| ask(Command::Mean(line.optional_count()?)))
+        .on(&[key(Common, "", &["z"], "the next reading", "")]),
+    verb("done", "", "the wish is fulfilled, you say", |_| ask(Command::Say { fulfilled: true })),
+    verb("failed", "", "the wish failed, you say", |_| ask(Command::Say { fulfilled: false })),
+    verb("wishes", "", "what was told, and what came of it", |_| Ok(Verb::Wishes)),
     verb("back", "[N]", "N steps back (1)", |line| Ok(Verb::Back(line.count()?)))
         .on(&[
             key(Common, "h l", &["h"], "a step back, forward", ""),

@@ -3,6 +3,7 @@
 mod class;
 mod grader;
 mod role_fit;
+mod standing;
 mod strict;
 mod words;
 

@@ -47,7 +47,7 @@ impl Comparison {
             let each: Vec<String> = run.completed_subtasks_by_folder.iter().map(|mean| format!("{mean:.2}")).collect();
             [
                 label(&run.run),
-                run.policy.clone(),
+                run.policy.clone() + run.end.in_words(),
                 run.episodes.to_string(),
                 run.errors.to_string(),
                 percent(run.success),

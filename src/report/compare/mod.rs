@@ -13,6 +13,7 @@ use super::stats;
 use super::stats::Interval;
 use super::summary::RunSummary;
 use crate::episode::record::Episode;
+use crate::episode::rollout::EndedBy;
 use crate::run_dir::reader::RecordedRun;
 
 /// Several runs of the same tasks, each further one compared with the first.
@@ -38,6 +39,9 @@ pub(crate) struct RunFigures {
     pub(crate) task_set: String,
     /// The name of the policy that acted.
     pub(crate) policy: String,
+    /// Whose word ended an episode before its time.
+    #[serde(default, skip_serializing_if = "EndedBy::is_grader")]
+    pub(crate) end: EndedBy,
     /// Episodes in the tasks' own words from their starts.
     pub(crate) episodes: usize,
     /// Episodes that ended with an error.
@@ -77,6 +81,7 @@ impl Comparison {
             run: run.path.display().to_string(),
             task_set: summary.task_set.clone(),
             policy: summary.policy.clone(),
+            end: summary.end,
             episodes: summary.episodes,
             errors: summary.errors,
             success: summary.success,

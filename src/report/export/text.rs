@@ -10,6 +10,9 @@ pub(crate) fn write(recording: &FrameSequence) -> String {
     for (number, subtask) in (1..).zip(&recording.subtasks) {
         let _ = writeln!(text, "subtask {number}: {subtask}");
     }
+    for wish in &recording.wishes {
+        let _ = writeln!(text, "wish {wish}");
+    }
     text.push('\n');
     let mut told = recording.told();
     for shot in &recording.shots[1.min(recording.shots.len())..] {

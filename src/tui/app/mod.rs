@@ -134,7 +134,7 @@ impl App {
             }
             ExplorerPage::Branches => {
                 self.branches.divergence.as_ref()?.frames.as_ref()?;
-                Some(layout.branches(self.rows(), self.terminal.graphics.cell_pixels).frames)
+                Some(layout.branches(self.rows(), self.wishes(), self.terminal.graphics.cell_pixels).frames)
             }
             ExplorerPage::Mind | ExplorerPage::World | ExplorerPage::Compare | ExplorerPage::Chain => None,
         }
@@ -151,6 +151,11 @@ impl App {
     pub(crate) fn pages(&self) -> usize {
         let size = self.layout().map_or(9, |layout| layout.interactions()).max(1);
         self.session.now.as_ref().map_or(0, |now| now.candidates.len().div_ceil(size))
+    }
+
+    /// How many wishes were told on the way to the present state.
+    pub(crate) fn wishes(&self) -> usize {
+        self.session.now.as_ref().map_or(0, |now| now.wishes.len())
     }
 
     /// How many rows the list of the present page has.

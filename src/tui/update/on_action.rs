@@ -39,7 +39,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             effects
         }
         Verb::Show(page) => show(app, page),
-        Verb::Branches => show(app, ExplorerPage::Branches),
+        Verb::Branches | Verb::Wishes => show(app, ExplorerPage::Branches),
         Verb::Think => show(app, ExplorerPage::Mind),
         Verb::Look | Verb::Candidates => show(app, ExplorerPage::World),
         Verb::Select(by) => select(app, by),

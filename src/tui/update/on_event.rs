@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::effect::Effect;
 use super::pages::turn_to;
-use crate::episode::rollout::End;
+use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::exploration::SessionSnapshot;
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::ExplorerPage;
@@ -88,14 +88,26 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
             app.session.replaced = (old != new).then_some(old);
             effects
         }
-        SessionEvent::Ended(end) | SessionEvent::AlreadyOver(end) => {
-            let task = app.session.now.as_ref().and_then(|now| now.progress.as_ref());
-            let (done, of) = task.map_or((0, 0), |task| (task.completed_at.len(), task.subtasks.len()));
-            match end {
-                End::Success => app.note(Tone::Good, format!("success: {done} of {of} subtasks; r resets, N goes on")),
-                End::Timeout => {
-                    app.note(Tone::Bad, format!("out of time: {done} of {of} subtasks; r resets, N goes on"));
-                }
+        SessionEvent::Read(wish) => {
+            for (tone, text) in reading(&wish) {
+                app.note(tone, text);
+            }
+            vec![]
+        }
+        SessionEvent::AgentDone(wish, likely) => {
+            let grader = match wish.subtasks.len() {
+                0 => "nobody grades it: :done or :failed".to_string(),
+                of => format!("the grader has {} of {of}", wish.completed),
+            };
+            app.note(Tone::Note, format!("the agent says done ({likely:.2}); {grader}"));
+            vec![]
+        }
+        SessionEvent::Ended(wish) | SessionEvent::AlreadyOver(wish) => {
+            let good = wish.verdict.is_some_and(WishVerdict::is_fulfilled);
+            let tone = if good { Tone::Good } else { Tone::Bad };
+            app.note(tone, format!("{}; i tells it the next thing", wish.verdict_in_words()));
+            if let Some(advice) = &wish.advice {
+                app.note(Tone::Note, advice.clone());
             }
             app.session.decision = None;
             vec![]
@@ -157,6 +169,20 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
             vec![]
         }
     }
+}
+
+/// How what was told is understood, in the log's lines.
+fn reading(wish: &Wish) -> Vec<(Tone, String)> {
+    let mut lines = Vec::new();
+    if !wish.understood.is_empty() {
+        lines.push((Tone::Note, format!("understood: {}", wish.understood)));
+    }
+    if let Some(why) = &wish.ungraded {
+        lines.push((Tone::Bad, format!("not graded: {why}")));
+    } else if !wish.unread.is_empty() {
+        lines.push((Tone::Bad, format!("not understood: {}", wish.unread.join(" "))));
+    }
+    lines
 }
 
 /// Steps after which nobody is a newcomer.

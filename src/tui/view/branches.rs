@@ -1,5 +1,7 @@
 //! The page of branches: the tree of what was tried, and how the selected branch and the one in hand part.
 
+use std::sync::Arc;
+
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -9,6 +11,7 @@ use unicode_width::UnicodeWidthStr;
 
 use super::panel::{fit, panel, put};
 use super::picture::picture;
+use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::timeline::{Divergence, Timeline};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -20,9 +23,10 @@ impl Widget for BranchesView<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         let (Some(now), Some(layout)) = (&app.session.now, app.layout()) else { return };
-        let parts = layout.branches(app.rows(), app.terminal.graphics.cell_pixels);
+        let parts = layout.branches(app.rows(), now.wishes.len(), app.terminal.graphics.cell_pixels);
         debug_assert_eq!(layout.page, area);
         self.list(&now.time, parts.list, buf);
+        wishes(&now.wishes, now.step, parts.wishes, buf);
         match &app.branches.divergence {
             Some(divergence) if divergence.names[0] != divergence.names[1] => {
                 let right = format!("the same until step {}", divergence.shared);
@@ -84,6 +88,30 @@ impl BranchesView<'_> {
             put(buf, head, 0, format!("{name}{step}"), THEME.quiet);
         }
         picture(self.0, area, buf);
+    }
+}
+
+/// What was told on the way to the present state, a wish a row, the newest in sight.
+fn wishes(wishes: &[Arc<Wish>], now: u32, area: Rect, buf: &mut Buffer) {
+    let fulfilled = wishes.iter().filter(|wish| wish.verdict.is_some_and(WishVerdict::is_fulfilled)).count();
+    let inner = panel(buf, area, "Wishes", &format!("{fulfilled} of {} fulfilled", wishes.len()));
+    let first = wishes.len().saturating_sub(usize::from(inner.height));
+    for (row, (at, wish)) in (0..inner.height).zip(wishes.iter().enumerate().skip(first)) {
+        let next = wishes.get(at + 1);
+        let over = match (wish.verdict, next) {
+            (Some(_), _) => wish.began + wish.steps,
+            (None, Some(next)) => next.began,
+            (None, None) => now,
+        };
+        let (verdict, style) = match wish.verdict {
+            Some(verdict) if verdict.is_fulfilled() => (verdict.words(), THEME.good),
+            Some(verdict) => (verdict.words(), THEME.bad),
+            None if next.is_some() => ("left", THEME.quiet),
+            None => ("in force", THEME.key),
+        };
+        let steps = format!("{}-{over}", wish.began);
+        let text = format!("  {:>2} steps {steps:<8} {verdict:<16} {}", at + 1, wish.instruction);
+        put(buf, inner, row, text, style);
     }
 }
 

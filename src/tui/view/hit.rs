@@ -25,7 +25,9 @@ pub(crate) fn target_at(app: &App, at: Position) -> Option<Target> {
             let [plan, list] = world::parts(layout.page);
             if plan.contains(at) { map::under(app, plan, at) } else { row(app, list, at) }
         }
-        ExplorerPage::Branches => row(app, layout.branches(app.rows(), app.terminal.graphics.cell_pixels).list, at),
+        ExplorerPage::Branches => {
+            row(app, layout.branches(app.rows(), app.wishes(), app.terminal.graphics.cell_pixels).list, at)
+        }
         ExplorerPage::Mind | ExplorerPage::Compare | ExplorerPage::Chain => None,
     }
 }

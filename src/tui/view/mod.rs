@@ -10,6 +10,7 @@ mod help;
 mod instruction;
 mod log;
 mod map;
+mod meaning;
 mod mind;
 mod palette;
 mod panel;
@@ -63,6 +64,7 @@ impl Widget for &App {
         }
         timeline::TimelineRow(self).render(layout.time, buf);
         instruction::InstructionRow(self).render(layout.instruction, buf);
+        meaning::MeaningRow(self).render(layout.meaning, buf);
         status::StatusRow(self).render(layout.status, buf);
         match self.input.mode {
             Mode::Help => help::HelpOverlay(self).render(area, buf),

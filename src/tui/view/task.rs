@@ -6,7 +6,7 @@ use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
 use super::panel::{panel, put, wrap};
-use crate::episode::rollout::End;
+use crate::episode::wish::{WishGrading, WishVerdict};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -20,22 +20,32 @@ impl Widget for TaskPanel<'_> {
             return;
         };
         let width = usize::from(area.width);
+        let wish = now.wishes.last();
+        let is_task = wish.is_none_or(|wish| wish.grading == WishGrading::Task);
+        let title = if is_task { "Task" } else { "Wish" };
+        let verdict = now.end.map(WishVerdict::words);
         let Some(progress) = &now.progress else {
-            let inner = panel(buf, area, "Task", "none");
-            let text = "Your own instruction: nobody grades it. Type the task's words (up arrow) and reset to be graded again.";
-            for (row, line) in (0..).zip(wrap(text, width, "")) {
+            let inner = panel(buf, area, title, verdict.unwrap_or("not graded"));
+            let why = wish.and_then(|wish| wish.ungraded.as_deref()).unwrap_or_default();
+            let text = match verdict {
+                Some(_) => "i tells it the next thing, from here on".to_string(),
+                None => format!("{why}. It goes on until you say :done or :failed."),
+            };
+            for (row, line) in (0..).zip(wrap(&text, width, "")) {
                 put(buf, inner, row, line, THEME.quiet);
             }
             return;
         };
         let done = progress.completed_at.len();
-        let right = match now.end {
-            Some(End::Success) => "success".to_string(),
-            Some(End::Timeout) => format!("out of time, {done} of {}", progress.subtasks.len()),
-            None => format!("{done} of {} done", progress.subtasks.len()),
+        let of = progress.subtasks.len();
+        let right = match (verdict, wish.and_then(|wish| wish.expert_steps).filter(|_| !is_task)) {
+            (Some(verdict), _) => format!("{verdict}, {done} of {of}"),
+            (None, Some(expert)) => format!("{done} of {of} · expert {expert}"),
+            (None, None) => format!("{done} of {of} done"),
         };
-        let inner = panel(buf, area, "Task", &right);
+        let inner = panel(buf, area, title, &right);
         let mut lines: Vec<(String, Style)> = Vec::new();
+        let advice = wish.and_then(|wish| wish.advice.as_deref());
         for (at, subtask) in progress.subtasks.iter().enumerate() {
             let (mark, style) = match at.cmp(&done) {
                 std::cmp::Ordering::Less => ("[x]", THEME.good),
@@ -45,9 +55,12 @@ impl Widget for TaskPanel<'_> {
             let when = progress.completed_at.get(at).map_or(String::new(), |step| format!(" (step {step})"));
             let text = format!("{mark} {subtask}{when}");
             lines.extend(wrap(&text, width, "    ").into_iter().map(|line| (line, style)));
-            if at == done && !progress.waits_for.is_empty() {
-                let waits = format!("    {}", progress.waits_for);
-                lines.extend(wrap(&waits, width - 4, "  ").into_iter().map(|line| (format!("    {line}"), THEME.note)));
+            let (next, style) = match advice {
+                Some(advice) => (advice, THEME.bad),
+                None => (progress.waits_for.as_str(), THEME.note),
+            };
+            if at == done && !next.is_empty() {
+                lines.extend(wrap(next, width - 4, "  ").into_iter().map(|line| (format!("    {line}"), style)));
             }
         }
         // Done subtasks scroll away first: the current one must be in sight.

@@ -80,6 +80,33 @@ fn another_instruction_ends_the_task_and_the_expert_says_so() {
 }
 
 #[test]
+fn a_wish_is_shown_from_how_it_is_understood_to_what_came_of_it() {
+    let shown = |name: &str, exploration: &mut Exploration| {
+        let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        update(&mut app, Msg::Session(SessionEvent::State(Box::new(snapshot(exploration)))));
+        check(&format!("wish-{name}-80x24"), &screen(&mut app));
+        app
+    };
+    let mut exploration = exploration();
+    exploration.choose(PolicyKind::Expert).unwrap();
+    exploration.instruct("pick up the mug").unwrap();
+    shown("read", &mut exploration);
+    while exploration.end().is_none() {
+        exploration.step().unwrap();
+    }
+    shown("done", &mut exploration);
+    exploration.instruct("grab a knife").unwrap();
+    shown("ambiguous", &mut exploration);
+    exploration.act(Action::navigate(ActionType::LookUp)).unwrap();
+    exploration.say(false).unwrap();
+    shown("failed", &mut exploration);
+    exploration.instruct("pick up the baseball bat").unwrap();
+    let mut app = shown("refused", &mut exploration);
+    on_action(&mut app, Verb::Show(ExplorerPage::Branches));
+    check("wish-list-80x24", &screen(&mut app));
+}
+
+#[test]
 fn help_names_every_key() {
     for (width, height) in SIZES {
         let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);

@@ -1,0 +1,82 @@
+//! Under the instruction: how it is understood, what else it may mean, and what came of it.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
+
+use super::panel::fit;
+use crate::episode::wish::{Wish, WishGrading};
+use crate::language::reader::CERTAIN;
+use crate::tui::app::App;
+use crate::tui::theme::THEME;
+
+/// The line under the instruction.
+pub(crate) struct MeaningRow<'a>(pub(crate) &'a App);
+
+impl Widget for MeaningRow<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        let Some(wish) = self.0.session.now.as_ref().and_then(|now| now.wishes.last()) else { return };
+        let width = usize::from(area.width);
+        let mut spans: Vec<Span<'_>> = Vec::new();
+        let mut used = 0;
+        for (text, style) in parts(wish) {
+            let text = fit(&text, width.saturating_sub(used));
+            used += text.width();
+            spans.push(Span::styled(text, style));
+        }
+        Line::from(spans).render(area, buf);
+    }
+}
+
+/// The line in pieces, what matters most first.
+fn parts(wish: &Wish) -> Vec<(String, Style)> {
+    if let Some(verdict) = wish.verdict {
+        let style = if verdict.is_fulfilled() { THEME.good } else { THEME.bad };
+        let agent = wish.agent_in_words().map_or(String::new(), |words| format!("; {words}"));
+        let next = match &wish.advice {
+            Some(advice) => format!(": {advice}"),
+            None => format!(", after {}; i: the next wish", steps(wish.steps)),
+        };
+        return vec![(format!("  {}", verdict.words()), style), (agent, THEME.note), (next, THEME.quiet)];
+    }
+    if wish.grading == WishGrading::Task {
+        return vec![("  the task's own words".into(), THEME.quiet)];
+    }
+    if let Some(agent) = wish.agent_in_words() {
+        let grader = match wish.subtasks.len() {
+            0 => "; nobody grades it".to_string(),
+            of => format!("; the grader: {} of {of}", wish.completed),
+        };
+        let next = "; space goes on, :done or :failed ends it";
+        return vec![(format!("  {agent}"), THEME.note), (grader, THEME.key), (next.into(), THEME.quiet)];
+    }
+    if let Some(why) = &wish.ungraded {
+        let judge = if wish.is_told() { "; :done or :failed when it is" } else { ": i tells it something" };
+        let style = if wish.is_told() { THEME.bad } else { THEME.quiet };
+        let head = if wish.is_told() { "  not graded: " } else { "  " };
+        return vec![(format!("{head}{why}"), style), (judge.into(), THEME.quiet)];
+    }
+    let sure = wish.confidence.filter(|&confidence| confidence < CERTAIN && wish.picked == 0);
+    let sure = sure.map_or(String::new(), |confidence| format!(" ({:.0} % sure)", 100.0 * confidence));
+    let head = format!("  understood{sure}: ");
+    let mut parts = vec![(head, THEME.quiet), (wish.understood.clone(), THEME.note)];
+    if !wish.unread.is_empty() {
+        parts.push((format!("  not understood: {}", wish.unread.join(" ")), THEME.bad));
+    }
+    let others: Vec<String> =
+        wish.alternatives().into_iter().map(|(number, words)| format!("{number} {words}")).collect();
+    if !others.is_empty() {
+        parts.push((format!("  or z: {}", others.join(", ")), THEME.key));
+    }
+    if wish.expert_steps.is_none() {
+        parts.push(("  the expert sees no way".into(), THEME.bad));
+    }
+    parts
+}
+
+fn steps(many: u32) -> String {
+    if many == 1 { "1 step".into() } else { format!("{many} steps") }
+}
