@@ -54,7 +54,7 @@ fn a_wish_is_read_and_fulfilled_the_next_goes_on_from_there_and_both_are_kept() 
     session.see("[x] pick up the potato");
     session.press("t");
     session.see("2 of 2 fulfilled");
-    session.see("1 steps 0-19");
+    session.see("1. steps 0-19");
     session.press("\x1b");
     session.see("In reach");
     session.press(&format!(":save {}\r", kept.display()));

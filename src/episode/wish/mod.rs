@@ -52,6 +52,15 @@ impl WishVerdict {
         matches!(self, WishVerdict::Done | WishVerdict::SaidDone)
     }
 
+    /// In a word, whoever says so.
+    pub(crate) fn short(self) -> &'static str {
+        match self {
+            WishVerdict::Done | WishVerdict::SaidDone => "done",
+            WishVerdict::OutOfTime => "out of time",
+            WishVerdict::SaidFailed => "failed",
+        }
+    }
+
     /// In words.
     pub(crate) fn words(self) -> &'static str {
         match self {

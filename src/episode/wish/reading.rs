@@ -23,10 +23,8 @@ pub(crate) enum Expect {
 
 /// Below this confidence a reading is a guess, by which nothing is graded.
 const LEAST: f32 = 0.3;
-/// How likely another class must be to be offered.
+/// How likely another reading must be to be offered.
 const OFFERED: f32 = 0.03;
-/// The most readings that are offered beside the best.
-const MOST: usize = 3;
 /// The most steps that the expert is given.
 const EXPERT: usize = 1000;
 
@@ -48,13 +46,16 @@ pub(crate) fn read<'a>(
         Ok(reader) => reader,
         Err(error) => return Wish::ungraded(text, began, &error.to_string()),
     };
+    // The capital that instructions begin with is not the person's.
+    let said = text.to_lowercase();
     let house = classes_of(scene, world);
     let before = before(reader, earlier, &house, world);
-    let best = reader.read(text, &Context { before: &before, house: Some(&house) });
-    let best = with_the_held(reader, text, &house, world, &best).unwrap_or(best);
-    let best = elsewhere(reader, text, &before, &house, &best).unwrap_or(best);
+    let best = reader.read(&said, &Context { before: &before, house: Some(&house) });
+    let best = with_the_held(reader, &said, &house, world, &best).unwrap_or(best);
+    let best = elsewhere(reader, &said, &before, &house, &best).unwrap_or(best);
     let mut readings = vec![best];
-    readings.extend(others(&readings[0]));
+    let others = readings[0].alternatives().into_iter().filter(|other| other.confidence >= OFFERED);
+    readings.extend(others.collect::<Vec<_>>());
     of_reading(text, began, readings, 0, scene, world)
 }
 
@@ -190,23 +191,6 @@ fn elsewhere(
     }
     reading.absent = absent.into_iter().collect();
     Some(reading)
-}
-
-/// The readings with one class in another's place that are likely enough to be offered, the likeliest first.
-fn others(reading: &WishReading) -> Vec<WishReading> {
-    let all = reading.subtasks.iter().enumerate();
-    let mut all: Vec<_> =
-        all.flat_map(|(at, subtask)| subtask.alternatives.iter().map(move |&other| (at, other))).collect();
-    all.retain(|(_, other)| other.probability >= OFFERED);
-    all.sort_by(|a, b| b.1.probability.total_cmp(&a.1.probability));
-    let mut found: Vec<WishReading> = Vec::new();
-    for (at, other) in all {
-        let other = reading.with(at, other);
-        if found.len() < MOST && other != *reading && !found.iter().any(|known| known.words() == other.words()) {
-            found.push(other);
-        }
-    }
-    found
 }
 
 /// What another reading means otherwise, in a word or two: "butter knife".

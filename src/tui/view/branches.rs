@@ -110,7 +110,7 @@ fn wishes(wishes: &[Arc<Wish>], now: u32, area: Rect, buf: &mut Buffer) {
             None => ("in force", THEME.key),
         };
         let steps = format!("{}-{over}", wish.began);
-        let text = format!("  {:>2} steps {steps:<8} {verdict:<16} {}", at + 1, wish.instruction);
+        let text = format!("  {:>2}. steps {steps:<8} {verdict:<16} {}", at + 1, wish.instruction);
         put(buf, inner, row, text, style);
     }
 }

@@ -23,7 +23,7 @@ impl Widget for TaskPanel<'_> {
         let wish = now.wishes.last();
         let is_task = wish.is_none_or(|wish| wish.grading == WishGrading::Task);
         let title = if is_task { "Task" } else { "Wish" };
-        let verdict = now.end.map(WishVerdict::words);
+        let verdict = now.end.map(WishVerdict::short);
         let Some(progress) = &now.progress else {
             let inner = panel(buf, area, title, verdict.unwrap_or("not graded"));
             let why = wish.and_then(|wish| wish.ungraded.as_deref()).unwrap_or_default();
