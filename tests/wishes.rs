@@ -58,7 +58,7 @@ fn a_wish_is_read_and_fulfilled_the_next_goes_on_from_there_and_both_are_kept() 
     session.press("\x1b");
     session.see("In reach");
     session.press(&format!(":save {}\r", kept.display()));
-    session.see("wrote the branch");
+    session.see("sprint open shows it");
     session.press("q");
     assert_eq!(session.end(), 0);
 

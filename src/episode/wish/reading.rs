@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{Wish, WishGrading};
+use super::record::{Wish, WishGrading};
 use crate::domain::skill::SkillKind;
 use crate::domain::{Class, Scene, World};
 use crate::house::House;
@@ -191,24 +191,6 @@ fn elsewhere(
     }
     reading.absent = absent.into_iter().collect();
     Some(reading)
-}
-
-/// What another reading means otherwise, in a word or two: "butter knife".
-pub(super) fn difference(own: &WishReading, other: &WishReading) -> String {
-    let classes = |reading: &WishReading| -> Vec<Option<Class>> {
-        reading.subtasks.iter().flat_map(|subtask| [subtask.object, subtask.receptacle]).collect()
-    };
-    let (own, others) = (classes(own), classes(other));
-    if own.len() != others.len() {
-        return other.words();
-    }
-    let mut names: Vec<&str> = Vec::new();
-    for class in own.iter().zip(&others).filter(|(a, b)| a != b).filter_map(|(_, class)| *class) {
-        if !names.contains(&class.spoken()) {
-            names.push(class.spoken());
-        }
-    }
-    names.join(", ")
 }
 
 #[cfg(test)]
