@@ -71,10 +71,16 @@ impl Percept {
     }
 }
 
-/// Whether a cell shows what is in the hand.
-pub(crate) fn in_hand(cell: u16, depth: &[f32]) -> bool {
-    let (column, row) = Percept::middle(cell);
-    depth.get(usize::from(cell)).is_some_and(|&depth| super::eye::is_in_hand(column, row, depth))
+/// Whether something is in the hand: where that is drawn, something is nearer than the house comes.
+pub(crate) fn fills_hand(frame: &Frame) -> bool {
+    /// As few pixels of a 300 x 300 frame are something.
+    const FEWEST: usize = 12;
+    let scale = 300.0 / frame.width.max(1) as f32;
+    let shows = |&(at, &depth): &(usize, &f32)| {
+        let (row, column) = (at / frame.width, at % frame.width);
+        super::eye::is_in_hand((column as f32 + 0.5) * scale, (row as f32 + 0.5) * scale, depth)
+    };
+    frame.depth.iter().enumerate().filter(shows).count() >= FEWEST
 }
 
 /// The median depth of each cell of a frame.
@@ -108,6 +114,36 @@ mod tests {
         }
         assert_eq!(Percept::cell_at(300.0, 10.0), None);
         assert_eq!(Percept::cell_at(10.0, -0.1), None);
+    }
+
+    #[test]
+    fn a_full_hand_is_told_from_an_empty_one_wherever_one_stands() {
+        use crate::domain::{
+            Room,
+            world::{Object, Parent},
+        };
+        use crate::house::{generate, render::Renderer};
+        let mut renderer = Renderer::new(300);
+        for (seed, room) in (0..).zip(Room::ALL) {
+            let (scene, mut world) = generate::house(room, seed);
+            let (mut wrong, mut looks) = (0, 0);
+            for &cell in scene.cells.iter().step_by(7) {
+                world.agent.cell = cell;
+                wrong += usize::from(fills_hand(renderer.draw(&scene, &world)));
+                looks += 1;
+            }
+            assert!(wrong * 20 <= looks, "{room:?}: {wrong} of {looks} empty hands look full");
+            world.objects = Class::all()
+                .filter(|class| class.info().pickupable)
+                .take(30)
+                .map(|class| Object { class, ..Object::default() })
+                .collect();
+            for index in 0..world.objects.len() {
+                (world.held, world.objects[index].parent) = (Some(index as u16), Parent::Hand);
+                assert!(fills_hand(renderer.draw(&scene, &world)), "{}", world.objects[index].class);
+                world.objects[index].parent = Parent::Floor;
+            }
+        }
     }
 
     #[test]

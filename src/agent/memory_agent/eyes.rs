@@ -1,12 +1,10 @@
 //! What the agent sees with: a trained detector, or for an ablation what the simulator knows to be in view.
 
-use std::collections::BTreeMap;
-
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use tch::Device;
 
-use crate::agent::memory::percept::{GRID, Percept, in_hand, median_depths};
+use crate::agent::memory::percept::{GRID, Percept, fills_hand, median_depths};
 use crate::domain::{Class, Scene, World};
 use crate::env::Environment;
 use crate::house::view::Frame;
@@ -30,10 +28,10 @@ pub(crate) enum Eyes {
     Simulator,
 }
 
-/// A frame as it was seen, and what was seen in the hand.
+/// A frame as it was seen, and whether something was seen in the hand.
 pub(crate) struct Seen {
     pub(crate) percept: Percept,
-    pub(crate) held: Option<Class>,
+    pub(crate) hand_full: bool,
 }
 
 impl Eyes {
@@ -83,23 +81,10 @@ fn detected(detector: &FrozenDetector, frame: &Frame) -> Seen {
         detections.extend(probable.map(|(place, &probability)| (class, place as u16, probability)));
     }
     let open = said.chunks_exact(GRID * GRID).last().map(<[f32]>::to_vec).unwrap_or_default();
-    seen(Percept { detections, open, depth })
-}
-
-/// What was seen in the hand is the class that is surest there.
-fn seen(percept: Percept) -> Seen {
-    let mut votes: BTreeMap<Class, f32> = BTreeMap::new();
-    for &(class, place, probability) in &percept.detections {
-        if class.info().pickupable && in_hand(place, &percept.depth) && probability >= 0.5 {
-            *votes.entry(class).or_default() += probability;
-        }
-    }
-    let held = votes.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(class, _)| class);
-    Seen { percept, held }
+    Seen { percept: Percept { detections, open, depth }, hand_full: fills_hand(frame) }
 }
 
 /// What eyes without fault would make of a frame that was drawn of `world`.
 fn true_sight(scene: &Scene, world: &World, frame: &Frame) -> Seen {
-    let held = world.held.and_then(|index| world.object(index)).map(|object| object.class);
-    Seen { percept: Percept::of_truth(scene, world, frame), held: held.filter(|class| class.in_vocabulary()) }
+    Seen { percept: Percept::of_truth(scene, world, frame), hand_full: world.held.is_some() }
 }

@@ -58,8 +58,9 @@ impl Mind {
             }
         }
         if first {
-            self.progress.held = moment.seen.held;
+            self.progress.held = moment.seen.hand_full.then_some(Class::NONE);
         }
+        self.progress.name_what_is_held();
         self.memory.observe(Glance {
             pose: moment.pose,
             blocked: attempt.is_some_and(|it| it.kind == ActionType::MoveAhead) && moment.pose == before,

@@ -1,7 +1,7 @@
 //! How far the agent believes to be: the subtask it is at, what it holds, and what it has done for it.
 
 use super::goal::Goal;
-use crate::domain::{ActionType, Cell, Class};
+use crate::domain::{ActionType, Cell, Class, SkillKind};
 
 /// An interaction that changed what is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub(crate) struct Progress {
     pub(crate) goals: Vec<Goal>,
     /// At which of them it is; the number of goals when all are done.
     pub(crate) at: usize,
-    /// What it holds.
+    /// What it holds; no class for something that it did not pick up itself.
     pub(crate) held: Option<Class>,
     /// What it has done for the present goal, oldest first.
     pub(crate) done: Vec<Interaction>,
@@ -46,6 +46,17 @@ impl Progress {
     pub(crate) fn set_goals(&mut self, goals: Vec<Goal>) {
         (self.goals, self.at, self.steps, self.turns) = (goals, 0, 0, 0);
         self.done.clear();
+    }
+
+    /// What was in the hand from the start is what somebody means who says to put or to wash something.
+    pub(crate) fn name_what_is_held(&mut self) {
+        let meant = self
+            .goals
+            .first()
+            .filter(|goal| !matches!(goal.skill, SkillKind::Pickup | SkillKind::Slice | SkillKind::Toggle));
+        if let (Some(Class::NONE), Some(goal)) = (self.held, meant) {
+            self.held = Some(goal.object);
+        }
     }
 
     /// The present goal; the last one when all are done.
@@ -91,7 +102,18 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::SkillKind;
+    #[test]
+    fn what_is_in_the_hand_from_the_start_is_what_is_to_be_put_but_not_what_is_to_be_picked_up() {
+        let mug = Class::named("Mug").unwrap();
+        let held = |skill| {
+            let goal = Goal { skill, object: mug, others: Vec::new(), receptacle: None, place: None, slice: false };
+            let mut progress = Progress { goals: vec![goal], held: Some(Class::NONE), ..Progress::default() };
+            progress.name_what_is_held();
+            progress.held
+        };
+        assert_eq!(held(SkillKind::Put), Some(mug));
+        assert_eq!(held(SkillKind::Pickup), Some(Class::NONE));
+    }
 
     #[test]
     fn what_worked_changes_hand_and_doors_and_what_did_not_changes_nothing() {
