@@ -14,6 +14,7 @@ mod fuzz;
 mod command_line;
 mod generated;
 mod properties;
+mod reading;
 mod program;
 mod evaluator;
 mod faults;

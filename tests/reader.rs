@@ -13,8 +13,42 @@ use crate::domain::task::SceneRef;
 use crate::domain::{Class, SkillKind, Subtask, Trajectory};
 use crate::house::grading::{Grader, Grading};
 use crate::language::nouns::names;
-use crate::language::reader::{CERTAIN, Context, ReadSubtask, Reader, Step, WishReading, canonical};
+use crate::language::reader::{Alternative, CERTAIN, Context, ReadSubtask, Reader, WishReading, lying};
 use proptest::prelude::*;
+
+/// A skill with its object and receptacle.
+type Step = (SkillKind, Option<Class>, Option<Class>);
+
+/// The form in which readings are compared, that of what the steps come to: without the pickups that another step of the same
+/// thing implies, without the knife where something is sliced and without a put before the slicing of the same thing; a thing
+/// goes into another before that is put somewhere, is in the hand before the lamp goes on, and is sliced once.
+fn canonical(steps: &[Step]) -> Vec<Step> {
+    let cuts = steps.iter().any(|step| step.0 == SkillKind::Slice);
+    let is_knife = |step: &Step| step.1.is_some_and(Class::is_knife);
+    let follows = |at: usize, kind: SkillKind, thing: Option<Class>| {
+        steps[at + 1..].iter().any(|other| other.0 == kind && other.1 == thing)
+    };
+    let mut kept: Vec<Step> = Vec::new();
+    for (at, step) in steps.iter().enumerate() {
+        let implied = step.0 == SkillKind::Pickup
+            && steps.iter().any(|other| !matches!(other.0, SkillKind::Pickup | SkillKind::Slice) && other.1 == step.1);
+        let knife = cuts && is_knife(step) && steps.len() > 1;
+        let aside = step.0 == SkillKind::Put && follows(at, SkillKind::Slice, step.1);
+        let again = step.0 == SkillKind::Slice && kept.contains(step);
+        if !(implied || knife || aside || again) {
+            kept.push(*step);
+        }
+    }
+    for at in 1..kept.len() {
+        let (first, second) = (kept[at - 1], kept[at]);
+        let stacked =
+            first.0 == SkillKind::Put && second.0 == SkillKind::Put && second.2 == first.1 && first.1 != second.1;
+        if stacked || first.0 == SkillKind::Toggle && second.0 == SkillKind::Pickup {
+            kept.swap(at - 1, at);
+        }
+    }
+    kept
+}
 
 fn reader() -> &'static Reader {
     Reader::shipped().unwrap()
@@ -35,18 +69,109 @@ fn parse(expected: &str) -> Vec<Step> {
     canonical(&all.collect::<Vec<_>>())
 }
 
+/// What a sentence says besides its steps, as the third column has it: "looks red; place Desk; slice".
+fn besides(reading: &WishReading) -> String {
+    let mut all: Vec<String> = Vec::new();
+    for subtask in &reading.subtasks {
+        all.extend((!subtask.looks.is_empty()).then(|| format!("looks {}", subtask.looks.join(" "))));
+        all.extend(subtask.place.map(|place| format!("place {}", place.name())));
+        all.extend(subtask.slice.then(|| "slice".to_string()));
+    }
+    if !reading.unread.is_empty() {
+        all.push(format!("unread {}", reading.unread.join(" ")));
+    }
+    all.dedup();
+    all.join("; ")
+}
+
 #[test]
 fn nineteen_in_twenty_of_peoples_sentences_are_read_exactly() {
-    let rows: Vec<(&str, &str)> =
-        include_str!("reader_sentences.tsv").lines().map(|line| line.split_once('\t').unwrap()).collect();
+    let rows: Vec<Vec<&str>> =
+        include_str!("reader_sentences.tsv").lines().map(|line| line.split('\t').collect()).collect();
     assert!(rows.len() >= 300);
-    let read = |text: &str| steps(&reader().read(text, &Context::default()).subtasks);
-    let missed: Vec<String> = rows
-        .iter()
-        .filter(|(text, expected)| read(text) != parse(expected))
-        .map(|(text, expected)| format!("{text}: {expected}, read as {:?}", read(text)))
-        .collect();
+    let mut missed = Vec::new();
+    for row in &rows {
+        let reading = reader().read(row[0], &Context::default());
+        let right = steps(&reading.subtasks) == parse(row[1]);
+        if !right {
+            missed.push(format!("{}: {}, read as {}", row[0], row[1], reading.words()));
+        }
+        assert!(right || reading.confidence < CERTAIN, "certain and wrong: {reading:?}");
+    }
     assert!(missed.len() * 20 <= rows.len(), "{} of {}:\n{}", missed.len(), rows.len(), missed.join("\n"));
+}
+
+#[test]
+fn looks_places_slices_and_what_is_left_out_are_read_as_written() {
+    let rows = include_str!("reader_sentences.tsv").lines().filter_map(|line| {
+        let mut columns = line.split('\t');
+        Some((columns.next()?, columns.nth(1)?))
+    });
+    let (mut asked, mut missed) = (0, Vec::new());
+    for (text, expected) in rows {
+        asked += 1;
+        let said = besides(&reader().read(text, &Context::default()));
+        if said != expected {
+            missed.push(format!("{text}: {expected}, read as {said}"));
+        }
+    }
+    assert!(asked >= 60, "{asked}");
+    assert!(missed.len() * 20 <= asked, "{} of {asked}:\n{}", missed.len(), missed.join("\n"));
+}
+
+#[test]
+fn what_lies_where_the_text_says_is_meant() {
+    let class = |name: &str| Class::named(name).unwrap();
+    let read = |lies: &[(Class, Class)]| {
+        reader().read("take the knife from the counter", &Context { lies, ..Context::default() }).subtasks[0].object
+    };
+    for knife in ["Knife", "ButterKnife"] {
+        assert_eq!(read(&[(class(knife), class("CounterTop"))]), Some(class(knife)));
+    }
+}
+
+#[test]
+fn a_text_that_is_too_long_is_never_certain_and_its_end_is_unread() {
+    let text = format!("take the mug{} and slice the apple", ", please".repeat(300));
+    let reading = reader().read(&text, &Context::default());
+    assert_eq!((reading.confidence, reading.unread.last().map(String::as_str)), (0.0, Some("apple")));
+}
+
+#[test]
+fn a_thing_never_goes_into_itself() {
+    for text in
+        ["put the mug in the mug", "put the bowl in the bowl and put the bowl in the bowl", "put the box in the box"]
+    {
+        let reading = reader().read(text, &Context::default());
+        assert!(reading.subtasks.iter().all(|one| one.object.is_none() || one.object != one.receptacle), "{reading:?}");
+        assert!(reading.confidence < 0.5, "{reading:?}");
+    }
+}
+
+#[test]
+fn other_readings_differ_in_one_thing_and_are_less_likely() {
+    let reading = reader().read("put the knife in the mug and put the mug on the table", &Context::default());
+    let others = reading.alternatives();
+    assert!((1..=3).contains(&others.len()));
+    for other in &others {
+        assert!(other.confidence <= 1.0 - reading.confidence);
+        assert_ne!(steps(&other.subtasks), steps(&reading.subtasks));
+    }
+    assert!(others.windows(2).all(|two| steps(&two[0].subtasks) != steps(&two[1].subtasks)));
+}
+
+#[test]
+fn another_object_leaves_the_receptacles_alone_unless_it_is_carried() {
+    let class = |name: &str| Class::named(name).unwrap();
+    let object = |name: &str| Alternative { is_receptacle: false, class: class(name), probability: 0.1 };
+    let stack = reader().read("put the fork in the mug and put the mug in the sink", &Context::default());
+    assert_eq!(stack.words(), "put a fork in the mug, put a mug in the sink");
+    let words = |reading: &WishReading| reading.words();
+    assert_eq!(words(&stack.with(1, object("Cup"))), "put a fork in the cup, put a cup in the sink");
+    let mut open = stack.clone();
+    open.subtasks[1].receptacle = None;
+    let sink = Alternative { is_receptacle: true, class: class("Sink"), probability: 0.1 };
+    assert_eq!(steps(&open.with(1, sink).subtasks), steps(&open.subtasks), "what was left open is no other's place");
 }
 
 #[test]
@@ -171,9 +296,11 @@ fn what_annotators_wrote_is_read_as_measured() {
         let fixtures = dataset.scene(scene).unwrap();
         let things = trajectory.start.objects.iter().map(|object| object.class);
         let house: BTreeSet<Class> = fixtures.fixtures.iter().map(|fixture| fixture.class).chain(things).collect();
+        let lies = lying(&fixtures, &trajectory.start);
         let mut read = |text: &str, before: &[ReadSubtask], house| {
             let start = Instant::now();
-            let reading = reader().read(text, &Context { before, house });
+            let reading =
+                reader().read(text, &Context { before, house, lies: if house.is_some() { &lies } else { &[] } });
             seconds += start.elapsed().as_secs_f64();
             texts += 1;
             reading

@@ -54,7 +54,7 @@ def is_held_out(name):
 
 
 def canonical(skills):
-    """What some skills come to: as `canonical` in src/language/reader/reading.rs."""
+    """What some skills come to: as `canonical` in tests/reader.rs."""
     cuts = any(skill[0] == "Slice" for skill in skills)
     kept = []
     for at, skill in enumerate(skills):

@@ -12,9 +12,10 @@ use super::exit_status::ExitStatus;
 use crate::data::dataset;
 use crate::domain::{Class, Room};
 use crate::house::generate;
+use crate::language::instruction::{self, InstructionError};
 use crate::language::reader::features::Before;
 use crate::language::reader::spelling::Spelling;
-use crate::language::reader::{Context, ReadSubtask, Reader, WishReading, features_of};
+use crate::language::reader::{Context, Reader, WishReading, features_of, lying};
 
 /// Reads wishes.
 #[derive(Args)]
@@ -31,8 +32,17 @@ pub(crate) struct ReadArgs {
 #[derive(Serialize)]
 struct Line<'a> {
     text: &'a str,
+    /// The reading in words.
+    words: String,
     #[serde(flatten)]
     reading: &'a WishReading,
+}
+
+/// What is known of a house.
+struct House {
+    classes: BTreeSet<Class>,
+    /// Which things lie in or on what; nothing for a scene file.
+    lies: Vec<(Class, Class)>,
 }
 
 /// A line of an example to train on.
@@ -50,19 +60,28 @@ impl ReadArgs {
     /// Reads standard input to standard output, a line at a time.
     ///
     /// # Errors
-    /// When the scene cannot be read or a line is not UTF-8.
+    /// When the scene cannot be read, or a line is not UTF-8, too long for an instruction, or holds control characters.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         if let Some(words) = &self.features {
             return print_features(words);
         }
-        let house = self.scene.as_deref().map(classes).transpose()?;
+        let house = self.scene.as_deref().map(house).transpose()?;
+        let context = house.as_ref().map_or_else(Context::default, |house| Context {
+            house: Some(&house.classes),
+            lies: &house.lies,
+            ..Context::default()
+        });
         let reader = Reader::shipped().map_err(|error| anyhow!("{error}"))?;
         let mut out = std::io::stdout().lock();
-        let none: &[ReadSubtask] = &[];
         for (number, text) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
             let text = text.with_context(|| format!("line {number} is not UTF-8 text"))?;
-            let reading = reader.read(&text, &Context { before: none, house: house.as_ref() });
-            serde_json::to_writer(&mut out, &Line { text: &text, reading: &reading })?;
+            match instruction::parse(&text) {
+                // An empty line asks for nothing.
+                Ok(_) | Err(InstructionError::Empty) => {}
+                Err(error) => bail!("line {number}: {error}"),
+            }
+            let reading = reader.read(&text, &context);
+            serde_json::to_writer(&mut out, &Line { text: &text, words: reading.words(), reading: &reading })?;
             out.write_all(b"\n")?;
             out.flush()?;
         }
@@ -70,8 +89,8 @@ impl ReadArgs {
     }
 }
 
-/// The classes of a house: of a generated one all that it holds, of a scene file its furniture and everything movable.
-fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
+/// A generated house holds what it holds; a scene file's furniture is there, and everything movable.
+fn house(name: &str) -> anyhow::Result<House> {
     if let Some((room, seed)) = name.split_once(':')
         && let Ok(room) = room.parse::<Room>()
     {
@@ -79,7 +98,8 @@ fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
             seed.parse().with_context(|| format!("--scene {name}: {seed:?} is not a seed: use a whole number"))?;
         let (scene, world) = generate::house(room, seed);
         let fixtures = scene.fixtures.iter().map(|fixture| fixture.class);
-        return Ok(fixtures.chain(world.objects.iter().map(|object| object.class)).collect());
+        let classes = fixtures.chain(world.objects.iter().map(|object| object.class)).collect();
+        return Ok(House { classes, lies: lying(&scene, &world) });
     }
     let file = Path::new(name);
     let (Some(folder), Some(stem)) = (file.parent(), file.file_stem().and_then(|stem| stem.to_str())) else {
@@ -89,7 +109,8 @@ fn classes(name: &str) -> anyhow::Result<BTreeSet<Class>> {
         .with_context(|| format!("--scene {name}: neither a generated house (kitchen:7) nor a scene file"))?;
     // A scene file says which furniture there is; what lies on it is another in every episode.
     let movable = Class::all().filter(|class| class.info().pickupable);
-    Ok(scene.fixtures.iter().map(|fixture| fixture.class).chain(movable).collect())
+    let classes = scene.fixtures.iter().map(|fixture| fixture.class).chain(movable).collect();
+    Ok(House { classes, lies: Vec::new() })
 }
 
 fn print_features(words: &Path) -> anyhow::Result<ExitStatus> {

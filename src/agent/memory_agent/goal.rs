@@ -30,7 +30,7 @@ impl Goal {
     /// When the shipped reader is damaged.
     pub(crate) fn read(instruction: &str, before: &[ReadSubtask]) -> anyhow::Result<(Vec<Goal>, Vec<ReadSubtask>)> {
         let reader = Reader::shipped().map_err(|error| anyhow::anyhow!("{error}"))?;
-        let read = reader.read(instruction, &Context { before, house: None }).subtasks;
+        let read = reader.read(instruction, &Context { before, ..Context::default() }).subtasks;
         Ok((read.iter().filter_map(Goal::of).collect(), read))
     }
 

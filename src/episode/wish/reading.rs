@@ -50,7 +50,7 @@ pub(crate) fn read<'a>(
     let said = text.to_lowercase();
     let house = classes_of(scene, world);
     let before = before(reader, earlier, &house, world);
-    let best = reader.read(&said, &Context { before: &before, house: Some(&house) });
+    let best = reader.read(&said, &Context { before: &before, house: Some(&house), ..Context::default() });
     let best = with_the_held(reader, &said, &house, world, &best).unwrap_or(best);
     let best = elsewhere(reader, &said, &before, &house, &best).unwrap_or(best);
     let mut readings = vec![best];
@@ -135,7 +135,7 @@ fn before<'a>(
 ) -> Vec<ReadSubtask> {
     let mut known: Vec<ReadSubtask> = Vec::new();
     for text in earlier {
-        let reading = reader.read(text, &Context { before: &known, house: Some(house) });
+        let reading = reader.read(text, &Context { before: &known, house: Some(house), ..Context::default() });
         if reading.confidence >= LEAST {
             known = reading.subtasks;
         }
@@ -168,7 +168,7 @@ fn with_the_held(
         _ => word.to_string(),
     });
     let said: Vec<String> = words.collect();
-    let reading = reader.read(&said.join(" "), &Context { before: &[], house: Some(house) });
+    let reading = reader.read(&said.join(" "), &Context { house: Some(house), ..Context::default() });
     (reading.confidence > here.confidence).then_some(reading)
 }
 
@@ -183,7 +183,7 @@ fn elsewhere(
     if here.confidence >= LEAST {
         return None;
     }
-    let mut reading = reader.read(text, &Context { before, house: None });
+    let mut reading = reader.read(text, &Context { before, ..Context::default() });
     let asked = reading.subtasks.iter().flat_map(|subtask| subtask.object.into_iter().chain(subtask.receptacle));
     let absent: BTreeSet<Class> = asked.filter(|class| !house.contains(class)).collect();
     if reading.confidence < LEAST.max(here.confidence) || absent.is_empty() {

@@ -1,9 +1,9 @@
-//! Clauses: a text cut where a verb begins something new, what must not be done left out, and each clause in pieces.
+//! Clauses: a text cut where a verb begins something new, and each clause in pieces.
 
 use super::lexicon::lexicon;
-use super::shape::is_lamp;
+use super::pronouns::{say_what_it_means, say_what_them_means};
+use super::switching::tell_switching;
 use super::tokens::Token;
-use crate::domain::class::FixtureEffect;
 
 /// A piece of a clause: a noun and what leads to it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -89,84 +89,8 @@ impl Clause {
     }
 }
 
-/// Leaves out what a text says is not to be done: "don't take the knife", "not the knife", "instead of the knife".
-pub fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
-    let text = |at: usize| tokens.get(at).map_or("", |token: &Token| token.text.as_str());
-    let mut kept: Vec<Token> = Vec::with_capacity(tokens.len());
-    // What was named only to say what not to do with it may still be meant by "it".
-    let mut named: Option<Token> = None;
-    let mut at = 0;
-    while at < tokens.len() {
-        if let Some(length) = asks_by_denying(&tokens[at..]) {
-            at += length;
-            continue;
-        }
-        let forbids = match (text(at), text(at + 1)) {
-            ("do" | "must" | "should" | "can" | "will" | "does" | "need" | "would" | "could", "not") => true,
-            ("not", next) => next != "only" && next != "far",
-            ("instead", "of") | ("rather", "than") | ("without", _) | ("except", _) | ("ignore" | "skip", _) => true,
-            ("no", "need") | ("refrain", "from") | ("forget", _) => true,
-            ("leave", _) => is_let_alone(&tokens, at),
-            _ => false,
-        };
-        if !forbids {
-            if tokens[at].is_name() {
-                named = None;
-            }
-            let stands_for = named.clone().filter(|_| matches!(text(at), "it" | "them"));
-            kept.push(stands_for.unwrap_or_else(|| tokens[at].clone()));
-            at += 1;
-            continue;
-        }
-        let start = at;
-        let anything_before = kept.iter().any(Token::is_name);
-        at += 1;
-        while at < tokens.len() {
-            let new_verb = |from: usize| {
-                (from..tokens.len().min(from + 3)).any(|i| lexicon().verb(text(i)).is_some() && starts_verb(&tokens, i))
-            };
-            let again = || {
-                // "don't take the knife take the fork"
-                is_plain_request(&tokens, at) && tokens[start..at].iter().any(Token::is_name)
-            };
-            let ends = tokens[at].ends_sentence()
-                || again()
-                || matches!(text(at), "but" | "just" | "only" | "instead") && at > start + 1 && text(at + 1) != "of"
-                || text(at) == "," && at > start + 1
-                || matches!(text(at), "and" | "then") && new_verb(at + 1);
-            if ends {
-                break;
-            }
-            at += 1;
-        }
-        if !anything_before {
-            named = tokens[start..at].iter().find(|token| token.is_name()).cloned();
-        }
-    }
-    kept
-}
-
-/// How many tokens ask for something by denying its opposite: "do not forget to", "why do not you", "can not you".
-fn asks_by_denying(tokens: &[Token]) -> Option<usize> {
-    let text = |at: usize| tokens.get(at).map_or("", |token: &Token| token.text.as_str());
-    let whom = |at: usize| usize::from(matches!(text(at), "you" | "we" | "i"));
-    let not = match text(0) {
-        "why" if text(1) == "not" => return Some(2 + whom(2)),
-        "why" if text(2) == "not" => return Some(3 + whom(3)),
-        "why" if matches!(text(2), "you" | "we") && text(3) == "not" => return Some(4),
-        "do" | "must" | "should" | "can" | "will" | "does" | "would" | "could" if text(1) == "not" => 1,
-        "not" => 0,
-        _ => return None,
-    };
-    if matches!(text(not + 1), "you" | "we") && not == 1 && text(0) != "do" {
-        return Some(3);
-    }
-    let omits = matches!(text(not + 1), "forget" | "hesitate" | "fail" | "neglect" | "omit");
-    (omits && text(not + 2) == "to").then_some(not + 3)
-}
-
 /// Whether a verb that can be nothing else stands here with its object: "take the fork".
-fn is_plain_request(tokens: &[Token], at: usize) -> bool {
+pub(super) fn is_plain_request(tokens: &[Token], at: usize) -> bool {
     let words = &lexicon().words;
     matches!(tokens[at].text.as_str(), "put" | "place" | "pick" | "take" | "grab" | "get")
         && tokens
@@ -178,25 +102,8 @@ fn is_plain_request(tokens: &[Token], at: usize) -> bool {
         })
 }
 
-/// "leave the lamp off", "leave it alone".
-fn is_let_alone(tokens: &[Token], at: usize) -> bool {
-    let words = &lexicon().words;
-    let mut rest = tokens[at + 1..].iter();
-    rest.find(|token| {
-        token.is_mark()
-            || words.prepositions.contains(&token.text)
-            || words.breaks.contains(&token.text)
-            || token.text == "alone"
-    })
-    .is_some_and(|token| {
-        let then = rest.next();
-        token.text == "alone"
-            || token.text == "off" && then.is_none_or(|then| then.is_mark() || words.breaks.contains(&then.text))
-    })
-}
-
 /// Whether a verb may stand at a place.
-fn starts_verb(tokens: &[Token], at: usize) -> bool {
+pub(super) fn starts_verb(tokens: &[Token], at: usize) -> bool {
     let words = &lexicon().words;
     let Some(before) = at.checked_sub(1).and_then(|before| tokens.get(before)) else { return true };
     // "clean the mug" begins something; "the clean mug" and "a cut of bread" do not.
@@ -254,98 +161,10 @@ pub fn clauses(tokens: &[Token]) -> Vec<Clause> {
         }
     }
     all.retain(|clause| clause.tokens.iter().any(|token| !token.is_mark()));
+    say_what_it_means(&mut all);
     say_what_them_means(&mut all);
     tell_switching(&mut all);
     all
-}
-
-/// Where several things were named together, a later "them" stands for each: "wash the mug and the plate and put them away".
-fn say_what_them_means(all: &mut [Clause]) {
-    let mut named: Vec<Token> = Vec::new();
-    for clause in all {
-        let them = |token: &Token| matches!(token.text.as_str(), "them" | "both");
-        let at = clause.tokens.iter().position(them).filter(|&at| {
-            at > 0 && clause.tokens[..at].last().is_some_and(|token| token.lemma().is_some()) && !named.is_empty()
-        });
-        if let Some(at) = at {
-            clause.tokens.splice(at..=at, named.iter().cloned());
-            clause.is_of_each = true;
-            continue;
-        }
-        match clause.apart() {
-            Some(parts) => {
-                named.clear();
-                for part in &parts {
-                    let name = part.tokens.iter().find(|token| token.is_name());
-                    let and = Token::understood("and", clause.tokens[0].at);
-                    named.extend((!named.is_empty()).then_some(and));
-                    named.extend(name.cloned());
-                }
-            }
-            None if clause.tokens.iter().any(Token::is_name) && clause.lemma != "go" => named.clear(),
-            None => {}
-        }
-    }
-}
-
-/// Tells switching off from switching on, and machines and water from lamps: the subtasks know only lamps that go on. "it" is what
-/// was last named that has a switch.
-fn tell_switching(all: &mut [Clause]) {
-    let words = &lexicon().words;
-    let mut named: Option<bool> = None;
-    for clause in all {
-        let tokens = &clause.tokens;
-        let lamp = |token: &Token| token.classes.iter().any(|class| is_lamp(*class));
-        let machine =
-            |token: &Token| token.classes.iter().any(|class| class.info().effect.is_some() || class.info().basin);
-        let own = tokens.iter().rev().find(|token| lamp(token) || machine(token)).map(lamp);
-        named = own.or(named);
-        let is = |token: &Token, texts: &[&str]| texts.contains(&token.text.as_str());
-        let ends = |token: Option<&Token>| token.is_none_or(|then| then.is_mark() || words.breaks.contains(&then.text));
-        // "the lamp off", not "the book off the lamp"
-        let lamp_off = tokens.iter().rposition(lamp).is_some_and(|at| {
-            let then = at + 1 + usize::from(tokens.get(at + 1).is_some_and(|token| is(token, &["is"])));
-            tokens.get(then).is_some_and(|token| is(token, &["off", "out"])) && ends(tokens.get(then + 1))
-        });
-        let verb = tokens.iter().position(|token| token.lemma().is_some());
-        let says_off = tokens.iter().any(|token| is(token, &["off"]))
-            || own == Some(true)
-                && verb.is_some_and(|at| tokens.get(at + 1).is_some_and(|token| is(token, &["out", "down"])));
-        let nothing_else = tokens.iter().all(|token| {
-            token.is_mark()
-                || token.lemma().is_some()
-                || is(token, &["off", "water", "it", "them"])
-                || words.determiners.contains(&token.text)
-                || words.plain.contains(&token.text)
-                || words.breaks.contains(&token.text)
-        });
-        let water = tokens.iter().any(|token| is(token, &["water"]));
-        let of_machine = own == Some(false) || own.is_none() && nothing_else && (water || named == Some(false));
-        match clause.lemma {
-            "turn" if says_off && of_machine => clause.lemma = "close",
-            "turn" if says_off => clause.lemma = "off",
-            _ if lamp_off || own == Some(true) && says_off && matches!(clause.lemma, "" | "close") => {
-                clause.lemma = "off";
-            }
-            // "run the mug under the tap"
-            "go" if own == Some(false) || water => {
-                let rinses = tokens.iter().any(|token| {
-                    is(token, &["water"])
-                        || token.classes.iter().any(|class| class.info().effect == Some(FixtureEffect::Rinse))
-                });
-                let runs = verb.filter(|&at| is(&tokens[at], &["run"]));
-                let thing =
-                    runs.and_then(|at| tokens[at + 1..].iter().find(|token| !words.determiners.contains(&token.text)));
-                let moved = thing.is_some_and(|token| {
-                    is(token, &["it", "them"]) || token.classes.iter().any(|class| class.info().pickupable)
-                });
-                if rinses && moved {
-                    clause.lemma = "wash";
-                }
-            }
-            _ => {}
-        }
-    }
 }
 
 /// Whether something is named after a preposition.
@@ -395,7 +214,9 @@ pub fn chunks(clause: &Clause) -> Vec<Chunk> {
     for token in &clause.tokens {
         let text = token.text.as_str();
         if verb && token.lemma().is_some_and(|lemma| comes_to(lemma, clause.lemma)) {
+            // What is said before the verb addresses somebody: "hey robot, take".
             verb = false;
+            all.clear();
             chunk = Chunk::default();
         } else if token.is_mark() || words.breaks.contains(text) {
             flush(&mut chunk, &mut all);
@@ -459,7 +280,7 @@ mod tests {
     use crate::language::reader::units::Reader;
 
     fn read(text: &str) -> Vec<String> {
-        let tokens = without_the_forbidden(tokens(text, Reader::shipped().unwrap().spelling()).tokens);
+        let tokens = tokens(text, Reader::shipped().unwrap().spelling()).tokens;
         clauses(&tokens)
             .iter()
             .map(|clause| {
@@ -483,9 +304,33 @@ mod tests {
     }
 
     #[test]
-    fn what_must_not_be_done_is_left_out() {
-        assert_eq!(read("don't take the knife, take the fork"), ["take: [fork]"]);
-        assert_eq!(read("take the fork, not the knife"), ["take: [fork]"]);
-        assert_eq!(read("Do not touch the knife. Pick up the spoon instead of the fork"), ["take: [spoon]"]);
+    fn a_verb_that_is_understood_begins_a_clause_too() {
+        let two = ["put: [mug] in[sink]", "put: [plate] in[cabinet]"];
+        assert_eq!(read("put the mug in the sink and the plate in the cabinet"), two);
+        assert_eq!(read("put mug in sink, plate in cabinet"), two);
+    }
+
+    #[test]
+    fn them_is_each_of_the_things_named_and_it_is_what_was_closed() {
+        let all = read("wash the mug and the plate and put them in the cabinet");
+        assert_eq!(all, ["wash: [mug] and[plate]", "put: [mug] and[plate] in[cabinet]"]);
+        assert_eq!(read("close the laptop and pick it up"), ["close: [laptop]", "take: [laptop]"]);
+    }
+
+    #[test]
+    fn switching_off_is_not_switching_on() {
+        let lemma = |text: &str| clauses(&tokens(text, Reader::shipped().unwrap().spelling()).tokens)[0].lemma;
+        for text in [
+            "switch the floor lamp off",
+            "turn off the desk lamp",
+            "lights off",
+            "put the lamp out",
+            "power down the lamp",
+        ] {
+            assert_eq!(lemma(text), "off", "{text}");
+        }
+        assert_eq!([lemma("turn on the lamp"), lemma("get the book off the lamp")], ["turn", "take"]);
+        assert_eq!([lemma("turn off the tap"), lemma("turn the water off")], ["close", "close"]);
+        assert_eq!(lemma("run the mug under the tap"), "wash");
     }
 }

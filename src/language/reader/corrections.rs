@@ -21,7 +21,7 @@ const TAKES_BACK: [&[&str]; 12] = [
 
 /// Puts right what a text corrects: a name, a place, or a whole request in another's stead. Where it is not clear what is taken
 /// back, the words that take it back become unknown ones.
-pub fn corrected(tokens: Vec<Token>) -> Vec<Token> {
+pub(super) fn corrected(tokens: Vec<Token>) -> Vec<Token> {
     let mut kept: Vec<Token> = Vec::with_capacity(tokens.len());
     let mut at = 0;
     while at < tokens.len() {

@@ -90,6 +90,7 @@ impl Features {
         if let Some(name) = names.last() {
             self.add("z", name);
         }
+        self.kinds(&all, before);
         if let Some((lemma, pieces)) = main(&all) {
             self.thing("d", direct(lemma, pieces), before);
             self.add("v", lemma);
@@ -107,6 +108,22 @@ impl Features {
                 self.add("cp", place.map_or("none", Class::name));
             }
         }
+    }
+
+    /// The kinds of things that are named, in order, and what leads to them: whether one is put into another one that is put
+    /// somewhere does not hang on which they are.
+    fn kinds(&mut self, all: &[Pieces], before: Before) {
+        let mut said = String::new();
+        for (lemma, pieces) in all.iter().filter(|(lemma, _)| CHANGING.contains(lemma)) {
+            said.push_str(lemma);
+            for chunk in pieces {
+                let kind = if chunk.is_pronoun() { "it" } else { chunk.head().map_or("?", kind) };
+                said.push_str(&format!(" {} {kind}", chunk.lead));
+            }
+            said.push('.');
+        }
+        self.add("y", &said);
+        self.add("y", &format!("{} {said}", before.object.is_some()));
     }
 
     fn thing(&mut self, kind: &str, chunk: Option<&Chunk>, before: Before) {
@@ -153,6 +170,22 @@ impl Features {
         for word in chunk.words.iter().filter(|word| *word != head) {
             self.add(kind, &format!("{} {}", word.text, head.text));
         }
+    }
+}
+
+/// What kind of thing a name stands for.
+fn kind(head: &Token) -> &'static str {
+    let all = |may: fn(&Class) -> bool| head.is_name() && head.classes.iter().all(may);
+    if all(|class| is_lamp(*class)) {
+        "lamp"
+    } else if all(|class| class.info().pickupable && class.info().receptacle) {
+        "holder"
+    } else if all(|class| class.info().pickupable) {
+        "thing"
+    } else if all(|class| !class.info().pickupable) {
+        "furniture"
+    } else {
+        "?"
     }
 }
 
@@ -217,7 +250,9 @@ pub fn speaks_of(clauses: &[Clause]) -> (bool, bool) {
     let tokens = || clauses.iter().flat_map(|clause| &clause.tokens);
     let furniture = |class: &Class| class.info().receptacle && !class.info().pickupable;
     let place = all.iter().any(|(_, pieces)| places(pieces).next().is_some())
-        || tokens().any(|token| token.lemma() == Some("put") || token.classes.iter().any(furniture));
+        || tokens().any(|token| {
+            token.lemma() == Some("put") || token.lemma().is_none() && token.classes.iter().any(furniture)
+        });
     let is_lamp = |chunk: &Chunk| {
         chunk.head().is_some_and(|head| head.is_name() && head.classes.iter().all(|class| is_lamp(*class)))
     };

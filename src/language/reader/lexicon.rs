@@ -218,12 +218,71 @@ impl Lexicon {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::reader::spelling::Spelling;
+    use crate::language::reader::tokens::tokens;
 
     #[test]
     fn the_table_of_words_is_sound() {
-        let table: Table = toml::from_str(include_str!("../../../assets/reader/words.toml")).unwrap();
+        let text = include_str!("../../../assets/reader/words.toml");
+        let table: Table = toml::from_str(text).unwrap();
         assert!(table.verbs.keys().all(|lemma| LEMMAS.contains(&lemma.as_str())));
         assert_eq!(table.verbs.len(), LEMMAS.len());
+        let lists: toml::Table = toml::from_str(text).unwrap();
+        let lists = ["verbs", "grammar"].map(|part| lists[part].as_table().unwrap().clone());
+        for (name, list) in lists.iter().flatten() {
+            let list: Vec<&str> = list.as_array().unwrap().iter().map(|word| word.as_str().unwrap()).collect();
+            let once: BTreeSet<&str> = list.iter().copied().collect();
+            assert_eq!(once.len(), list.len(), "a word stands twice in {name}");
+        }
+        for (from, to) in &table.same {
+            assert_ne!(from, to);
+            let words = tokens(from, &Spelling::of([])).tokens;
+            let typed: Vec<&str> = words.iter().map(|token| token.typed.as_str()).collect();
+            assert_eq!(typed.join(" "), *from, "no typed text comes to this key");
+        }
+    }
+
+    #[test]
+    fn what_is_foreign_is_nothing_else_and_a_verb_is_of_one_kind() {
+        let table: Table = toml::from_str(include_str!("../../../assets/reader/words.toml")).unwrap();
+        let mut forms = BTreeSet::new();
+        assert!(table.verbs.values().flatten().all(|form| forms.insert(form.clone())));
+        let words = &table.grammar;
+        let lists = [&words.before_verb, &words.prepositions, &words.determiners, &words.pronouns, &words.breaks];
+        let more = [&words.particles, &words.places, &words.plain, &words.nameless, &words.other];
+        let mut known: BTreeSet<String> = lists.into_iter().chain(more).flatten().cloned().chain(forms).collect();
+        known.extend(table.same.keys().chain(table.same.values()).filter(|words| !words.contains(' ')).cloned());
+        known.extend(table.counts.into_keys());
+        known.extend(
+            lexicon().names.values().flatten().filter(|name| name.words.len() == 1).map(|name| name.words[0].clone()),
+        );
+        let twice: Vec<&String> = words.foreign.intersection(&known).collect();
+        assert_eq!(twice, Vec::<&String>::new());
+    }
+
+    #[test]
+    fn every_word_that_the_rules_match_is_known() {
+        let sources = [
+            include_str!("clauses.rs"),
+            include_str!("corrections.rs"),
+            include_str!("forbidden.rs"),
+            include_str!("pronouns.rs"),
+            include_str!("switching.rs"),
+            include_str!("told.rs"),
+            include_str!("unread.rs"),
+            include_str!("features.rs"),
+        ];
+        // Parts of features' names, and the class that has no name.
+        let others = ["again", "none", "many", "holder", "thing", "furniture", "true"];
+        let rules = sources.iter().map(|source| source.split("#[cfg(test)]").next().unwrap());
+        let code = rules.flat_map(str::lines).filter(|line| !line.trim_start().starts_with("//"));
+        let quoted = code.flat_map(|line| line.split('"').skip(1).step_by(2));
+        let is_word = |word: &&str| word.len() > 2 && word.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+        let words: BTreeSet<&str> = quoted.filter(is_word).filter(|word| !others.contains(word)).collect();
+        assert!(words.len() > 80, "{words:?}");
+        let unknown: Vec<&&str> =
+            words.iter().filter(|word| !word.split('_').all(|word| lexicon().knows(word))).collect();
+        assert_eq!(unknown, Vec::<&&str>::new(), "spelling would turn these into others");
     }
 
     #[test]

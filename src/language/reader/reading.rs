@@ -173,37 +173,3 @@ impl WishReading {
         (!subtasks.is_empty()).then_some((roles, subtasks))
     }
 }
-
-/// A skill with its object and receptacle.
-pub type Step = (SkillKind, Option<Class>, Option<Class>);
-
-/// The form in which readings are compared, that of what the steps come to: without the pickups that another step of the same
-/// thing implies, without the knife where something is sliced and without a put before the slicing of the same thing; a thing
-/// goes into another before that is put somewhere, is in the hand before the lamp goes on, and is sliced once.
-pub fn canonical(steps: &[Step]) -> Vec<Step> {
-    let cuts = steps.iter().any(|step| step.0 == SkillKind::Slice);
-    let is_knife = |step: &Step| step.1.is_some_and(Class::is_knife);
-    let follows = |at: usize, kind: SkillKind, thing: Option<Class>| {
-        steps[at + 1..].iter().any(|other| other.0 == kind && other.1 == thing)
-    };
-    let mut kept: Vec<Step> = Vec::new();
-    for (at, step) in steps.iter().enumerate() {
-        let implied = step.0 == SkillKind::Pickup
-            && steps.iter().any(|other| !matches!(other.0, SkillKind::Pickup | SkillKind::Slice) && other.1 == step.1);
-        let knife = cuts && is_knife(step) && steps.len() > 1;
-        let aside = step.0 == SkillKind::Put && follows(at, SkillKind::Slice, step.1);
-        let again = step.0 == SkillKind::Slice && kept.contains(step);
-        if !(implied || knife || aside || again) {
-            kept.push(*step);
-        }
-    }
-    for at in 1..kept.len() {
-        let (first, second) = (kept[at - 1], kept[at]);
-        let stacked =
-            first.0 == SkillKind::Put && second.0 == SkillKind::Put && second.2 == first.1 && first.1 != second.1;
-        if stacked || first.0 == SkillKind::Toggle && second.0 == SkillKind::Pickup {
-            kept.swap(at - 1, at);
-        }
-    }
-    kept
-}

@@ -13,6 +13,8 @@ pub(super) struct Told {
     pub looks: Vec<String>,
     /// Where it is said to be.
     pub place: Option<Class>,
+    /// Every class that may be meant by where it is said to be.
+    pub places: Vec<Class>,
     /// It is picked up before something else is done.
     pub takes_first: bool,
 }
@@ -23,7 +25,7 @@ impl Told {
             clauses.iter().filter(|clause| !matches!(clause.lemma, "" | "go" | "wait" | "open" | "close")).collect();
         let takes_first = doing.len() > 1 && doing[0].lemma == "take";
         let Some(clause) = doing.first().copied().or(clauses.first()) else {
-            return Told { looks: Vec::new(), place: None, takes_first };
+            return Told { looks: Vec::new(), place: None, places: Vec::new(), takes_first };
         };
         let pieces = chunks(clause);
         let thing = direct(clause.lemma, &pieces).or(pieces.first());
@@ -31,11 +33,10 @@ impl Told {
         let from = |lead: &str| matches!(lead, "from" | "off" | "out");
         let at = |lead: &str| matches!(lead, "in" | "on" | "inside" | "at" | "under") && clause.lemma != "put";
         let places = pieces.iter().skip(1).filter(|chunk| from(&chunk.lead) || at(&chunk.lead));
-        let mut classes = places.filter_map(|chunk| {
-            let head = chunk.head()?;
-            one_meant(&head.text, head.classes, house)
-        });
-        Told { looks, place: classes.next(), takes_first }
+        let heads: Vec<_> = places.filter_map(Chunk::head).filter(|head| head.is_name()).collect();
+        let place = heads.iter().find_map(|head| one_meant(&head.text, head.classes, house));
+        let places = heads.first().map_or_else(Vec::new, |head| head.classes.to_vec());
+        Told { looks, place, places, takes_first }
     }
 }
 

@@ -3,20 +3,22 @@
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use super::clauses::{Clause, clauses, without_the_forbidden};
+use super::answers::{Answer, alternatives, ranked, set_all_apart};
+use super::clauses::{Clause, clauses};
 use super::corrections::corrected;
 use super::features::{
     Before, are_about_different_things, are_in_two_places, do_not_mix, features, named_outright, speaks_of,
 };
-use super::model::{Head, Model, ModelError, softmax};
-use super::reading::{Alternative, ReadSubtask, WishReading};
+use super::forbidden::without_the_forbidden;
+use super::model::{Model, ModelError, softmax};
+use super::reading::{ReadSubtask, WishReading};
 use super::shape::Shape;
 use super::spelling::Spelling;
 use super::tokens::{Token, Typed, tokens};
 use super::told::Told;
 use super::unread::{Part, is_foreign, is_means, says_nothing, unread};
-use crate::domain::Class;
 use crate::domain::skill::SkillKind;
+use crate::domain::{Class, Instance, Scene, World};
 
 /// The most clauses that one unit has.
 const WIDEST: usize = 6;
@@ -24,12 +26,16 @@ const WIDEST: usize = 6;
 const NEW_UNIT: f32 = -0.7;
 /// What passing over a clause that names something costs.
 const PASSED_OVER: f32 = -3.0;
+/// What passing over walking and doors costs: what they say may help to read what follows.
+const ASIDE: f32 = -0.2;
 /// How likely it must be that something of the house is meant.
 const IN_HOUSE: f32 = 0.05;
 /// Alternatives that are kept.
 const ALTERNATIVES: usize = 3;
-/// How much likelier a class gets by its usual name, beside what was learned.
-const OUTRIGHT: f32 = 1.5;
+/// How much likelier a thing is for lying where the text says that it is.
+const LIES_THERE: f32 = 20.0;
+/// How much likelier a thing is for having been asked for before.
+const NAMED_BEFORE: f32 = 4.0;
 
 /// What is known besides the text.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,6 +44,18 @@ pub struct Context<'a> {
     pub before: &'a [ReadSubtask],
     /// The classes of the house.
     pub house: Option<&'a BTreeSet<Class>>,
+    /// Which things lie in or on what, where that is known: "the knife on the counter" is the one that lies there.
+    pub lies: &'a [(Class, Class)],
+}
+
+/// Which things lie in or on what: for [`Context::lies`].
+pub fn lying(scene: &Scene, world: &World) -> Vec<(Class, Class)> {
+    let objects = (0..world.objects.len() as u16).map(Instance::Object);
+    let pairs = objects.filter_map(|thing| {
+        let holder = world.container_of(thing)?;
+        Some((world.class_of(scene, thing)?, world.class_of(scene, holder)?))
+    });
+    pairs.collect()
 }
 
 /// Reads wishes.
@@ -51,13 +69,6 @@ struct Unit {
     shape: Shape,
     score: f32,
     features: Vec<u32>,
-}
-
-/// A class with its probability, and the ones behind it.
-struct Answer {
-    class: Option<Class>,
-    probability: f32,
-    others: Vec<(Class, f32)>,
 }
 
 /// The best way to cut the clauses up to a place.
@@ -132,7 +143,7 @@ impl Reader {
     fn skip(&self, path: &Path, clauses: &[Clause]) -> Option<Path> {
         let [clause] = clauses else { return None };
         let cost = match clause.lemma {
-            "go" | "wait" | "open" | "close" => 0.0,
+            "go" | "wait" | "open" | "close" => ASIDE,
             _ if is_foreign(clause) || says_nothing(clause) => 0.0,
             "" if !clause.tokens.iter().any(Token::is_name) => 0.0,
             "" | "find" | "make" => PASSED_OVER,
@@ -199,15 +210,24 @@ impl Reader {
         let house = context.house;
         path.probability *= score.exp();
         let [thing, place] = named_outright(clauses);
-        let absent = &mut path.absent;
-        let mut object = self.answer("object", features, thing, house, absent, |class| shape.takes_object(class));
+        let told = Told::of(clauses, house);
+        let evidence = |class: Class| {
+            let lies = context.lies.iter().any(|(thing, place)| *thing == class && told.places.contains(place));
+            let known = path.read.iter().chain(context.before).any(|read| read.object == Some(class));
+            (if lies { LIES_THERE } else { 1.0 }) * (if known { NAMED_BEFORE } else { 1.0 })
+        };
+        let mut absent = path.absent.clone();
+        let may = |class: Class| shape.takes_object(class);
+        let mut object = self.answer("object", features, thing, house, &mut absent, may, evidence);
         let mut holder = (shape == Shape::Stack).then(|| {
             let may = |class: Class| class.info().pickupable && class.info().receptacle;
-            self.answer("movable", features, None, house, absent, may)
+            self.answer("movable", features, None, house, &mut absent, may, |_| 1.0)
         });
-        let mut place = shape
-            .has_place()
-            .then(|| self.answer("place", features, place, house, absent, |class| shape.takes_place(class)));
+        let mut place = shape.has_place().then(|| {
+            let may = |class: Class| shape.takes_place(class);
+            self.answer("place", features, place, house, &mut absent, may, |_| 1.0)
+        });
+        path.absent = absent;
         set_all_apart(&mut object, &mut holder, &mut place);
         for answer in [Some(&object), holder.as_ref(), place.as_ref()].into_iter().flatten() {
             path.probability *= answer.probability;
@@ -216,7 +236,6 @@ impl Reader {
         let slice = slice.is_some_and(|p| p.get(1).is_some_and(|&p| p > 0.5))
             && object.class.is_some_and(|class| class.info().slices > 0)
             && shape != Shape::One(SkillKind::Slice);
-        let told = Told::of(clauses, house);
         let stands = told.place.filter(|stands| {
             let goes = [Some(&object), holder.as_ref(), place.as_ref()];
             let used = goes.into_iter().flatten().any(|answer| answer.class == Some(*stands));
@@ -293,11 +312,12 @@ impl Reader {
         house: Option<&BTreeSet<Class>>,
         absent: &mut Vec<Class>,
         may: impl Fn(Class) -> bool,
+        evidence: impl Fn(Class) -> f32,
     ) -> Answer {
         let Some(head) = self.model.head(name) else {
             return Answer { class: None, probability: 0.0, others: Vec::new() };
         };
-        let all = ranked(head, features, outright, may);
+        let all = ranked(head, features, outright, may, evidence);
         let inside = |class: &Option<Class>| class.is_none_or(|class| house.is_none_or(|house| house.contains(&class)));
         let known: f32 = all.iter().filter(|(class, _)| inside(class)).map(|(_, p)| p).sum();
         let chosen: Vec<(Option<Class>, f32)> = if known > IN_HOUSE {
@@ -310,36 +330,6 @@ impl Reader {
         let (class, probability) = chosen.first().copied().unwrap_or((None, 0.0));
         let others = chosen.iter().skip(1).filter_map(|&(class, p)| Some((class?, p))).take(ALTERNATIVES).collect();
         Answer { class, probability, others }
-    }
-}
-
-/// A thing does not go into itself: of two answers that are the same, the one that loses less by it is the next best.
-fn set_apart(object: &mut Answer, holder: &mut Answer) {
-    if object.class != holder.class {
-        return;
-    }
-    let next = |answer: &Answer| answer.others.first().map_or(0.0, |other| other.1);
-    let keeps_object = object.probability * next(holder) > next(object) * holder.probability;
-    let other = if keeps_object { holder } else { object };
-    if !other.others.is_empty() {
-        let (class, probability) = other.others.remove(0);
-        (other.class, other.probability) = (Some(class), probability);
-    }
-}
-
-/// No two of a unit's things are the same.
-fn set_all_apart(object: &mut Answer, holder: &mut Option<Answer>, place: &mut Option<Answer>) {
-    // A change may bring about another pair that is the same.
-    for _ in 0..3 {
-        if let Some(holder) = holder {
-            set_apart(object, holder);
-            if let Some(place) = place {
-                set_apart(holder, place);
-            }
-        }
-        if let Some(place) = place {
-            set_apart(object, place);
-        }
     }
 }
 
@@ -364,34 +354,6 @@ fn leave_out_means(read: &mut Vec<ReadSubtask>) {
 fn before(path: &Path, context: &Context<'_>) -> Before {
     let last = path.read.last().or(context.before.last());
     Before { object: last.and_then(|read| read.object), place: last.and_then(|read| read.receptacle) }
-}
-
-/// The classes that may be meant, the likeliest first.
-fn ranked(
-    head: &Head,
-    features: &[u32],
-    outright: Option<Class>,
-    may: impl Fn(Class) -> bool,
-) -> Vec<(Option<Class>, f32)> {
-    let scores = head.scores(features);
-    let classes: Vec<Option<Class>> = head.labels().iter().map(|label| Class::named(label)).collect();
-    let kept: Vec<(Option<Class>, f32)> = classes
-        .into_iter()
-        .map(|class| class.filter(|&class| class != Class::NONE))
-        .zip(scores)
-        .filter(|(class, _)| class.is_none_or(&may))
-        .collect();
-    let p = softmax(&kept.iter().map(|(_, score)| *score).collect::<Vec<_>>());
-    let mut all: Vec<(Option<Class>, f32)> = kept.into_iter().map(|(class, _)| class).zip(p).collect();
-    // What a name speaks for its class decides, but makes nothing more certain.
-    let weight =
-        |&(class, p): &(Option<Class>, f32)| if class.is_some() && class == outright { p * OUTRIGHT } else { p };
-    all.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-    all
-}
-
-fn alternatives(answer: &Answer, is_receptacle: bool) -> Vec<Alternative> {
-    answer.others.iter().map(|&(class, probability)| Alternative { is_receptacle, class, probability }).collect()
 }
 
 /// Whether a clause names several things of which none goes into another.
