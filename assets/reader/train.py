@@ -339,7 +339,7 @@ def main():
         starts.append(starts[-1] + len(found))
     indices = np.concatenate(indices).astype(np.int32)
     matrix = sp.csr_matrix((np.ones(len(indices), np.float32), indices, np.array(starts)), shape=(len(rows), len(hashes)))
-    sure_of = {"step": 1.0, "goal": 1.5, "joined": 0.7, "made up": 0.5}
+    sure_of = {"step": 1.0, "goal": 2.0, "joined": 0.7, "made up": 0.5}
     classes = ["None"] + list(OBJECTS)
     heads = [("shape", 0, SHAPES), ("slice", 1, [0, 1]), ("object", 2, classes), ("place", 3, classes), ("movable", 4, classes)]
     blob = [b"SPRD", struct.pack("<I", 1), struct.pack("<I", len(words))] + [text_bytes(word) for word in words]

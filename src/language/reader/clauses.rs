@@ -57,7 +57,8 @@ impl Clause {
             return None;
         }
         let joins = |token: &Token| token.text == "and" || token.text == ",";
-        let mut things: Vec<Vec<Token>> = vec![self.tokens[verb + 1..=first].to_vec()];
+        let both = |token: &&Token| token.text != "both";
+        let mut things: Vec<Vec<Token>> = vec![self.tokens[verb + 1..=first].iter().filter(both).cloned().collect()];
         let mut at = first + 1;
         while self.tokens.get(at).is_some_and(joins) {
             let start = at + self.tokens[at..].iter().take_while(|token| joins(token)).count();

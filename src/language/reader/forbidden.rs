@@ -54,6 +54,14 @@ pub(super) fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
             }
             at += 1;
         }
+        let left_out = &tokens[start..at];
+        if text(start) == "not" && !left_out.iter().any(|token| token.is_name() || token.lemma().is_some()) {
+            // "the mug that is not red" says how a thing is, which nothing is made of.
+            let words = &lexicon().words;
+            let says = |token: &Token| !(token.is_mark() || words.determiners.contains(&token.text));
+            let doubted = left_out.iter().skip(1).filter(|token| says(token));
+            kept.extend(doubted.map(|token| Token { unknown: true, ..token.clone() }));
+        }
         if !anything_before {
             named = tokens[start..at].iter().find(|token| token.is_name()).cloned();
         }

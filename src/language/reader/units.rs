@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use super::answers::{Answer, alternatives, ranked, set_all_apart};
-use super::clauses::{Clause, clauses};
+use super::clauses::{Chunk, Clause, clauses};
 use super::corrections::corrected;
 use super::features::{
-    Before, are_about_different_things, are_in_two_places, do_not_mix, features, named_outright, speaks_of,
+    Before, are_about_different_things, are_in_two_places, do_not_mix, features, in_pieces, named_outright, places,
+    speaks_of,
 };
 use super::forbidden::without_the_forbidden;
 use super::model::{Model, ModelError, softmax};
@@ -195,7 +196,8 @@ impl Reader {
         let may = |shape: Shape| match shape {
             Shape::Many => false,
             Shape::Stack => place && one_place,
-            Shape::Changed(_) | Shape::Two => place,
+            Shape::Changed(kind) => place && goes_elsewhere(clauses, kind),
+            Shape::Two | Shape::One(SkillKind::Put) => place,
             Shape::Look => thing,
             Shape::One(_) => true,
         };
@@ -331,6 +333,15 @@ impl Reader {
         let others = chosen.iter().skip(1).filter_map(|&(class, p)| Some((class?, p))).take(ALTERNATIVES).collect();
         Answer { class, probability, others }
     }
+}
+
+/// Whether a place is spoken of besides the one where a thing is changed: "chill it in the fridge" puts nothing anywhere.
+fn goes_elsewhere(clauses: &[Clause], kind: SkillKind) -> bool {
+    let says = |lemma: &str, pieces: &[Chunk]| {
+        let mut heads = places(pieces).filter_map(Chunk::head);
+        lemma == "put" || heads.any(|head| !head.classes.iter().any(|class| is_means(kind, *class)))
+    };
+    in_pieces(clauses).iter().any(|(lemma, pieces)| says(lemma, pieces))
 }
 
 /// Putting a thing into what then heats, chills or rinses it is part of that.

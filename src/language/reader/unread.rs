@@ -65,8 +65,13 @@ pub(super) fn says_nothing(clause: &Clause) -> bool {
 /// The words that were not used, as they were typed, and how much of the probability they leave.
 pub(super) fn unread(wanted: &[Token], clauses: &[Clause], parts: &[Part], read: &[ReadSubtask]) -> (Vec<String>, f32) {
     let mut found = Found::default();
-    for token in wanted.iter().filter(|token| is_strange(token)) {
-        found.add(token, UNKNOWN);
+    for (at, token) in wanted.iter().enumerate() {
+        let then = wanted.get(at + 1).map_or("", |then| then.text.as_str());
+        // A condition; "if you can" is none.
+        let condition = matches!(token.text.as_str(), "if" | "unless") && !matches!(then, "you" | "possible");
+        if is_strange(token) || condition {
+            found.add(token, UNKNOWN);
+        }
     }
     let everything = Used::of(read);
     for (some, steps) in parts {
@@ -165,7 +170,8 @@ impl Found {
             let goes = places(&pieces).next().filter(|_| clause.lemma == "put");
             for chunk in &pieces {
                 let is_main = Some(chunk) == about || Some(chunk) == goes;
-                if is_main && CHANGING.contains(&clause.lemma) && has_no_name(chunk) {
+                let is_goal = chunk.lead == "to";
+                if (is_main || is_goal) && CHANGING.contains(&clause.lemma) && has_no_name(chunk) {
                     chunk.head().into_iter().for_each(|head| self.add(head, LEFT_OUT));
                 }
                 let says_where = lexicon().words.prepositions.contains(&chunk.lead) && chunk.lead != "with";
@@ -208,7 +214,8 @@ impl Found {
                 .copied()
                 .collect();
             let either = between.contains(&"or");
-            if side_by_side && two[0].text != two[1].text && (either || both.len() < 2) && covered(two[1]) > 0 {
+            let again = two[0].text == two[1].text && (between.contains(&",") || used.kinds.len() > 1);
+            if side_by_side && !again && (either || both.len() < 2) && covered(two[1]) > 0 {
                 self.add(two[1], LEFT_OUT);
             }
         }
@@ -222,9 +229,13 @@ impl Found {
                 let leads = lexicon().words.prepositions.contains(&token.text) && token.text != "of";
                 !(token.is_mark() || leads || lexicon().words.breaks.contains(&token.text) || token.lemma().is_some())
             };
-            let Some(name) = wanted[at + 1..].iter().take_while(goes_on).find(|token| token.is_name()) else {
+            let mut after = wanted[at + 1..].iter().take_while(goes_on).skip_while(|token| !token.is_name());
+            let Some(name) = after.next() else { continue };
+            // "both the fork and the knife"
+            let joined = wanted[at + 1..].iter().skip_while(|token| *token != name).nth(1);
+            if token.text == "both" && joined.is_some_and(|then| matches!(then.text.as_str(), "and" | ",")) {
                 continue;
-            };
+            }
             let of = |kind: SkillKind| {
                 let same = |one: &&ReadSubtask| {
                     one.skill == kind && one.object.is_some_and(|class| name.classes.contains(&class))
