@@ -343,4 +343,4 @@ fn what_annotators_wrote_is_read_as_measured() {
 }
 
 /// What was measured, less a small margin.
-const LEAST: [f64; 5] = [0.755, 0.83, 0.845, 0.72, 0.745];
+const LEAST: [f64; 5] = [0.76, 0.845, 0.87, 0.72, 0.75];

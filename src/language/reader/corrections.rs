@@ -46,11 +46,13 @@ pub(super) fn corrected(tokens: Vec<Token>) -> Vec<Token> {
 
 /// How many tokens from here take back what was said; 0 when they do not.
 fn taken_back(kept: &[Token], rest: &[Token]) -> usize {
-    let marked = kept.last().is_some_and(Token::is_mark);
-    if !marked || !kept.iter().any(|token| token.is_name() || token.lemma().is_some()) {
+    if !kept.iter().any(|token| token.is_name() || token.lemma().is_some()) {
         return 0;
     }
-    let longest = TAKES_BACK.iter().filter_map(|words| says(rest, words)).max();
+    let marked = kept.last().is_some_and(Token::is_mark);
+    // Two words are clear without a mark before them, but for "make that".
+    let clear = |words: &&&[&str]| marked || words.len() > 1 && words[0] != "make";
+    let longest = TAKES_BACK.iter().filter(clear).filter_map(|words| says(rest, words)).max();
     let Some(mut length) = longest else { return 0 };
     let strong = length > 1 || rest[0].text != "no" && rest[0].text != "actually";
     while says(&rest[length..], &["sorry"]).is_some() || rest.get(length).is_some_and(Token::is_mark) {
@@ -91,8 +93,13 @@ fn replace(kept: &mut Vec<Token>, rest: &[Token]) -> Option<usize> {
     if let Some(lemma) = first.lemma().filter(|_| !first.is_name()) {
         // "take the mug, no, take the cup"
         let at = kept[..said].iter().rposition(|token| token.lemma() == Some(lemma))?;
+        let meant = kept[at..].iter().find(|token| token.is_name()).cloned();
         kept.truncate(at);
-        return Some(0);
+        // "it" stands for what is taken back.
+        let it = rest.get(1).is_some_and(|next| matches!(next.text.as_str(), "it" | "them"));
+        let Some(meant) = meant.filter(|_| it) else { return Some(0) };
+        kept.extend([first.clone(), meant]);
+        return Some(2);
     }
     let begin = said - kept[..said].iter().rev().take_while(|token| !token.is_mark()).count();
     if is_preposition(first) {
@@ -101,8 +108,13 @@ fn replace(kept: &mut Vec<Token>, rest: &[Token]) -> Option<usize> {
             kept[at] = first.clone();
             return Some(2);
         }
+        let meant = kept[at..].iter().find(|token| token.is_name()).cloned();
         kept.truncate(at);
-        return Some(0);
+        // "it" stands for what is taken back.
+        let it = rest.get(1).is_some_and(|next| matches!(next.text.as_str(), "it" | "them"));
+        let Some(meant) = meant.filter(|_| it) else { return Some(0) };
+        kept.extend([first.clone(), meant]);
+        return Some(2);
     }
     let length = rest.iter().position(Token::is_name)? + 1;
     let leads_on = |token: &Token| token.is_mark() || is_preposition(token) || token.lemma().is_some();
@@ -138,7 +150,7 @@ mod tests {
             "take the pen from the desk and wash it"
         );
         assert_eq!(read("put the mug in the sink, no, in the fridge"), "put the mug in the fridge");
-        assert_eq!(read("put the mug under the desk - I mean, put it on the desk"), "put it on the desk");
+        assert_eq!(read("put the mug under the desk - I mean, put it on the desk"), "put mug on the desk");
         assert_eq!(read("take the fork, no, take the spoon"), "take the spoon");
     }
 

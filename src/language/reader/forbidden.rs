@@ -20,6 +20,7 @@ pub(super) fn without_the_forbidden(tokens: Vec<Token>) -> Vec<Token> {
             ("do" | "must" | "should" | "can" | "will" | "does" | "need" | "would" | "could", "not") => true,
             ("not", next) => next != "only" && next != "far",
             ("instead", "of") | ("rather", "than") | ("without", _) | ("except", _) | ("ignore" | "skip", _) => true,
+            ("no", _) if tokens[at + 1..].iter().take(3).any(Token::is_name) => true,
             ("no", "need") | ("refrain", "from") | ("forget", _) => true,
             ("leave", _) => is_let_alone(&tokens, at),
             _ => false,
