@@ -4,6 +4,9 @@ use super::model::{Head, softmax};
 use super::reading::Alternative;
 use crate::domain::Class;
 
+/// Alternatives that are kept.
+pub(super) const ALTERNATIVES: usize = 3;
+
 /// How much likelier a class gets by its usual name, beside what was learned.
 const OUTRIGHT: f32 = 1.5;
 
@@ -12,6 +15,16 @@ pub(super) struct Answer {
     pub class: Option<Class>,
     pub probability: f32,
     pub others: Vec<(Class, f32)>,
+}
+
+impl Answer {
+    /// Leaves open which class it is: "it" where nothing was named.
+    pub fn leave_open(&mut self) {
+        if let Some(class) = self.class.take() {
+            self.others.insert(0, (class, self.probability));
+            self.others.truncate(ALTERNATIVES);
+        }
+    }
 }
 
 /// A thing does not go into itself: of two answers that are the same, the one that loses less by it is the next best.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use super::answers::{Answer, alternatives, ranked, set_all_apart};
+use super::answers::{ALTERNATIVES, Answer, alternatives, ranked, set_all_apart};
 use super::clauses::{Chunk, Clause, clauses};
 use super::corrections::corrected;
 use super::features::{
@@ -31,8 +31,6 @@ const PASSED_OVER: f32 = -3.0;
 const ASIDE: f32 = -0.2;
 /// How likely it must be that something of the house is meant.
 const IN_HOUSE: f32 = 0.05;
-/// Alternatives that are kept.
-const ALTERNATIVES: usize = 3;
 /// How much likelier a thing is for lying where the text says that it is.
 const LIES_THERE: f32 = 20.0;
 /// How much likelier a thing is for having been asked for before.
@@ -221,6 +219,10 @@ impl Reader {
         let mut absent = path.absent.clone();
         let may = |class: Class| shape.takes_object(class);
         let mut object = self.answer("object", features, thing, house, &mut absent, may, evidence);
+        if shape != Shape::One(SkillKind::Toggle) && before(path, context) == Before::default() && says_only_it(clauses)
+        {
+            object.leave_open();
+        }
         let mut holder = (shape == Shape::Stack).then(|| {
             let may = |class: Class| class.info().pickupable && class.info().receptacle;
             self.answer("movable", features, None, house, &mut absent, may, |_| 1.0)
@@ -333,6 +335,13 @@ impl Reader {
         let others = chosen.iter().skip(1).filter_map(|&(class, p)| Some((class?, p))).take(ALTERNATIVES).collect();
         Answer { class, probability, others }
     }
+}
+
+/// Whether a pronoun stands for the thing, and nothing movable is named.
+fn says_only_it(clauses: &[Clause]) -> bool {
+    let movable = |token: &Token| token.classes.iter().any(|class| class.info().pickupable);
+    let tokens = || clauses.iter().flat_map(|clause| &clause.tokens);
+    tokens().any(|token| matches!(token.text.as_str(), "it" | "them")) && !tokens().any(movable)
 }
 
 /// Whether a place is spoken of besides the one where a thing is changed: "chill it in the fridge" puts nothing anywhere.
