@@ -9,7 +9,7 @@ use crate::domain::{Class, Scene, World};
 use crate::house::House;
 use crate::house::expert::demonstrate;
 use crate::house::grading::{Grader, Grading};
-use crate::language::reader::{Context, ReadSubtask, Reader, WishReading};
+use crate::language::reader::{Context, ReadSubtask, Reader, WishReading, lying};
 
 /// What is made of typed wishes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +50,8 @@ pub(crate) fn read<'a>(
     let said = text.to_lowercase();
     let house = classes_of(scene, world);
     let before = before(reader, earlier, &house, world);
-    let best = reader.read(&said, &Context { before: &before, house: Some(&house), ..Context::default() });
+    let lies = lying(scene, world);
+    let best = reader.read(&said, &Context { before: &before, house: Some(&house), lies: &lies });
     let best = with_the_held(reader, &said, &house, world, &best).unwrap_or(best);
     let best = elsewhere(reader, &said, &before, &house, &best).unwrap_or(best);
     let mut readings = vec![best];

@@ -19,7 +19,7 @@ pub(super) struct Answer {
 
 impl Answer {
     /// Leaves open which class it is: "it" where nothing was named.
-    pub fn leave_open(&mut self) {
+    pub(super) fn leave_open(&mut self) {
         if let Some(class) = self.class.take() {
             self.others.insert(0, (class, self.probability));
             self.others.truncate(ALTERNATIVES);
