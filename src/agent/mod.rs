@@ -10,7 +10,6 @@ pub(crate) mod frame_history;
 pub(crate) mod learned;
 pub(crate) mod logit_adjustment;
 pub(crate) mod loop_guard;
-#[allow(dead_code)]
 pub(crate) mod memory;
 pub(crate) mod memory_agent;
 pub(crate) mod policy;

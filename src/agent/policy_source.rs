@@ -120,11 +120,13 @@ fn hash(folder: &Path) -> anyhow::Result<String> {
 pub(crate) fn load_agent(
     folder: &Path,
     sentences: SharedEmbedder,
-    device: tch::Device,
+    computes: tch::Device,
 ) -> anyhow::Result<Box<dyn Policy>> {
+    // More threads than one would make sums depend on how many there are, and workers get in each other's way.
+    device::set_threads(1);
     Ok(match MemoryConfig::is_there(folder) {
-        true => Box::new(MemoryPolicy::load(folder, device)?),
-        false => Box::new(LearnedPolicy::load(folder, sentences, device)?),
+        true => Box::new(MemoryPolicy::load(folder, computes)?),
+        false => Box::new(LearnedPolicy::load(folder, sentences, computes)?),
     })
 }
 

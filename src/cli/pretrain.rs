@@ -26,7 +26,7 @@ pub(crate) struct Pretrain {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, l-bc-agg; or a preset's
+    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, l-bc-agg, sprint-memory; or a preset's
     /// file, which may extend one of these
     #[arg(long)]
     preset: String,
@@ -116,6 +116,17 @@ impl Pretrain {
     }
 
     fn run_memory(self, preset: MemoryPreset) -> anyhow::Result<ExitStatus> {
+        let unused = [
+            ("--size", self.size.is_some()),
+            ("--policy-from", self.policy_from.is_some()),
+            ("--critic-from", self.critic_from.is_some()),
+            ("--trials", self.trials.is_some()),
+            ("--steps", self.steps.is_some()),
+            ("--encoder-steps", self.encoder_steps.is_some()),
+        ];
+        if let Some((option, _)) = unused.iter().find(|(_, given)| *given) {
+            anyhow::bail!("{option} says nothing to the preset {}: a preset's file that extends it can", preset.name);
+        }
         let device = best_device();
         let folder = self.encoder.unwrap_or_else(default_folder);
         let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));

@@ -138,6 +138,16 @@ impl<E: Environment> Rollout<E> {
         self.env.reset()
     }
 
+    /// The action that was taken last; `None` at the start.
+    pub(crate) fn last(&self) -> Option<Action> {
+        self.last
+    }
+
+    /// Goes on as if that action had led here.
+    pub(crate) fn set_last(&mut self, last: Option<Action>) {
+        self.last = last;
+    }
+
     /// Goes on as if so many steps had been taken: the environment was brought to another state.
     pub(crate) fn set_steps(&mut self, steps: u32) {
         (self.steps, self.last) = (steps, None);

@@ -74,11 +74,6 @@ pub(crate) struct Occupancy {
 }
 
 impl Occupancy {
-    /// An empty map that goes by this rule.
-    pub(crate) fn by(clearance: Clearance) -> Occupancy {
-        Occupancy { clearance, ..Occupancy::default() }
-    }
-
     /// Takes in the depth that an agent at `pose` sees.
     pub(crate) fn observe(&mut self, pose: Pose, frame: &Frame) {
         let mut seen: BTreeMap<Cell, Glimpses> = BTreeMap::new();

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use crate::domain::{Class, Scene, World};
 use crate::house::view::{Frame, decode};
 
-/// Cells of a percept's raster in a row, and rows.
-pub(crate) const GRID: usize = 40;
+pub(crate) use crate::nets::detector::GRID;
 
 /// One frame on a raster of [`GRID`] x [`GRID`] cells, row by row, top left first.
 #[derive(Clone, Debug, Default, PartialEq)]

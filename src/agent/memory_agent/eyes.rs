@@ -41,7 +41,7 @@ impl Eyes {
     /// When the environment shows nothing, or the simulator is asked and is another one than House.
     pub(crate) fn look(&self, environment: &mut dyn Environment) -> anyhow::Result<Seen> {
         match self {
-            Eyes::Detector(detector) => Ok(detected(detector, environment.frame()?)),
+            Eyes::Detector(detector) => detected(detector, environment.frame()?),
             Eyes::Simulator => {
                 let name = environment.name().to_owned();
                 let access = environment.house();
@@ -54,10 +54,13 @@ impl Eyes {
     }
 
     /// Looks at a frame of House that was drawn of `world`.
-    pub(crate) fn look_at(&self, scene: &Scene, world: &World, frame: &Frame) -> Seen {
+    ///
+    /// # Errors
+    /// When the detector fails.
+    pub(crate) fn look_at(&self, scene: &Scene, world: &World, frame: &Frame) -> anyhow::Result<Seen> {
         match self {
             Eyes::Detector(detector) => detected(detector, frame),
-            Eyes::Simulator => true_sight(scene, world, frame),
+            Eyes::Simulator => Ok(true_sight(scene, world, frame)),
         }
     }
 
@@ -70,9 +73,9 @@ impl Eyes {
     }
 }
 
-fn detected(detector: &FrozenDetector, frame: &Frame) -> Seen {
+fn detected(detector: &FrozenDetector, frame: &Frame) -> anyhow::Result<Seen> {
     let said = detector.detect(&[DetectorSpec::image(frame)]).flatten(0, -1).to_device(Device::Cpu);
-    let said = Vec::<f32>::try_from(said).unwrap_or_default();
+    let said = Vec::<f32>::try_from(said)?;
     let depth = median_depths(frame);
     let mut detections = Vec::new();
     for (class, places) in said.chunks_exact(GRID * GRID).take(Class::VOCABULARY).enumerate() {
@@ -81,7 +84,7 @@ fn detected(detector: &FrozenDetector, frame: &Frame) -> Seen {
         detections.extend(probable.map(|(place, &probability)| (class, place as u16, probability)));
     }
     let open = said.chunks_exact(GRID * GRID).last().map(<[f32]>::to_vec).unwrap_or_default();
-    Seen { percept: Percept { detections, open, depth }, hand_full: fills_hand(frame) }
+    Ok(Seen { percept: Percept { detections, open, depth }, hand_full: fills_hand(frame) })
 }
 
 /// What eyes without fault would make of a frame that was drawn of `world`.

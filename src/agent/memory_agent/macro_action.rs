@@ -90,15 +90,23 @@ pub(crate) fn available(
     for (index, thing) in things.iter().enumerate() {
         let Some(goal) = progress.goal() else { break };
         let class = thing.class;
-        for kind in kinds(thing, progress).filter(|&kind| matters(goal, progress, kind, class)) {
-            let purpose = Purpose::Interact(kind, class);
-            if found.iter().any(|now| now.purpose == purpose && now.thing == Some(index)) {
-                continue;
-            }
-            match way_to(&routes, thing, failed) {
-                Some(route) => found.extend(MacroAction::along(purpose, Some(index), thing.best, route)),
-                None => memory.map.discredit(class, thing.best, 0.3, NOT_THERE),
-            }
+        let wanted: Vec<ActionType> = kinds(thing, progress)
+            .filter(|&kind| matters(goal, progress, kind, class))
+            .filter(|&kind| {
+                !found.iter().any(|now| now.purpose == Purpose::Interact(kind, class) && now.thing == Some(index))
+            })
+            .collect();
+        // The way does not depend on what is done at its end.
+        if wanted.is_empty() {
+            continue;
+        }
+        let can_act = legal.iter().any(|candidate| candidate.class == class);
+        match way_to(&routes, thing, failed, can_act) {
+            Some(route) => found.extend(wanted.iter().filter_map(|&kind| {
+                MacroAction::along(Purpose::Interact(kind, class), Some(index), thing.best, route)
+            })),
+            None if !can_act => memory.map.discredit(class, thing.best, 0.3, NOT_THERE),
+            None => {}
         }
     }
     found.extend(explorations(memory, &routes));
@@ -122,13 +130,17 @@ pub(crate) fn available(
     (things, found)
 }
 
-/// A way that does not end here: what could be done here would be possible already.
-fn way_to(routes: &Routes, thing: &Thing, failed: &mut Failed) -> Option<Route> {
+/// A way that does not end here: what could be done here would be possible already. `can_act`: something else can be done here
+/// with a thing of the class, so that it is no bad place.
+fn way_to(routes: &Routes, thing: &Thing, failed: &mut Failed, can_act: bool) -> Option<Route> {
     let cells: Vec<(Cell, f32)> = thing.cells.iter().map(|(cell, known)| (*cell, known.height)).collect();
     for _ in 0..ENDS {
         let route = routes.plan(thing.class, &cells, failed)?;
         if route.first.is_some() {
             return Some(route);
+        }
+        if can_act {
+            return None;
         }
         failed.insert((thing.class, route.end));
     }

@@ -51,9 +51,16 @@ pub struct Recollection {
     /// What was begun where: a pose, and how much had been done for which goal.
     tried: BTreeSet<Tried>,
     /// What was set out to last, and where.
-    aim: Option<(Purpose, Option<Cell>)>,
+    aim: Option<Aim>,
+    /// What was decided at the step that was seen last: it counts as begun once it is known to have been done.
+    decided: Option<(Action, Tried, Aim)>,
+    /// The likeliest decision in the state that was seen last.
+    greedy: Option<Decision>,
     rng: ChaCha8Rng,
 }
+
+/// What was set out to, and where.
+type Aim = (Purpose, Option<Cell>);
 
 /// What was begun: where, at which goal, after how many interactions, and how.
 type Tried = (Pose, usize, usize, ActionType, Option<Class>);
@@ -66,6 +73,8 @@ impl Default for Recollection {
             seen_at: None,
             tried: BTreeSet::new(),
             aim: None,
+            decided: None,
+            greedy: None,
             rng: ChaCha8Rng::seed_from_u64(0),
         }
     }
@@ -109,14 +118,20 @@ impl MemoryPolicy {
         if known.seen_at != Some(here.step) {
             known.look(&self.eyes, here)?;
         }
+        if let Some(decision) = known.greedy.clone().filter(|_| !self.samples) {
+            return Ok(decision);
+        }
         let legal = here.environment.legal_actions()?;
         let (actions, done, probabilities) = known.weigh(&self.chooser, &legal)?;
         let tried = if self.loop_guard { known.begun_here() } else { Vec::new() };
-        let chosen = known.choose(&actions, &probabilities, &tried, self.samples);
+        let greedy = known.choose(&actions, &probabilities, &tried, false);
+        let distribution = distribution(&actions, &probabilities, &legal, greedy.first);
+        let chosen = if self.samples { known.choose(&actions, &probabilities, &tried, true) } else { greedy };
         let action = chosen.first;
         known.begin(chosen, here);
-        let distribution = distribution(&actions, &probabilities, &legal, action);
-        Ok(Decision { distribution: Some(distribution), done: Some(done), ..Decision::of(action) })
+        let decision = Decision { distribution: Some(distribution), done: Some(done), ..Decision::of(action) };
+        known.greedy = (!self.samples).then(|| decision.clone());
+        Ok(decision)
     }
 }
 
@@ -129,6 +144,7 @@ impl Recollection {
             let (goals, subtasks) = Goal::read(&instruction, &before)?;
             self.mind.set_goals(goals);
             self.tried.clear();
+            (self.aim, self.decided, self.greedy) = (None, None, None);
             self.read = Some((instruction, subtasks));
         }
         Ok(())
@@ -142,9 +158,13 @@ impl Recollection {
             let target = last.target.and_then(|target| environment.class_of(target));
             self.mind.acted(last, target);
         }
+        if let Some((_, tried, aim)) = self.decided.take().filter(|decided| Some(decided.0) == here.last) {
+            self.tried.insert(tried);
+            self.aim = Some(aim);
+        }
         let seen = eyes.look(environment)?;
         self.mind.observe(&Moment { pose, frame: environment.frame()?, seen: &seen });
-        self.seen_at = Some(here.step);
+        (self.seen_at, self.greedy) = (Some(here.step), None);
         Ok(())
     }
 
@@ -220,8 +240,7 @@ impl Recollection {
     fn begin(&mut self, chosen: MacroAction, here: &Observation<'_>) {
         let (pose, at, done) = self.situation();
         let (kind, class) = beginning(&chosen);
-        self.tried.insert((pose, at, done, kind, class));
-        self.aim = Some((chosen.purpose, chosen.at));
+        self.decided = Some((chosen.first, (pose, at, done, kind, class), (chosen.purpose, chosen.at)));
         let class = chosen.first.target.and_then(|target| here.environment.class_of(target));
         let cell = chosen.at.unwrap_or_else(|| self.mind.ahead());
         self.mind.attempt(chosen.first, class.map(|class| (class, cell)));
@@ -229,11 +248,10 @@ impl Recollection {
 }
 
 /// Whether a macro action goes on with what was set out to last.
-fn goes_on(aim: Option<(Purpose, Option<Cell>)>, action: &MacroAction) -> bool {
+fn goes_on(aim: Option<Aim>, action: &MacroAction) -> bool {
     let near = |a: Cell, b: Cell| (a.x - b.x).abs().max((a.z - b.z).abs()) <= 2;
-    let same = |(purpose, at): (Purpose, Option<Cell>)| {
-        purpose == action.purpose && at.zip(action.at).is_some_and(|(was, is)| near(was, is))
-    };
+    let same =
+        |(purpose, at): Aim| purpose == action.purpose && at.zip(action.at).is_some_and(|(was, is)| near(was, is));
     aim.is_some_and(same)
 }
 
@@ -384,19 +402,36 @@ mod tests {
         policy.reset(0, 7);
         let mut rollout = episode();
         play(&mut policy, &mut rollout, 0, 4);
-        let (state, world) = (policy.state(0), rollout.env.snapshot().unwrap());
+        let (state, world, last) = (policy.state(0), rollout.env.snapshot().unwrap(), rollout.last());
         let went_on = play(&mut policy, &mut rollout, 0, 6);
         policy.restore(0, state.clone());
         rollout.env.restore(&world).unwrap();
         rollout.set_steps(4);
+        rollout.set_last(last);
         assert_eq!(play(&mut policy, &mut rollout, 0, 6), went_on);
         policy.set_sampling(false);
         policy.restore(0, state);
         rollout.env.restore(&world).unwrap();
         rollout.set_steps(4);
-        let distributions = [rollout.decide(&mut policy), rollout.decide(&mut policy)];
-        let [once, twice] = distributions.map(|decision| decision.unwrap().distribution.unwrap());
-        assert_eq!(once.actions, twice.actions);
+        rollout.set_last(last);
+        let [once, twice] = [rollout.decide(&mut policy), rollout.decide(&mut policy)].map(Result::unwrap);
+        assert_eq!(once, twice);
+    }
+
+    #[test]
+    fn what_somebody_else_did_is_what_was_done() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        policy.reset(0, 1);
+        let mut rollout = episode();
+        rollout.decide(&mut policy).unwrap();
+        rollout.carry_out(Decision::of(Action::navigate(ActionType::RotateLeft))).unwrap();
+        rollout.decide(&mut policy).unwrap();
+        let known = &policy.slots[0];
+        assert_eq!(known.mind.memory.odometry.pose().heading, crate::domain::Heading::West);
+        assert!(known.mind.progress.done.is_empty());
+        let own = |tried: &&Tried| tried.3 != ActionType::RotateLeft;
+        assert_eq!(known.tried.iter().filter(own).count(), 0, "{:?}", known.tried);
     }
 
     #[test]

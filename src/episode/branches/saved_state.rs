@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::agent::{Policy, PolicyState};
-use crate::domain::World;
+use crate::domain::{Action, World};
 use crate::episode::record::Author;
 use crate::episode::rollout::Rollout;
 use crate::episode::wish::Wishes;
@@ -24,6 +24,8 @@ pub(crate) struct SavedState {
     pub(crate) wishes: Wishes,
     /// Who decides.
     pub(crate) author: Author,
+    /// The action that led here; `None` at the start.
+    pub(crate) last: Option<Action>,
     /// What the policy carries.
     pub(crate) carried: PolicyState,
 }
@@ -38,6 +40,7 @@ impl SavedState {
             instruction: rollout.instruction.clone(),
             wishes: Wishes::new(),
             author: author.clone(),
+            last: rollout.last(),
             carried,
         }
     }
@@ -49,6 +52,7 @@ impl SavedState {
         rollout.env.house.restore((*self.world).clone());
         rollout.env.grader.clone_from(&self.grader);
         rollout.set_steps(steps);
+        rollout.set_last(self.last);
     }
 }
 

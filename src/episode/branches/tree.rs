@@ -264,6 +264,7 @@ mod tests {
         let mut world = World::default();
         world.agent.cell.x = x;
         SavedState {
+            last: None,
             world: Arc::new(world),
             grader: None,
             horizon: None,

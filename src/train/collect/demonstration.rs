@@ -200,12 +200,17 @@ impl DisturbedPolicy<'_> {
         if self.disturbed == 0 && self.rng.random_bool(self.noise) {
             self.disturbed = self.rng.random_range(1..=LONGEST);
         }
-        let action = match self.learner.as_mut().filter(|_| here.step < self.learner_until) {
+        // A learner that remembers looks at every step, whoever acts.
+        let learned = match self.learner.as_mut() {
+            Some(learner) => Some(again(here, learner.as_mut())?.action),
+            None => None,
+        };
+        let action = match learned.filter(|_| here.step < self.learner_until) {
             _ if self.disturbed > 0 => {
                 self.disturbed -= 1;
                 disturbance(&here.environment.legal_actions()?, self.rng)
             }
-            Some(learner) => again(here, learner.as_mut())?.action,
+            Some(learned) => learned,
             None => choice,
         };
         self.choices.push(choice);

@@ -35,7 +35,7 @@ pub(crate) struct PlaceLabels {
 }
 
 impl PlaceLabels {
-    /// The labels of a frame that was drawn of `world`. What the agent holds is labelled as everything else.
+    /// The labels of a frame that was drawn of `world`. What the agent holds is no instance of the frame, and so has no label.
     pub(crate) fn of(scene: &Scene, world: &World, frame: &Frame) -> PlaceLabels {
         let mut holding: BTreeMap<usize, f32> = BTreeMap::new();
         let mut things = Vec::new();

@@ -106,7 +106,7 @@ pub(crate) fn train(
             scalars.add("detector_loss", &loss);
         }
         if (learner.step().is_multiple_of(rhythm.report_every * 10) || learner.is_done()) && !held_out.is_empty() {
-            accuracy(detector, &held_out).report(&mut scalars);
+            accuracy(detector, &held_out)?.report(&mut scalars);
         }
         logger.log(&scalars)?;
         if learner.step().is_multiple_of(rhythm.save_every) || learner.is_done() {
@@ -193,15 +193,15 @@ fn holding(glimpses: &[Glimpse], device: Device) -> Holding {
     Holding { at: Tensor::from_slice(&at).to_device(device), weights: Tensor::from_slice(&weights).to_device(device) }
 }
 
-fn accuracy(detector: &Detector, held_out: &[Glimpse]) -> Accuracy {
+fn accuracy(detector: &Detector, held_out: &[Glimpse]) -> anyhow::Result<Accuracy> {
     let mut accuracy = Accuracy::default();
     for glimpses in held_out.chunks(64) {
         let said = tch::no_grad(|| detector.forward(Precision::Full, &images(glimpses), false)).sigmoid();
         let said = said.to_kind(Kind::Float).to_device(Device::Cpu);
         for (row, glimpse) in (0i64..).zip(glimpses) {
-            let numbers = Vec::<f32>::try_from(said.get(row).flatten(0, -1)).unwrap_or_default();
+            let numbers = Vec::<f32>::try_from(said.get(row).flatten(0, -1))?;
             accuracy.add(&numbers, &glimpse.labels);
         }
     }
-    accuracy
+    Ok(accuracy)
 }

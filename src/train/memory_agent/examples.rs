@@ -17,6 +17,7 @@ use crate::house::House;
 use crate::house::render::Renderer;
 use crate::house::view::{self, View};
 use crate::language::instruction::normalise;
+use crate::nets::device::set_threads;
 use crate::train::frame_store::FrameStore;
 
 /// A remembered object within so many cells of the one that the demonstrator went for is taken for it.
@@ -45,6 +46,8 @@ pub(crate) fn examples(
     seed: u64,
     wanted: &[usize],
 ) -> anyhow::Result<Vec<Vec<Example>>> {
+    // Sums must not depend on how many threads there are.
+    set_threads(1);
     let threads = rayon::current_num_threads().max(1);
     // Each worker has eyes of its own; weights are shared.
     let workers: Vec<(Eyes, &[usize])> =
@@ -56,7 +59,7 @@ pub(crate) fn examples(
             rng.set_stream(trajectory as u64 + 1);
             let recorded = &frame_store.trajectories[trajectory];
             let told = Told::of(recorded, &mut rng)?;
-            Ok(replay(recorded, frame_store.scene(trajectory)?, &told, &eyes, &mut renderer))
+            replay(recorded, frame_store.scene(trajectory)?, &told, &eyes, &mut renderer)
         });
         replayed.collect()
     };
@@ -119,8 +122,8 @@ fn ends(trajectory: &Trajectory, goals: &[Goal]) -> Option<Vec<usize>> {
                 ends.push(end(trajectory, at));
                 break;
             }
-            let implied = done.skill == SkillKind::Pickup
-                && (same(&done, goal) || goal.skill == SkillKind::Slice && done.object.is_knife());
+            // People say nothing of the knife, neither that it is taken nor that it is laid down.
+            let implied = done.object.is_knife() || done.skill == SkillKind::Pickup && same(&done, goal);
             if !implied {
                 return None;
             }
@@ -129,7 +132,13 @@ fn ends(trajectory: &Trajectory, goals: &[Goal]) -> Option<Vec<usize>> {
     (skills.next().is_none() && !ends.is_empty()).then_some(ends)
 }
 
-fn replay(trajectory: &Trajectory, scene: &Scene, told: &Told, eyes: &Eyes, renderer: &mut Renderer) -> Vec<Example> {
+fn replay(
+    trajectory: &Trajectory,
+    scene: &Scene,
+    told: &Told,
+    eyes: &Eyes,
+    renderer: &mut Renderer,
+) -> anyhow::Result<Vec<Example>> {
     let origin = trajectory.start.agent;
     let labels = if trajectory.choices.is_empty() { &trajectory.actions } else { &trajectory.choices };
     let mut world = trajectory.start.clone();
@@ -138,14 +147,14 @@ fn replay(trajectory: &Trajectory, scene: &Scene, told: &Told, eyes: &Eyes, rend
     let mut found = Vec::new();
     for step in 0..=trajectory.actions.len() {
         let frame = renderer.draw(scene, &world);
-        let seen = eyes.look_at(scene, &world, frame);
+        let seen = eyes.look_at(scene, &world, frame)?;
         mind.observe(&Moment { pose: world.agent.relative_to(origin), frame, seen: &seen });
         let legal = view::candidates(scene, &world, &View::of(frame));
-        if told.ends.get(mind.progress.at) == Some(&step) {
+        while told.ends.get(mind.progress.at).is_some_and(|end| *end <= step) {
             let (_, choice) = mind.choice(&legal);
             found.push(Example { choice, right: Vec::new(), aim: None, reached: true });
             if mind.progress.is_last() {
-                break;
+                return Ok(found);
             }
             mind.progress.advance();
         }
@@ -163,7 +172,7 @@ fn replay(trajectory: &Trajectory, scene: &Scene, told: &Told, eyes: &Eyes, rend
         mind.attempt(action, class.map(|class| (class, at)));
         crate::house::rules::apply(scene, &mut world, action);
     }
-    found
+    Ok(found)
 }
 
 /// Whether a macro action begins with what the demonstrator did: for an interaction, with a thing of the same class.
