@@ -1,6 +1,6 @@
 //! For tests: places of the house in the agent's own frame.
 
-use crate::domain::{Cell, Heading, Point, Pose, Scene};
+use crate::domain::{Heading, Point, Pose, Scene};
 
 /// A point of the house as an agent that started at `start` would call it, its height above the floor.
 pub(crate) fn point_in_own_frame(scene: &Scene, start: Pose, point: Point) -> Point {
@@ -12,11 +12,4 @@ pub(crate) fn point_in_own_frame(scene: &Scene, start: Pose, point: Point) -> Po
         Heading::South => Point::new(-dx, y, -dz),
         Heading::West => Point::new(dz, y, -dx),
     }
-}
-
-/// A pose of the house as an agent that started at `start` would call it.
-pub(crate) fn in_own_frame(scene: &Scene, start: Pose, pose: Pose) -> Pose {
-    let cell = Cell::nearest(point_in_own_frame(scene, start, pose.cell.centre(0)));
-    let heading = Heading::from_quarters(pose.heading.quarters() - start.heading.quarters());
-    Pose { cell, heading, ..pose }
 }

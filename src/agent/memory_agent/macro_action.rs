@@ -209,3 +209,87 @@ fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::memory::semantic_map::Evidence;
+    use crate::agent::memory_agent::eyes::Eyes;
+    use crate::agent::memory_agent::mind::{Mind, Moment};
+    use crate::domain::SkillKind;
+    use crate::domain::world::{Object, Parent};
+    use crate::house::House;
+    use crate::house::testing::kitchen;
+
+    fn class(name: &str) -> Class {
+        Class::named(name).unwrap()
+    }
+
+    fn goal(skill: SkillKind, object: &str, receptacle: Option<&str>) -> Goal {
+        let receptacle = receptacle.map(class);
+        Goal { skill, object: class(object), others: Vec::new(), receptacle, place: None, slice: false }
+    }
+
+    fn possible(name: &str, open: f32, held: Option<&str>) -> Vec<ActionType> {
+        let known = Evidence { score: 0.9, open, ..Evidence::default() };
+        let thing = Thing {
+            class: class(name),
+            cells: vec![(Cell::new(0, 0), known)],
+            best: Cell::new(0, 0),
+            score: 0.9,
+            height: 1.0,
+            seen: 0,
+            open,
+        };
+        kinds(&thing, &Progress { held: held.map(class), ..Progress::default() }).collect()
+    }
+
+    #[test]
+    fn what_can_be_done_with_a_thing_follows_from_its_kind_its_state_and_the_hand() {
+        use ActionType::{Close, Open, Pickup, Put, Slice, ToggleOff, ToggleOn};
+        assert_eq!(possible("Mug", 0.0, None), [Pickup]);
+        assert_eq!(possible("Mug", 0.0, Some("Spoon")), [Put]);
+        assert_eq!(possible("Fridge", 0.1, Some("Apple")), [Open]);
+        assert_eq!(possible("Fridge", 0.9, Some("Apple")), [Put, Close]);
+        assert_eq!(possible("FloorLamp", 0.0, None), [ToggleOn]);
+        assert_eq!(possible("Apple", 0.0, Some("Knife")), [Slice]);
+        assert_eq!(possible("Microwave", 0.5, None), [Open, Close, ToggleOn, ToggleOff]);
+    }
+
+    #[test]
+    fn only_what_can_have_to_do_with_the_goal_is_set_out_to() {
+        let put = goal(SkillKind::Put, "Mug", Some("Sink"));
+        let heat = goal(SkillKind::Heat, "Potato", None);
+        let empty = Progress::default();
+        let full = Progress { held: Some(class("Book")), ..Progress::default() };
+        assert!(matters(&put, &empty, ActionType::Pickup, class("Mug")));
+        assert!(!matters(&put, &empty, ActionType::Pickup, class("Spoon")));
+        assert!(matters(&heat, &empty, ActionType::ToggleOn, class("Microwave")));
+        assert!(!matters(&heat, &empty, ActionType::ToggleOn, class("FloorLamp")));
+        assert!(matters(&heat, &empty, ActionType::Open, class("Drawer")), "the potato may be in it");
+        assert!(matters(&heat, &full, ActionType::Put, class("CounterTop")), "the hand must be freed");
+    }
+
+    #[test]
+    fn whoever_starts_with_a_full_hand_can_put_down_what_is_in_it() {
+        let (scene, mut world) = kitchen();
+        world.objects.push(Object { class: class("Book"), parent: Parent::Hand, ..Object::default() });
+        world.held = Some(world.objects.len() as u16 - 1);
+        let mut house = House::new(scene.into(), world);
+        let mut mind = Mind::default();
+        mind.set_goals(vec![goal(SkillKind::Put, "Book", Some("CounterTop"))]);
+        for _ in 0..4 {
+            let (scene, world) = (house.scene().clone(), house.world().clone());
+            let frame = house.frame().clone();
+            let seen = Eyes::Simulator.look_at(&scene, &world, &frame).unwrap();
+            mind.observe(&Moment { pose: world.agent, frame: &frame, seen: &seen });
+            house.step(Action::navigate(ActionType::RotateRight));
+        }
+        assert_eq!(mind.progress.held, Some(class("Book")), "the goal says what it is");
+        let (actions, choice) = mind.choice(&house.candidates());
+        let puts = |it: &&MacroAction| it.purpose == Purpose::Interact(ActionType::Put, class("CounterTop"));
+        assert!(actions.iter().any(|it| puts(&it)), "{actions:?}");
+        assert!(!actions.iter().any(|it| matches!(it.purpose, Purpose::Interact(ActionType::Pickup, _))));
+        assert_eq!(choice.len(), actions.len());
+    }
+}

@@ -419,6 +419,35 @@ mod tests {
     }
 
     #[test]
+    fn an_episode_that_is_replayed_is_remembered_as_it_was_played() {
+        let _chance = crate::nets::testing::chance();
+        let mut policy = policy();
+        policy.set_sampling(true);
+        policy.reset(0, 11);
+        let mut rollout = episode();
+        let origin = rollout.env.house.world().agent;
+        let mut replayed = Mind::default();
+        replayed.set_goals(Goal::read("pick up the mug", &[]).unwrap().0);
+        for _ in 0..10 {
+            let pose = rollout.env.house.world().agent.relative_to(origin);
+            let (scene, world) = (rollout.env.house.scene().clone(), rollout.env.house.world().clone());
+            let frame = rollout.env.house.frame().clone();
+            let seen = Eyes::Simulator.look_at(&scene, &world, &frame).unwrap();
+            let decision = rollout.decide(&mut policy).unwrap();
+            replayed.observe(&Moment { pose, frame: &frame, seen: &seen });
+            let (actions, _) = replayed.choice(&rollout.env.legal_actions().unwrap());
+            let played = &policy.slots[0].mind;
+            assert_eq!((&played.memory, &played.progress), (&replayed.memory, &replayed.progress));
+            let action = decision.action;
+            let class = action.target.and_then(|target| world.class_of(&scene, target));
+            let at = actions.iter().find(|it| it.first == action).and_then(|it| it.at);
+            let at = at.unwrap_or_else(|| replayed.ahead());
+            replayed.attempt(action, class.map(|class| (class, at)));
+            rollout.carry_out(decision).unwrap();
+        }
+    }
+
+    #[test]
     fn what_somebody_else_did_is_what_was_done() {
         let _chance = crate::nets::testing::chance();
         let mut policy = policy();
