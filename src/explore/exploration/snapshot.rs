@@ -7,7 +7,7 @@ use crate::agent::Reading;
 use crate::agent::registry::PolicyKind;
 use crate::domain::{Cell, Scene, World};
 use crate::episode::branches::FRAMES;
-use crate::episode::wish::{WishVerdict, Wishes};
+use crate::episode::wish::{WishGrading, WishVerdict, Wishes};
 use crate::explore::timeline::Timeline;
 use crate::house::House;
 use crate::house::grading::describe;
@@ -42,6 +42,8 @@ pub struct SessionSnapshot {
     pub(crate) progress: Option<TaskProgress>,
     /// What was told on the way here, the wish in force last.
     pub(crate) wishes: Wishes,
+    /// How many subtasks of the wish in force are done, and of how many; nothing where nobody grades it.
+    pub(crate) graded: Option<(usize, usize)>,
     /// What the wish in force came to, if it is over.
     pub(crate) end: Option<WishVerdict>,
     /// Where the agent has been.
@@ -99,6 +101,7 @@ impl Exploration {
             expert_steps: self.wishes.last().and_then(|wish| wish.expert_steps),
             progress,
             wishes: self.wishes.clone(),
+            graded: self.graded(),
             end: self.end(),
             path,
             policy: self.acting.kind,
@@ -108,6 +111,13 @@ impl Exploration {
             reading: self.acting.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
             examples: self.episode.examples.clone(),
         }
+    }
+
+    /// How many subtasks the grader of the wish in force has done, and of how many; nothing where nobody grades it.
+    pub(crate) fn graded(&self) -> Option<(usize, usize)> {
+        let is_graded = self.wish().is_some_and(|wish| wish.grading != WishGrading::Nobody);
+        let grader = self.rollout.env.grader.as_ref().filter(|_| is_graded)?;
+        Some((grader.completed(), grader.total()))
     }
 
     /// How far the task has come, where one applies.

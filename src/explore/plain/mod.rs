@@ -185,9 +185,9 @@ impl<W: Write> Plain<W> {
             }
             SessionEvent::Noted(what) => writeln!(out, "{what}")?,
             SessionEvent::Read(wish) => reading(&wish, out)?,
-            SessionEvent::AgentDone(wish, likely) => {
-                let (done, of) = (wish.completed, wish.subtasks.len());
-                let grader = if of > 0 { format!("the grader: {done} of {of}") } else { "nobody grades it".into() };
+            SessionEvent::AgentDone { likely, graded, .. } => {
+                let grader =
+                    graded.map_or("nobody grades it".into(), |(done, of)| format!("the grader: {done} of {of}"));
                 writeln!(out, "the agent says that it is done ({likely:.2}); {grader}")?;
             }
             SessionEvent::Ended(wish) => verdict(&wish, out)?,

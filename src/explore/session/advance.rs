@@ -79,7 +79,7 @@ impl Session {
             self.set_mode(None);
             let likely = self.exploration.decide().ok().and_then(|(decision, _)| decision.done);
             if let (Some(wish), Some(likely)) = (self.exploration.wish().cloned(), likely) {
-                self.emit(SessionEvent::AgentDone(wish, likely));
+                self.emit(SessionEvent::AgentDone { wish, likely, graded: self.exploration.graded() });
             }
             if self.live {
                 self.show();
@@ -161,6 +161,7 @@ mod tests {
     use crate::agent::{Decision, Decisions, Observation, Policy};
     use crate::domain::{Action, ActionType};
     use crate::episode::wish::WishVerdict;
+    use crate::explore::exploration::Exploration;
     use crate::explore::session::SessionCommand;
     use crate::explore::testing;
 
@@ -190,6 +191,10 @@ mod tests {
         let mut exploration = testing::exploration();
         exploration.act_by(Box::new(Turning(says_done_from)));
         exploration.instruct(told).unwrap();
+        listened(exploration)
+    }
+
+    fn listened(exploration: Exploration) -> (Session, Receiver<SessionEvent>) {
         let (tell, events) = channel();
         let tell = Mutex::new(tell);
         (Session::on_request(exploration, Arc::new(move |event| drop(tell.lock().unwrap().send(event)))), events)
@@ -204,7 +209,7 @@ mod tests {
 
     fn last_word(events: &Receiver<SessionEvent>) -> String {
         let words = events.try_iter().filter_map(|event| match event {
-            SessionEvent::AgentDone(wish, likely) => Some(format!("agent {likely}: {}", wish.instruction)),
+            SessionEvent::AgentDone { wish, likely, .. } => Some(format!("agent {likely}: {}", wish.instruction)),
             SessionEvent::Ended(wish) => Some(wish.verdict_in_words()),
             _ => None,
         });
@@ -221,6 +226,30 @@ mod tests {
         session.apply(SessionCommand::Say { fulfilled: true });
         assert_eq!(last_word(&events), "done, you say; the agent: done at step 3");
         assert_eq!(session.exploration.end(), Some(WishVerdict::SaidDone));
+    }
+
+    #[test]
+    fn the_agents_word_stands_beside_what_the_grader_of_a_task_or_a_reading_has_done() {
+        let graded = |exploration: crate::explore::exploration::Exploration| {
+            let (mut session, events) = listened(exploration);
+            run(&mut session, 10);
+            let graded = events.try_iter().find_map(|event| match event {
+                SessionEvent::AgentDone { graded, .. } => Some(graded),
+                _ => None,
+            });
+            graded.unwrap()
+        };
+        let told = |text: Option<&str>| {
+            let mut exploration = testing::exploration();
+            exploration.act_by(Box::new(Turning(3)));
+            if let Some(text) = text {
+                exploration.instruct(text).unwrap();
+            }
+            exploration
+        };
+        assert_eq!(graded(told(None)), Some((0, 2)), "the task's own subtasks");
+        assert_eq!(graded(told(Some("pick up the mug"))), Some((0, 1)));
+        assert_eq!(graded(told(Some("dance"))), None);
     }
 
     #[test]

@@ -49,7 +49,14 @@ pub enum SessionEvent {
     /// How what was told is understood.
     Read(Arc<Wish>),
     /// The agent says that it is done; the grader does not, or there is none.
-    AgentDone(Arc<Wish>, f32),
+    AgentDone {
+        /// The wish in force.
+        wish: Arc<Wish>,
+        /// How likely that is by the agent's own end.
+        likely: f32,
+        /// How many subtasks the grader has done, and of how many; nothing where nobody grades the wish.
+        graded: Option<(usize, usize)>,
+    },
     /// The wish in force is over.
     Ended(Arc<Wish>),
     /// Nothing was done, because the wish in force is over.

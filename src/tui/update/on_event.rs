@@ -94,10 +94,10 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
             }
             vec![]
         }
-        SessionEvent::AgentDone(wish, likely) => {
-            let grader = match wish.subtasks.len() {
-                0 => "nobody grades it: :done or :failed".to_string(),
-                of => format!("the grader has {} of {of}", wish.completed),
+        SessionEvent::AgentDone { likely, graded, .. } => {
+            let grader = match graded {
+                None => "nobody grades it: :done or :failed".to_string(),
+                Some((done, of)) => format!("the grader has {done} of {of}"),
             };
             app.note(Tone::Note, format!("the agent says done ({likely:.2}); {grader}"));
             vec![]

@@ -18,11 +18,12 @@ pub(crate) struct MeaningRow<'a>(pub(crate) &'a App);
 
 impl Widget for MeaningRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let Some(wish) = self.0.session.now.as_ref().and_then(|now| now.wishes.last()) else { return };
+        let Some(now) = &self.0.session.now else { return };
+        let Some(wish) = now.wishes.last() else { return };
         let width = usize::from(area.width);
         let mut spans: Vec<Span<'_>> = Vec::new();
         let mut used = 0;
-        for (text, style) in parts(wish) {
+        for (text, style) in parts(wish, now.graded) {
             let text = fit(&text, width.saturating_sub(used));
             used += text.width();
             spans.push(Span::styled(text, style));
@@ -32,7 +33,7 @@ impl Widget for MeaningRow<'_> {
 }
 
 /// The line in pieces, what matters most first.
-fn parts(wish: &Wish) -> Vec<(String, Style)> {
+fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
     if let Some(verdict) = wish.verdict {
         let style = if verdict.is_fulfilled() { THEME.good } else { THEME.bad };
         let agent = wish.agent_in_words().map_or(String::new(), |words| format!("; {words}"));
@@ -42,16 +43,16 @@ fn parts(wish: &Wish) -> Vec<(String, Style)> {
         };
         return vec![(format!("  {}", verdict.words()), style), (agent, THEME.note), (next, THEME.quiet)];
     }
-    if wish.grading == WishGrading::Task {
-        return vec![("  the task's own words".into(), THEME.quiet)];
-    }
     if let Some(agent) = wish.agent_in_words() {
-        let grader = match wish.subtasks.len() {
-            0 => "; nobody grades it".to_string(),
-            of => format!("; the grader: {} of {of}", wish.completed),
+        let grader = match graded {
+            None => "; nobody grades it".to_string(),
+            Some((done, of)) => format!("; the grader: {done} of {of}"),
         };
         let next = "; space goes on, :done or :failed ends it";
         return vec![(format!("  {agent}"), THEME.note), (grader, THEME.key), (next.into(), THEME.quiet)];
+    }
+    if wish.grading == WishGrading::Task {
+        return vec![("  the task's own words".into(), THEME.quiet)];
     }
     if let Some(why) = &wish.ungraded {
         let judge = if wish.is_told() { "; :done or :failed when it is" } else { ": i tells it something" };
@@ -79,4 +80,18 @@ fn parts(wish: &Wish) -> Vec<(String, Style)> {
 
 fn steps(many: u32) -> String {
     if many == 1 { "1 step".into() } else { format!("{many} steps") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn that_the_agent_says_done_is_shown_on_a_task_too_with_what_its_grader_has() {
+        let text = |wish: &Wish| parts(wish, Some((1, 2))).into_iter().map(|(text, _)| text).collect::<String>();
+        let task = Wish::task("Put the mug in the sink.", 12);
+        assert_eq!(text(&task), "  the task's own words");
+        let said = text(&Wish { agent_done: Some(7), ..task });
+        assert!(said.starts_with("  the agent: done at step 7; the grader: 1 of 2;"), "{said}");
+    }
 }
