@@ -87,12 +87,14 @@ impl InFlight {
         if let Some(wish) = evaluation.read.get(&self.spec.task) {
             let verdict = match (episode.success, episode.error.is_some()) {
                 (true, _) => Some(WishVerdict::Done),
-                (false, false) => Some(WishVerdict::OutOfTime),
-                (false, true) => None,
+                // Where the agent ended it, time was left.
+                (false, false) if episode.agent_end.is_none() => Some(WishVerdict::OutOfTime),
+                (false, _) => None,
             };
+            let agent_done = episode.agent_end.map(|_| episode.trace.len() as u32);
             let (steps, completed, failure) = (episode.steps, episode.completed, episode.failure);
             let instruction = episode.instruction.clone();
-            episode.wishes = vec![Wish { instruction, steps, completed, verdict, failure, ..wish.clone() }];
+            episode.wishes = vec![Wish { instruction, steps, completed, agent_done, verdict, failure, ..wish.clone() }];
         }
         self.episode
     }

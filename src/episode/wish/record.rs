@@ -192,6 +192,7 @@ impl Wish {
     pub(crate) fn verdict_in_words(&self) -> String {
         let own = match self.verdict {
             Some(verdict) => verdict.words(),
+            None if self.failure.is_some() => "failed",
             None => "open",
         };
         let failure = self.failure.map_or(String::new(), |failure| format!(" ({})", failure.words()));

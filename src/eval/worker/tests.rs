@@ -2,12 +2,16 @@
 
 use super::*;
 use crate::agent::policy::each_alone;
+use crate::agent::policy_source::MakePolicy;
 use crate::agent::{Decisions, Observation};
 use crate::domain::{Action, ActionType};
 use crate::episode::failure::Failure;
 use crate::episode::record::Episode;
 use crate::episode::rollout::EndedBy;
-use crate::eval::evaluation::tests::{options, run};
+use crate::episode::scenes::Scenes;
+use crate::episode::wish::WishVerdict;
+use crate::eval::evaluation::Evaluation;
+use crate::eval::evaluation::tests::{options, run, tasks};
 use crate::eval::options::Options;
 
 /// When an expert that may say so says that it is done.
@@ -101,4 +105,34 @@ fn an_agents_own_end_counts_only_where_everything_holds_when_it_speaks() {
 fn a_policy_without_an_end_of_its_own_is_told_so() {
     let error = played(Says::Nothing)[0].error.clone().unwrap();
     assert!(error.contains("--end grader"), "{error}");
+}
+
+#[test]
+fn a_task_that_was_read_keeps_what_the_agent_said_of_its_end() {
+    let wish = |says| {
+        let (folder, mut set) = tasks();
+        set.value.tasks.truncate(1);
+        let task = &mut set.value.tasks[0];
+        task.instruction = "pick up the mug".into();
+        (task.roles, task.subtasks, task.sentences) = (Vec::new(), Vec::new(), Vec::new());
+        let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
+        let options = Options { end: EndedBy::Agent, seeds: 1, ..options() };
+        let evaluation = Evaluation::prepare(&set, scenes, options, "speaker", None).unwrap();
+        let make: Arc<MakePolicy> =
+            Arc::new(move || Ok(Box::new(Speaker { expert: ExpertPolicy::new(), says }) as Box<dyn Policy>));
+        let mut wishes = Vec::new();
+        let mut sink = |episode: Episode| {
+            wishes.extend(episode.wishes);
+            Ok(())
+        };
+        evaluation.play(&evaluation.all(), &make, &Arc::default(), &mut sink).unwrap();
+        wishes.remove(0)
+    };
+    let done = wish(Says::WhenDone);
+    assert_eq!((done.verdict, done.agent_done), (Some(WishVerdict::Done), Some(done.steps)));
+    let early = wish(Says::AtOnce);
+    assert_eq!((early.verdict, early.agent_done, early.failure), (None, Some(0), Some(Failure::StoppedEarly)));
+    assert!(early.verdict_in_words().starts_with("failed ("), "{}", early.verdict_in_words());
+    let never = wish(Says::Never);
+    assert_eq!((never.verdict, never.agent_done), (Some(WishVerdict::OutOfTime), None));
 }
