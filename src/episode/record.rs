@@ -111,7 +111,9 @@ impl Episode {
     /// The trace's steps that the agent took for what it was told at the start.
     pub(crate) fn own_steps(&self) -> &[TraceStep] {
         let first = (self.prefix_steps as usize).min(self.trace.len());
-        let told_else = self.wishes.get(1).map_or(self.trace.len(), |next| next.began as usize);
+        // What was told before the first step was told at the start, too.
+        let next = self.wishes.iter().skip(1).find(|wish| wish.began > 0);
+        let told_else = next.map_or(self.trace.len(), |next| next.began as usize);
         &self.trace[first..told_else.clamp(first, self.trace.len())]
     }
 

@@ -61,12 +61,34 @@ pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -
     };
     let rows: Vec<serde_json::Value> = run.episodes.par_iter().enumerate().map(row).collect::<anyhow::Result<_>>()?;
     let data = in_script(&rows)?;
+    let wishes = match run.manifest.policy.as_str() {
+        "explored" => {
+            fulfilled(&run.episodes).map_or(String::new(), |[k, n]| format!("\nWishes fulfilled: {k} of {n}.\n"))
+        }
+        _ => String::new(),
+    };
     let title = format!("{} on {}", summary.policy, summary.task_set);
     Ok(TEMPLATE
         .replace("{{title}}", &escape(&title))
         .replace("{{plot}}", &progress_by_length::draw(&[summary]).svg())
-        .replace("{{summary}}", &escape(&summary.markdown()))
+        .replace("{{summary}}", &escape(&(summary.markdown() + &wishes)))
         .replace("{{episodes}}", &data))
+}
+
+/// How many wishes were fulfilled, and of how many, where any was told. Branches that part only later share theirs.
+fn fulfilled(episodes: &[Episode]) -> Option<[usize; 2]> {
+    let mut known: Vec<(&Wish, &[TraceStep])> = Vec::new();
+    for episode in episodes {
+        for wish in episode.wishes.iter().filter(|wish| wish.grading == WishGrading::Task || wish.is_told()) {
+            let until = ((wish.began + wish.steps) as usize).min(episode.trace.len());
+            let one = (wish, &episode.trace[..until]);
+            if !known.contains(&one) {
+                known.push(one);
+            }
+        }
+    }
+    let done = known.iter().filter(|(wish, _)| wish.verdict.is_some_and(WishVerdict::is_fulfilled)).count();
+    (!known.is_empty()).then_some([done, known.len()])
 }
 
 /// What was told, and what came of it.
@@ -138,6 +160,32 @@ fn frame_png(rollout: &mut Rollout) -> anyhow::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::ActionType;
+    use crate::house::Outcome;
+
+    #[test]
+    fn a_wish_that_two_branches_share_counts_once() {
+        let step = |kind| TraceStep {
+            kind,
+            target: None,
+            class: None,
+            outcome: Outcome::Done,
+            subtask: None,
+            instruction: None,
+            author: None,
+        };
+        let wish = |began, steps, verdict| Wish { steps, verdict, ..Wish::ungraded("Dance.", began, "no thing") };
+        let done = Some(WishVerdict::SaidDone);
+        let branch = |last: ActionType, wishes: Vec<Wish>| Episode {
+            wishes,
+            trace: vec![step(ActionType::LookUp), step(last)],
+            ..Episode::default()
+        };
+        let main = branch(ActionType::RotateLeft, vec![wish(0, 1, done), wish(1, 1, None)]);
+        let other = branch(ActionType::RotateRight, vec![wish(0, 1, done), wish(1, 1, None)]);
+        assert_eq!(fulfilled(&[main, other]), Some([1, 3]));
+        assert_eq!(fulfilled(&[branch(ActionType::LookUp, Vec::new())]), None);
+    }
 
     #[test]
     fn nothing_in_a_script_ends_it_or_begins_a_comment() {

@@ -151,6 +151,22 @@ mod tests {
     }
 
     #[test]
+    fn a_wish_that_follows_another_at_the_start_is_the_branchs_own() {
+        let mut exploration = testing::exploration();
+        exploration.choose(PolicyKind::Expert).unwrap();
+        exploration.instruct("dance").unwrap();
+        exploration.say(true).unwrap();
+        exploration.instruct("pick up the mug").unwrap();
+        while exploration.end().is_none() {
+            exploration.step().unwrap();
+        }
+        let episode = exploration.explored().episodes.remove(0);
+        assert_eq!(episode.wishes.iter().map(|wish| wish.began).collect::<Vec<_>>(), [0, 0]);
+        assert_eq!((episode.success, episode.completed, episode.of), (true, 1, 1));
+        assert_eq!(episode.own_steps().len(), episode.trace.len());
+    }
+
+    #[test]
     fn a_branch_is_exported_by_its_ending() {
         let folder = tempfile::tempdir().unwrap();
         let mut exploration = testing::exploration();
