@@ -229,6 +229,19 @@ mod tests {
     }
 
     #[test]
+    fn a_run_pauses_again_after_a_reset_time_travel_and_in_the_next_house() {
+        let (mut session, events) = session(3, "dance");
+        run(&mut session, 10);
+        assert_eq!(last_word(&events), "agent 0.9: Dance.");
+        for again in [SessionCommand::Seek(0), SessionCommand::Reset, SessionCommand::Next] {
+            session.apply(again.clone());
+            run(&mut session, 10);
+            assert_eq!(session.exploration.tree().at(), 3, "{again:?}");
+            assert!(last_word(&events).starts_with("agent 0.9: "), "{again:?}");
+        }
+    }
+
+    #[test]
     fn the_agents_word_stands_beside_what_the_grader_of_a_task_or_a_reading_has_done() {
         let graded = |exploration: crate::explore::exploration::Exploration| {
             let (mut session, events) = listened(exploration);

@@ -42,6 +42,7 @@ impl Session {
             },
             SessionCommand::Reset => {
                 self.exploration.reset();
+                self.run.heard = None;
                 self.set_mode(None);
                 self.emit_reading();
                 self.changed();
@@ -169,6 +170,8 @@ impl Session {
         self.emit(SessionEvent::Busy(None));
         match chosen {
             Ok(()) => {
+                // Another agent may say so in the same state.
+                self.run.heard = None;
                 self.changed();
                 true
             }
@@ -230,6 +233,7 @@ impl Session {
                 // What is known of the chain and of other words is of the house before.
                 self.jobs.leave_house();
                 self.compared = None;
+                self.run.heard = None;
                 self.emit(SessionEvent::Working(None));
                 self.changed();
             }
@@ -239,6 +243,7 @@ impl Session {
 
     fn reseed(&mut self, seed: u64, samples: bool) {
         self.exploration.reseed(seed, samples);
+        self.run.heard = None;
         self.emit(SessionEvent::Sampling(samples.then_some(seed)));
         self.changed();
     }
@@ -256,6 +261,7 @@ impl Session {
     }
 
     fn moved(&mut self) {
+        self.run.heard = None;
         self.set_mode(None);
         self.emit_position();
         self.changed();
