@@ -59,6 +59,9 @@ fn taken_back(kept: &[Token], rest: &[Token]) -> usize {
         length += 1;
     }
     let words = &lexicon().words;
+    if apologises(&rest[..length], &rest[length..]) {
+        return 0;
+    }
     // "no knife" and "no more" take nothing back; "no, the fork" does.
     let clear = rest[length - 1].is_mark()
         || rest.get(length).is_some_and(|next| {
@@ -66,6 +69,19 @@ fn taken_back(kept: &[Token], rest: &[Token]) -> usize {
             determined || words.prepositions.contains(&next.text)
         });
     if strong || clear { length } else { 0 }
+}
+
+/// "sorry for the trouble" and "sorry to bother you" take nothing back; "sorry, to the fridge" names another place.
+fn apologises(said: &[Token], rest: &[Token]) -> bool {
+    let words = &lexicon().words;
+    let is_sorry = said.iter().rfind(|token| !token.is_mark()).is_some_and(|token| token.text == "sorry");
+    let leads_on = |token: &Token| {
+        token.is_mark() || token.lemma().is_some() && !token.is_name() || words.prepositions.contains(&token.text)
+    };
+    let Some((first, rest)) = rest.split_first().filter(|_| is_sorry) else { return false };
+    let named = rest.iter().take_while(|token| !leads_on(token)).find(|token| token.is_name());
+    let is_place = named.is_some_and(|token| token.classes.iter().any(|class| class.info().receptacle));
+    matches!(first.text.as_str(), "for" | "to") && !is_place
 }
 
 /// How many tokens these words take, marks between them included.
@@ -150,13 +166,20 @@ mod tests {
             "take the pen from the desk and wash it"
         );
         assert_eq!(read("put the mug in the sink, no, in the fridge"), "put the mug in the fridge");
+        assert_eq!(read("put the mug in the sink, sorry, to the fridge"), "put the mug to the fridge");
         assert_eq!(read("put the mug under the desk - I mean, put it on the desk"), "put mug on the desk");
         assert_eq!(read("take the fork, no, take the spoon"), "take the spoon");
     }
 
     #[test]
     fn a_no_that_takes_nothing_back_stays() {
-        for text in ["take the mug , no knife", "actually take the mug", "there is no mug"] {
+        for text in [
+            "take the mug , no knife",
+            "actually take the mug",
+            "there is no mug",
+            "put the mug in the sink , sorry for the trouble",
+            "put the mug in the sink , sorry to bother you",
+        ] {
             assert_eq!(read(text), text);
         }
     }
