@@ -16,7 +16,7 @@ use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
 use crate::episode::instruction_variant::task_instruction;
 use crate::episode::scenes::Scenes;
-use crate::eval::evaluation::Evaluation;
+use crate::eval::evaluation::{Evaluation, read_instruction};
 use crate::eval::options::Options;
 use crate::eval::tasks::check;
 use crate::eval::tasks::sample;
@@ -165,7 +165,7 @@ impl CheckArgs {
             writeln!(out, "{}:{mistake}", self.file.display())?;
         }
         check::none(&mistakes, &self.file)?;
-        let set = taskset::read(&self.file)?;
+        let set = taskset::read_told(&self.file)?;
         let scenes = Scenes::of(&self.file, &set.value);
         let options = Options { jobs: jobs::threads(self.jobs), ..Options::plain(Grading::Class) };
         let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
@@ -194,7 +194,7 @@ impl CheckArgs {
 impl ShowArgs {
     fn run(self) -> anyhow::Result<ExitStatus> {
         let (file, wanted) = taskset::split_reference(&self.task);
-        let set = taskset::read(&file)?.value;
+        let set = taskset::read_told(&file)?.value;
         let mut out = streams::out();
         match wanted {
             None => {
@@ -235,6 +235,16 @@ fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()
     for (i, subtask) in task.subtasks.iter().enumerate() {
         let sentence = task.sentences.get(i).map(|sentence| format!("   \"{sentence}\"")).unwrap_or_default();
         writeln!(out, "subtask {i:<4} {}{sentence}", describe(&task.roles, subtask))?;
+    }
+    if task.subtasks.is_empty() {
+        match read_instruction(task, &setting) {
+            Ok(wish) => {
+                for (i, words) in wish.subtasks_in_words().iter().enumerate() {
+                    writeln!(out, "subtask {i:<4} {words}   (as the instruction is read)")?;
+                }
+            }
+            Err(problem) => writeln!(out, "subtasks     {problem}")?,
+        }
     }
     Ok(())
 }

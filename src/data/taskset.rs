@@ -32,8 +32,7 @@ pub fn read(path: &Path) -> anyhow::Result<Document<TaskSet>> {
 /// As [`read`].
 pub fn read_told(path: &Path) -> anyhow::Result<Document<TaskSet>> {
     let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
-    let counts = |task: &Task, misfit: &Misfit| !(task.subtasks.is_empty() && misfit.field == "subtasks");
-    check_each(&document.value, counts).with_context(|| format!("{}", path.display()))?;
+    check_each(&document.value, misfits_told).with_context(|| format!("{}", path.display()))?;
     Ok(document)
 }
 
@@ -70,11 +69,11 @@ pub(crate) fn pick(set: &TaskSet, wanted: &str) -> anyhow::Result<usize> {
 /// # Errors
 /// Names the first task and field that is wrong.
 pub(crate) fn check(set: &TaskSet) -> anyhow::Result<()> {
-    check_each(set, |_, _| true)
+    check_each(set, misfits)
 }
 
-/// The same for those misfits that count.
-fn check_each(set: &TaskSet, counts: impl Fn(&Task, &Misfit) -> bool) -> anyhow::Result<()> {
+/// The same with what is wrong with a task as `misfits` tells it.
+fn check_each(set: &TaskSet, misfits: impl Fn(&Task) -> Vec<Misfit>) -> anyhow::Result<()> {
     if set.tasks.is_empty() {
         return Err(anyhow!("tasks: the set is empty"));
     }
@@ -82,7 +81,7 @@ fn check_each(set: &TaskSet, counts: impl Fn(&Task, &Misfit) -> bool) -> anyhow:
     for (i, task) in set.tasks.iter().enumerate() {
         let named =
             |misfit: Misfit| anyhow!("{} (task {:?})", misfit.under(&format!("tasks[{i}]")), shortened(&task.id));
-        misfits(task).into_iter().find(|misfit| counts(task, misfit)).map_or(Ok(()), |misfit| Err(named(misfit)))?;
+        misfits(task).into_iter().next().map_or(Ok(()), |misfit| Err(named(misfit)))?;
         if !ids.insert(&task.id) {
             return Err(named(Misfit::new("id", "another task of the set has the same")));
         }
@@ -95,6 +94,13 @@ fn check_each(set: &TaskSet, counts: impl Fn(&Task, &Misfit) -> bool) -> anyhow:
 
 fn shortened(text: &str) -> String {
     if text.chars().count() <= 80 { text.to_owned() } else { text.chars().take(79).chain(['…']).collect() }
+}
+
+/// The same as [`misfits`] where a task may say no subtasks.
+pub(crate) fn misfits_told(task: &Task) -> Vec<Misfit> {
+    let mut found = misfits(task);
+    found.retain(|misfit| !(task.subtasks.is_empty() && misfit.field == "subtasks"));
+    found
 }
 
 /// Everything that is wrong with a task by itself.

@@ -12,7 +12,7 @@ use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
 use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
-use crate::episode::scenes::Scenes;
+use crate::episode::scenes::{Scenes, Setting};
 use crate::episode::wish;
 use crate::episode::wish::Wish;
 use crate::house::grading::Grading;
@@ -140,19 +140,26 @@ fn read_untold(tasks: &mut [Task], scenes: &Scenes) -> anyhow::Result<BTreeMap<u
     let mut found = BTreeMap::new();
     for (i, task) in tasks.iter_mut().enumerate().filter(|(_, task)| task.subtasks.is_empty()) {
         let setting = scenes.setting(task)?;
-        let text = instruction::normalise(&task.instruction);
-        let wish = wish::read(&text, 0, std::iter::empty(), &setting.scene, &setting.world);
-        if let Some(why) = &wish.ungraded {
-            anyhow::bail!(
-                "tasks[{i}].subtasks: none, and {:?} cannot be graded as it is read: {why}",
-                task.instruction
-            );
-        }
+        let wish =
+            read_instruction(task, &setting).map_err(|problem| anyhow::anyhow!("tasks[{i}].subtasks: {problem}"))?;
         (task.roles, task.subtasks) = (wish.roles.clone(), wish.subtasks.clone());
         task.expert_steps = wish.expert_steps.unwrap_or(task.expert_steps);
         found.insert(i, wish);
     }
     Ok(found)
+}
+
+/// What a task without subtasks asks, as its instruction is read where it begins.
+///
+/// # Errors
+/// When it cannot be graded as it is read; says why.
+pub(crate) fn read_instruction(task: &Task, setting: &Setting) -> Result<Wish, String> {
+    let text = instruction::normalise(&task.instruction);
+    let wish = wish::read(&text, 0, std::iter::empty(), &setting.scene, &setting.world);
+    match &wish.ungraded {
+        Some(why) => Err(format!("none, and {:?} cannot be graded as it is read: {why}", task.instruction)),
+        None => Ok(wish),
+    }
 }
 
 /// Checks that the tasks have what the options need.

@@ -8,6 +8,7 @@ use serde_json::Value;
 use crate::data::{json, json_positions, schema, taskset};
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
+use crate::eval::evaluation::read_instruction;
 
 /// A mistake in a task file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,13 +100,18 @@ fn meaning(path: &Path, document: &Value, found: &mut Vec<(String, String)>) {
                 found.push((field, error.inner().to_string()));
             }
             Ok(task) => {
-                let misfits = taskset::misfits(&task);
-                if misfits.is_empty()
-                    && let Err(error) = scenes.setting(&task)
-                {
-                    let text = format!("{error:#}");
-                    let (field, problem) = text.split_once(": ").unwrap_or(("scene", &text));
-                    found.push((format!("{place}.{field}"), problem.to_owned()));
+                let misfits = taskset::misfits_told(&task);
+                match misfits.is_empty().then(|| scenes.setting(&task)) {
+                    Some(Err(error)) => {
+                        let text = format!("{error:#}");
+                        let (field, problem) = text.split_once(": ").unwrap_or(("scene", &text));
+                        found.push((format!("{place}.{field}"), problem.to_owned()));
+                    }
+                    Some(Ok(setting)) if task.subtasks.is_empty() => {
+                        let problem = read_instruction(&task, &setting).err();
+                        found.extend(problem.map(|problem| (format!("{place}.subtasks"), problem)));
+                    }
+                    Some(Ok(_)) | None => {}
                 }
                 found.extend(misfits.into_iter().map(|misfit| (format!("{place}.{}", misfit.field), misfit.problem)));
             }
@@ -126,6 +132,8 @@ pub(crate) fn none(mistakes: &[Mistake], path: &Path) -> anyhow::Result<()> {
 mod tests {
     use super::*;
     use crate::data::taskset::tests::sample_set;
+    use crate::domain::task::SceneRef;
+    use crate::house::testing::kitchen;
 
     fn of(text: &str) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
@@ -164,6 +172,28 @@ mod tests {
         for part in ["tasks[0].sentences: 1 sentences", "subtasks[0].object: 9, but", "subtasks[1].receptacle: a Put"] {
             assert!(told.contains(part), "{part} in {told}");
         }
+    }
+
+    #[test]
+    fn a_task_without_subtasks_is_a_mistake_only_where_its_instruction_cannot_be_graded() {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene, world) = kitchen();
+        json::write(&folder.path().join(format!("{}.json", scene.name)), &*scene).unwrap();
+        let told = |instruction: &str| {
+            let mut set = sample_set();
+            set.tasks.truncate(1);
+            set.scenes = Some(".".into());
+            let task = &mut set.tasks[0];
+            (task.roles, task.subtasks, task.sentences) = (Vec::new(), Vec::new(), Vec::new());
+            (task.scene, task.start) = (SceneRef::Named(scene.name.clone()), Some(world.clone()));
+            task.instruction = instruction.into();
+            let path = folder.path().join("mine.json");
+            std::fs::write(&path, serde_json::to_string(&set).unwrap()).unwrap();
+            mistakes(&path).unwrap().iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        assert_eq!(told("pick up the mug"), Vec::<String>::new());
+        let dance = told("dance").join("\n");
+        assert!(dance.contains("tasks[0].subtasks: none, and \"dance\" cannot be graded"), "{dance}");
     }
 
     #[test]
