@@ -129,6 +129,9 @@ pub struct Wish {
     /// The reading by which it is graded.
     #[serde(skip)]
     pub(crate) picked: usize,
+    /// How many steps its task gives it, where it is a task's own words.
+    #[serde(skip)]
+    pub(crate) horizon: Option<u32>,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
@@ -171,9 +174,10 @@ impl Wish {
         })
     }
 
-    /// How many steps it may take: twice the expert's.
+    /// How many steps it may take: as many as its task gives it, else twice the expert's.
     pub(crate) fn limit(&self) -> Option<u32> {
-        (self.grading == WishGrading::Read).then(|| (2 * self.expert_steps.unwrap_or(UNKNOWN)).max(LEAST))
+        let expert = || (2 * self.expert_steps.unwrap_or(UNKNOWN)).max(LEAST);
+        (self.grading == WishGrading::Read).then(|| self.horizon.unwrap_or_else(expert))
     }
 
     /// What it was read as, in the words of the subtasks.

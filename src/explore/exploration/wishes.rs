@@ -166,8 +166,9 @@ impl Exploration {
     }
 
     /// The wish comes into force. One that nothing was done for gives way to it.
-    fn begin(&mut self, wish: Wish) {
+    fn begin(&mut self, mut wish: Wish) {
         let now = self.tree.at();
+        wish.horizon = self.task_horizon(&wish);
         let house = &self.rollout.env.house;
         self.rollout.instruction.clone_from(&wish.instruction);
         self.rollout.env.grader = wish.grader(house.scene(), house.world());
@@ -178,6 +179,14 @@ impl Exploration {
         }
         self.wishes.push(Arc::new(wish));
         self.judge_by_grader();
+    }
+
+    /// How many steps a task of a set gives its own words, told where it begins: an evaluation gives them as many.
+    fn task_horizon(&self, wish: &Wish) -> Option<u32> {
+        let task = self.episode.task.as_ref().filter(|_| self.episode.limited && wish.began == 0)?;
+        let is_own = instruction::normalise(&task.instruction) == instruction::normalise(&wish.instruction);
+        // What was explored and graded by nobody is kept as a task without a horizon.
+        (is_own && task.horizon > 0).then_some(task.horizon)
     }
 
     /// Counts a step that was just taken for the wish in force, and what it came to.
@@ -290,5 +299,30 @@ impl Exploration {
             episode.wishes = self.wishes.iter().map(|wish| (**wish).clone()).collect();
         }
         episode
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::registry::{Policies, PolicyKind};
+    use crate::episode::scenes::Scenes;
+    use crate::eval::evaluation::tests::tasks;
+    use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
+
+    #[test]
+    fn a_task_without_subtasks_has_its_own_horizon_as_in_an_evaluation() {
+        let (folder, mut set) = tasks();
+        let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
+        let mut task = set.value.tasks.remove(0);
+        (task.roles, task.subtasks, task.sentences) = (Vec::new(), Vec::new(), Vec::new());
+        (task.instruction, task.horizon) = ("pick up the mug".into(), 77);
+        let origin = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };
+        let source = EpisodeSource::new(origin, 0, scenes);
+        let mut exploration = Exploration::new(source, Policies::new(Vec::new()), PolicyKind::Random, None).unwrap();
+        assert_eq!(exploration.rollout.horizon, Some(77));
+        assert_eq!(exploration.wish().unwrap().limit(), Some(77));
+        exploration.instruct("grab a knife").unwrap();
+        assert_ne!(exploration.rollout.horizon, Some(77), "other words have a limit of their own");
     }
 }
