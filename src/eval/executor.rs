@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::plan::EvaluationPlan;
 use super::work_queue::WorkQueue;
@@ -17,6 +17,8 @@ pub(crate) struct Executor {
     pub(crate) stop: Arc<AtomicBool>,
     /// Set when nobody takes the episodes any more.
     pub(crate) give_up: AtomicBool,
+    /// Why the policy cannot be evaluated like this at all: the first decision shows it.
+    pub(crate) refusal: OnceLock<String>,
     pub(crate) queue: WorkQueue,
     pub(crate) sender: Mutex<Sender<Message>>,
 }

@@ -28,7 +28,7 @@ pub(crate) struct Worker {
     is_alone: bool,
 }
 
-/// Nobody waits for this worker any more.
+/// Nobody waits for this worker any more, or it may play nothing.
 struct Abandoned;
 
 impl Worker {
@@ -195,8 +195,12 @@ impl Worker {
                 }
                 Some(false) => {}
                 None => {
-                    let problem = "the policy never says that it is done: use --end grader";
-                    return self.record(|slots| slots[slot].iter_mut().for_each(|in_flight| in_flight.fail(problem)));
+                    // No episode of it can end so: that is said once, and none is recorded.
+                    let problem =
+                        "the policy has no end of its own, so its word cannot end an episode: use --end grader";
+                    self.executor.refusal.get_or_init(|| problem.into());
+                    self.executor.give_up.store(true, Ordering::Relaxed);
+                    return Err(Abandoned);
                 }
             }
         }

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -61,6 +61,7 @@ pub(crate) fn play(
         make_policy: make_policy.clone(),
         stop: stop.clone(),
         give_up: AtomicBool::new(false),
+        refusal: OnceLock::new(),
         queue: WorkQueue::new(wanted, slots),
         sender: Mutex::new(sender),
     });
@@ -73,6 +74,9 @@ pub(crate) fn play(
     // A run that was stopped waited for its workers already.
     if !stop.load(Ordering::Relaxed) {
         workers.close();
+    }
+    if let Some(problem) = executor.refusal.get() {
+        anyhow::bail!("{problem}");
     }
     let whole = played?;
     ensure!(

@@ -102,9 +102,14 @@ fn an_agents_own_end_counts_only_where_everything_holds_when_it_speaks() {
 }
 
 #[test]
-fn a_policy_without_an_end_of_its_own_is_told_so() {
-    let error = played(Says::Nothing)[0].error.clone().unwrap();
+fn a_policy_without_an_end_of_its_own_is_refused_once_and_nothing_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = || Ok(Box::new(Speaker { expert: ExpertPolicy::new(), says: Says::Nothing }) as Box<dyn Policy>);
+    let options = Options { end: EndedBy::Agent, ..options() };
+    let error = run(folder.path(), options, make, usize::MAX).err().unwrap().to_string();
     assert!(error.contains("--end grader"), "{error}");
+    let lines = std::fs::read_to_string(folder.path().join("episodes.jsonl")).unwrap_or_default();
+    assert_eq!(lines, "");
 }
 
 #[test]
