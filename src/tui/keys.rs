@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use KeyCode::Char;
 
 use super::key_name::parse_key;
-use crate::explore::verb::entry::KeyScope;
+use crate::explore::verb::entry::{KeyArguments, KeyScope};
 use crate::explore::verb::table::VERBS;
 use crate::explore::verb::{ExplorerPage, Verb};
 
@@ -82,6 +82,23 @@ pub(crate) fn verb(mode: Mode, page: ExplorerPage, key: KeyEvent) -> Option<Verb
     bindings(mode, page).find(|binding| binding.codes.contains(&key.code)).map(|binding| binding.verb.clone())
 }
 
+/// A text that names verbs between backticks, with their keys instead; a verb without one as it is typed.
+pub(crate) fn with_keys(text: &str) -> String {
+    let named = |(at, part): (usize, &str)| match at % 2 {
+        0 => part.to_string(),
+        _ => key_of(part).map_or_else(|| format!(":{part}"), str::to_string),
+    };
+    text.split('`').enumerate().map(named).collect()
+}
+
+/// The first key that does what a verb alone does.
+fn key_of(verb: &str) -> Option<&'static str> {
+    let entry = VERBS.iter().find(|entry| entry.name == verb)?;
+    let key =
+        entry.keys.iter().find(|key| key.scope == KeyScope::Common && key.arguments == KeyArguments::These(""))?;
+    key.keys.first().copied()
+}
+
 #[cfg(test)]
 mod tests {
     use KeyCode::{Enter, Esc, Right};
@@ -127,6 +144,14 @@ mod tests {
         check(Mode::Typing, Enter, Some(Verb::Apply));
         check(Mode::Help, Char('q'), Some(Verb::Cancel));
         check(Mode::Watch, Char('f'), None);
+    }
+
+    #[test]
+    fn advice_names_keys_where_verbs_have_some() {
+        let text = "try another house (`next`), or `values`; `manual` takes over, `compare` tries other words";
+        let keys = "try another house (N), or V; m takes over, :compare tries other words";
+        assert_eq!(with_keys(text), keys);
+        assert_eq!(with_keys("no verb"), "no verb");
     }
 
     #[test]

@@ -95,16 +95,16 @@ fn as_task(grader: &Grader, scene: &Arc<Scene>, world: &World) -> (Task, Setting
     (task, Setting { scene: scene.clone(), world: world.clone() })
 }
 
-/// What happened and what to do about it. The keys are the explorer's.
+/// What happened and what to do about it. The explorer's verbs stand between backticks; a screen names their keys.
 fn advice(failure: Failure, thing: Class, was_seen: bool) -> String {
     let name = thing.spoken();
     match failure {
-        Failure::NeverReached if !was_seen => format!("it never saw a {name}: try another house (N), or V"),
-        Failure::NeverReached => format!("it saw a {name} and never got to it: m takes over, or V"),
+        Failure::NeverReached if !was_seen => format!("it never saw a {name}: try another house (`next`), or `values`"),
+        Failure::NeverReached => format!("it saw a {name} and never got to it: `manual` takes over, or `values`"),
         Failure::OutOfOrder => "it did a later step first: tell it one step at a time".into(),
-        Failure::WrongObject => format!("it took something else for the {name}: B compares words"),
+        Failure::WrongObject => format!("it took something else for the {name}: `compare` tries other words"),
         Failure::WrongAction => format!("it did something else with the {name}: tell it that step alone"),
-        Failure::Stuck => "it turned on the spot or pushed on: m takes over for a step".into(),
+        Failure::Stuck => "it turned on the spot or pushed on: `manual` takes over for a step".into(),
         // The last three are of evaluations in which the agent's own word ends an episode.
         Failure::Timeout | Failure::StoppedEarly | Failure::Undone | Failure::NeverStopped => {
             format!("the {name} was in reach: tell it again, and it goes on")
@@ -127,6 +127,6 @@ mod tests {
         let (failure, advice) =
             explain(&grader, &scene, &world, &[Action::navigate(ActionType::LookDown)]).unwrap().unwrap();
         assert_eq!(failure, Failure::NeverReached);
-        assert_eq!(advice, "it never saw a laptop: try another house (N), or V");
+        assert_eq!(advice, "it never saw a laptop: try another house (`next`), or `values`");
     }
 }

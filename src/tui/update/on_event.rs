@@ -10,6 +10,7 @@ use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
 use crate::tui::graphics::letters::{self, Letters};
+use crate::tui::keys::with_keys;
 use crate::tui::log::{LogEntry, Tone};
 
 /// Changes the state by what the session tells.
@@ -107,7 +108,7 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
             let tone = if good { Tone::Good } else { Tone::Bad };
             app.note(tone, format!("{}; i tells it the next thing", wish.verdict_in_words()));
             if let Some(advice) = &wish.advice {
-                app.note(Tone::Note, advice.clone());
+                app.note(Tone::Note, with_keys(advice));
             }
             app.session.decision = None;
             vec![]

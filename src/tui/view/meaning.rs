@@ -11,6 +11,7 @@ use super::panel::fit;
 use crate::episode::wish::{Wish, WishGrading};
 use crate::language::reader::CERTAIN;
 use crate::tui::app::App;
+use crate::tui::keys::with_keys;
 use crate::tui::theme::THEME;
 
 /// The line under the instruction.
@@ -38,7 +39,7 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
         let style = if verdict.is_fulfilled() { THEME.good } else { THEME.bad };
         let agent = wish.agent_in_words().map_or(String::new(), |words| format!("; {words}"));
         let next = match &wish.advice {
-            Some(advice) => format!(": {advice}"),
+            Some(advice) => format!(": {}", with_keys(advice)),
             None => format!(", after {}; i: the next wish", steps(wish.steps)),
         };
         return vec![(format!("  {}", verdict.words()), style), (agent, THEME.note), (next, THEME.quiet)];

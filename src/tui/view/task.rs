@@ -8,6 +8,7 @@ use ratatui::widgets::Widget;
 use super::panel::{panel, put, wrap};
 use crate::episode::wish::{WishGrading, WishVerdict};
 use crate::tui::app::App;
+use crate::tui::keys::with_keys;
 use crate::tui::theme::THEME;
 
 /// The panel with the subtasks.
@@ -45,7 +46,7 @@ impl Widget for TaskPanel<'_> {
         };
         let inner = panel(buf, area, title, &right);
         let mut lines: Vec<(String, Style)> = Vec::new();
-        let advice = wish.and_then(|wish| wish.advice.as_deref());
+        let advice = wish.and_then(|wish| wish.advice.as_deref()).map(with_keys);
         for (at, subtask) in progress.subtasks.iter().enumerate() {
             let (mark, style) = match at.cmp(&done) {
                 std::cmp::Ordering::Less => ("[x]", THEME.good),
@@ -55,8 +56,8 @@ impl Widget for TaskPanel<'_> {
             let when = progress.completed_at.get(at).map_or(String::new(), |step| format!(" (step {step})"));
             let text = format!("{mark} {subtask}{when}");
             lines.extend(wrap(&text, width, "    ").into_iter().map(|line| (line, style)));
-            let (next, style) = match advice {
-                Some(advice) => (advice, THEME.bad),
+            let (next, style) = match &advice {
+                Some(advice) => (advice.as_str(), THEME.bad),
                 None => (progress.waits_for.as_str(), THEME.note),
             };
             if at == done && !next.is_empty() {
