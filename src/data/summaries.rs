@@ -96,7 +96,9 @@ impl Summaries {
                 }
                 (Some(source), _) => source,
                 (None, Some(only)) if sources.len() == 1 => only,
-                (None, _) => bail!("{} has labels of {}: name one as labels_of", path.display(), listed()),
+                (None, _) => {
+                    bail!("{} has labels of {}: name one as data.label_source in the preset", path.display(), listed())
+                }
             };
             let wanted = wanted.to_string();
             by_input.extend(lines.into_iter().filter(|line| line.source == wanted).map(|line| (line.input, line.text)));

@@ -282,7 +282,8 @@ mod tests {
             let (scene, world) = (house.scene().clone(), house.world().clone());
             let frame = house.frame().clone();
             let seen = Eyes::Simulator.look_at(&scene, &world, &frame).unwrap();
-            mind.observe(&Moment { pose: world.agent, frame: &frame, seen: &seen });
+            let legal = house.candidates();
+            mind.observe(&Moment { pose: world.agent, frame: &frame, seen: &seen, legal: &legal });
             house.step(Action::navigate(ActionType::RotateRight));
         }
         assert_eq!(mind.progress.held, Some(class("Book")), "the goal says what it is");

@@ -31,6 +31,8 @@ pub(crate) struct Moment<'a> {
     pub(crate) frame: &'a Frame,
     /// What it makes of the picture.
     pub(crate) seen: &'a Seen,
+    /// The interactions that are possible.
+    pub(crate) legal: &'a [Candidate],
 }
 
 impl Mind {
@@ -59,6 +61,13 @@ impl Mind {
         }
         if first {
             self.progress.held = moment.seen.hand_full.then_some(Class::NONE);
+        }
+        // What can be done tells for certain: nobody picks up with a full hand, or puts down with an empty one.
+        let can = |kinds: &[ActionType]| moment.legal.iter().any(|candidate| kinds.contains(&candidate.kind));
+        if can(&[ActionType::Pickup]) {
+            self.progress.held = None;
+        } else if can(&[ActionType::Put, ActionType::Slice]) {
+            self.progress.held.get_or_insert(Class::NONE);
         }
         self.progress.name_what_is_held();
         self.memory.observe(Glance {

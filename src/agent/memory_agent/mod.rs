@@ -9,5 +9,7 @@ pub(crate) mod macro_action;
 pub(crate) mod mind;
 mod policy;
 pub(crate) mod progress;
+mod recollection;
 
-pub(crate) use policy::{MemoryPolicy, Recollection};
+pub(crate) use policy::MemoryPolicy;
+pub(crate) use recollection::Recollection;

@@ -1,6 +1,6 @@
 //! Pronouns that stand for something that no subtask before them names.
 
-use super::clauses::Clause;
+use super::clause::Clause;
 use super::tokens::Token;
 
 /// What was last named only to walk to it, open or close it is meant by "it": "close the laptop and pick it up".

@@ -1,6 +1,6 @@
 //! Switching: lamps go on, and nothing else that is switched is a subtask.
 
-use super::clauses::Clause;
+use super::clause::Clause;
 use super::lexicon::lexicon;
 use super::shape::is_lamp;
 use super::tokens::Token;

@@ -13,9 +13,9 @@ use crate::agent::memory_agent::mind::{Mind, Moment};
 use crate::domain::skill::SkillKind;
 use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Cell, Pose, Scene, Trajectory, World};
-use crate::house::House;
 use crate::house::render::Renderer;
 use crate::house::view::{self, View};
+use crate::house::{House, Replay};
 use crate::language::instruction::normalise;
 use crate::nets::device::set_threads;
 use crate::train::frame_store::FrameStore;
@@ -141,15 +141,16 @@ fn replay(
 ) -> anyhow::Result<Vec<Example>> {
     let origin = trajectory.start.agent;
     let labels = if trajectory.choices.is_empty() { &trajectory.actions } else { &trajectory.choices };
-    let mut world = trajectory.start.clone();
+    let mut recorded = Replay::new(scene, trajectory.start.clone(), &trajectory.actions);
     let mut mind = Mind::default();
     mind.set_goals(told.goals.clone());
     let mut found = Vec::new();
     for step in 0..=trajectory.actions.len() {
+        let world = recorded.world().clone();
         let frame = renderer.draw(scene, &world);
         let seen = eyes.look_at(scene, &world, frame)?;
-        mind.observe(&Moment { pose: world.agent.relative_to(origin), frame, seen: &seen });
         let legal = view::candidates(scene, &world, &View::of(frame));
+        mind.observe(&Moment { pose: world.agent.relative_to(origin), frame, seen: &seen, legal: &legal });
         while told.ends.get(mind.progress.at).is_some_and(|end| *end <= step) {
             let (_, choice) = mind.choice(&legal);
             found.push(Example { choice, right: Vec::new(), aim: None, reached: true });
@@ -170,7 +171,7 @@ fn replay(
         let class = action.target.and_then(|target| world.class_of(scene, target));
         let at = actions.iter().find(|it| it.first == action).and_then(|it| it.at).unwrap_or_else(|| mind.ahead());
         mind.attempt(action, class.map(|class| (class, at)));
-        crate::house::rules::apply(scene, &mut world, action);
+        recorded.step();
     }
     Ok(found)
 }
