@@ -31,15 +31,18 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
 }
 
 #[test]
-fn without_options_the_shipped_agent_with_a_critic_acts() {
+fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
     if encoder_home().is_none() {
         return;
     }
     let mut session = Session::start(&[]);
-    session.see("· sprint acts");
+    session.see("· sprint-memory acts");
     session.see("running");
     session.press(" M");
     session.see("by probability");
+    session.see("no critic");
+    session.press(":checkpoint sprint\r");
+    session.see("· sprint acts");
     session.miss("no critic");
     session.press("q");
     assert_eq!(session.end(), 0);

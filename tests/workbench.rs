@@ -236,7 +236,7 @@ fn the_mouse_is_heard_only_where_it_is_asked_for() {
     session.see("main 1/2");
     session.press("\x1b[<65;10;10M");
     session.see("main 2/2");
-    session.press("\x1b[<0;15;34M");
+    session.press("\x1b[<0;15;33M");
     session.see("main 0/2");
     leave(session);
 }

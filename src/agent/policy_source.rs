@@ -185,7 +185,7 @@ pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
 }
 
 /// The agent that acts when none is named.
-const DEFAULT: &str = "sprint";
+const DEFAULT: &str = "sprint-memory";
 
 /// The agent that acts when none is named: the first that is found.
 pub(crate) fn shipped() -> anyhow::Result<PathBuf> {

@@ -203,6 +203,15 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn the_shipped_agent_loads() {
+        let _chance = crate::nets::testing::chance();
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/sprint-memory"));
+        let config = MemoryConfig::read(folder).unwrap();
+        assert_eq!(config.sight, Sight::Detector);
+        MemoryNetworks::load(folder, &config, Device::Cpu).unwrap();
+    }
+
+    #[test]
     fn an_agent_that_counts_other_features_is_refused_with_the_field() {
         let _chance = crate::nets::testing::chance();
         let folder = tempfile::tempdir().unwrap();
