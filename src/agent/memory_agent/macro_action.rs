@@ -200,11 +200,12 @@ fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
     let mut found = Vec::new();
     for (cell, route) in ways {
         let apart = |other: &Cell| (other.x - cell.x).abs().max((other.z - cell.z).abs()) >= APART;
-        if found.len() < EXPLORATIONS && chosen.iter().all(apart) {
-            if let Some(way) = MacroAction::along(Purpose::Explore, None, cell, route) {
-                chosen.push(cell);
-                found.push(way);
-            }
+        if found.len() < EXPLORATIONS
+            && chosen.iter().all(apart)
+            && let Some(way) = MacroAction::along(Purpose::Explore, None, cell, route)
+        {
+            chosen.push(cell);
+            found.push(way);
         }
     }
     found
@@ -275,7 +276,7 @@ mod tests {
         let (scene, mut world) = kitchen();
         world.objects.push(Object { class: class("Book"), parent: Parent::Hand, ..Object::default() });
         world.held = Some(world.objects.len() as u16 - 1);
-        let mut house = House::new(scene.into(), world);
+        let mut house = House::new(scene, world);
         let mut mind = Mind::default();
         mind.set_goals(vec![goal(SkillKind::Put, "Book", Some("CounterTop"))]);
         for _ in 0..4 {

@@ -191,8 +191,8 @@ mod tests {
         policy.reset(0, 7);
         let (mut first, mut second) = (episode(), episode());
         for decision in &alone {
-            assert_eq!(play(&mut policy, &mut first, 0, 1), [decision.clone()]);
-            assert_eq!(play(&mut policy, &mut second, 1, 1), [decision.clone()]);
+            assert_eq!(play(&mut policy, &mut first, 0, 1), std::slice::from_ref(decision));
+            assert_eq!(play(&mut policy, &mut second, 1, 1), std::slice::from_ref(decision));
         }
         assert!(alone.iter().all(|decision| decision.done.is_some_and(|done| (0.0..=1.0).contains(&done))));
     }

@@ -218,18 +218,18 @@ impl Reader {
         };
         let mut absent = path.absent.clone();
         let may = |class: Class| shape.takes_object(class);
-        let mut object = self.answer("object", features, thing, house, &mut absent, may, evidence);
+        let mut object = self.answer(("object", features), thing, house, &mut absent, may, evidence);
         if shape != Shape::One(SkillKind::Toggle) && before(path, context) == Before::default() && says_only_it(clauses)
         {
             object.leave_open();
         }
         let mut holder = (shape == Shape::Stack).then(|| {
             let may = |class: Class| class.info().pickupable && class.info().receptacle;
-            self.answer("movable", features, None, house, &mut absent, may, |_| 1.0)
+            self.answer(("movable", features), None, house, &mut absent, may, |_| 1.0)
         });
         let mut place = shape.has_place().then(|| {
             let may = |class: Class| shape.takes_place(class);
-            self.answer("place", features, place, house, &mut absent, may, |_| 1.0)
+            self.answer(("place", features), place, house, &mut absent, may, |_| 1.0)
         });
         path.absent = absent;
         set_all_apart(&mut object, &mut holder, &mut place);
@@ -310,8 +310,7 @@ impl Reader {
     /// Which class a question is answered with; of the house's where that is known, unless none of them can be meant.
     fn answer(
         &self,
-        name: &str,
-        features: &[u32],
+        (name, features): (&str, &[u32]),
         outright: Option<Class>,
         house: Option<&BTreeSet<Class>>,
         absent: &mut Vec<Class>,
