@@ -65,11 +65,11 @@ impl Chooser {
     pub(crate) fn new(path: &nn::Path<'_>, spec: &ChooserSpec) -> Chooser {
         let ChooserSpec { situation, action, embedding, hidden } = spec;
         let layers = |name: &str, from: i64, widths: &[i64]| -> Vec<nn::Linear> {
-            let froms = std::iter::once(&from).chain(widths);
+            let inputs = std::iter::once(&from).chain(widths);
             let layer = |(i, (&from, &to)): (usize, (&i64, &i64))| {
                 nn::linear(path / format!("{name}{}", i + 1), from, to, Default::default())
             };
-            froms.zip(widths).enumerate().map(layer).collect()
+            inputs.zip(widths).enumerate().map(layer).collect()
         };
         let width = hidden.last().copied().unwrap_or(1);
         Chooser {

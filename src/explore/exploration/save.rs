@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_that_follows_another_at_the_start_is_the_branchs_own() {
+    fn a_wish_that_follows_another_at_the_start_is_the_one_of_the_branch() {
         let mut exploration = testing::exploration();
         exploration.choose(PolicyKind::Expert).unwrap();
         exploration.instruct("dance").unwrap();
