@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use sprint_explorer::data::alfred::import::parse_recording;
+use sprint_explorer::data::alfred::checkout::parse_recording;
 use sprint_explorer::data::alfred::tasks;
 use sprint_explorer::data::items::{ActionLabel, ItemSource, Items, Span};
 use sprint_explorer::data::selection::{Composites, DataSelection};

@@ -65,6 +65,37 @@ tasks = 1
 swaps = 0
 "#;
 
+/// The agent with a memory in miniature.
+const MEMORY: &str = r#"
+extends = "sprint-memory"
+hold_out = 3
+save_every = 1
+report_every = 1
+
+[detector]
+channels = [2, 2, 2, 2]
+pyramid = 2
+
+[detector_training.optimisation]
+steps = 2
+batch_size = 2
+
+[chooser]
+embedding = 2
+hidden = [4]
+
+[chooser_training]
+trajectories = 4
+
+[chooser_training.optimisation]
+steps = 2
+batch_size = 4
+
+[validation]
+tasks = 1
+swaps = 0
+"#;
+
 /// A folder with a few labelled demonstrations; nothing where the sentence encoder is not there.
 fn demonstrations() -> Option<Sprint> {
     let sprint = Sprint::new();
@@ -75,6 +106,7 @@ fn demonstrations() -> Option<Sprint> {
     done(&sprint, "relabel D --with rules");
     std::fs::write(sprint.path("tiny.toml"), TINY).unwrap();
     std::fs::write(sprint.path("resnet.toml"), RESNET).unwrap();
+    std::fs::write(sprint.path("memory.toml"), MEMORY).unwrap();
     Some(sprint)
 }
 
@@ -216,6 +248,30 @@ fn an_agent_that_is_shown_its_goal_is_trained_and_evaluated() {
     sprint.sample("tasks.json", 1, 2);
     done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
     assert_eq!(sprint.sorted("run/episodes.jsonl").len(), 2);
+}
+
+#[test]
+fn an_agent_with_a_memory_is_trained_evaluated_by_its_own_end_verified_and_corrected() {
+    let Some(sprint) = demonstrations() else { return };
+    sprint.sample("tasks.json", 1, 2);
+    done(&sprint, "pretrain D --preset memory.toml --out agent");
+    let trained = |folder: &str| sprint.read(&format!("{folder}/training/progress.jsonl"));
+    for part in ["detector_loss", "held_out_recall_tiny", "reached_loss", "held_out_end_precision"] {
+        assert!(trained("agent").contains(part), "{part} is not in {}", trained("agent"));
+    }
+    assert!(sprint.read("agent/README.md").contains("on a map of its own"));
+    let refused = sprint.run("pretrain D --preset memory.toml --out agent");
+    assert!(refused.code != Some(0) && refused.stderr.contains("holds a training already"), "{}", refused.stderr);
+    let refused = sprint.run("pretrain D --preset memory.toml --steps 5 --out other");
+    assert!(refused.code != Some(0) && refused.stderr.contains("--steps says nothing"), "{}", refused.stderr);
+    done(&sprint, "pretrain D --preset memory.toml --visual-from agent --out second");
+    assert!(!trained("second").contains("detector_loss") && trained("second").contains("reached_loss"));
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --out run");
+    let verified = done(&sprint, "verify run --checkpoint agent");
+    assert!(verified.contains("equal"), "{verified}");
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --end agent --out ended");
+    assert_eq!(sprint.sorted("ended/episodes.jsonl").len(), 2);
+    done(&sprint, "collect C --episodes 2 --seed 9 --learner agent");
 }
 
 #[test]

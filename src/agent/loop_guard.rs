@@ -71,7 +71,7 @@ impl LoopGuard {
 }
 
 /// Tells views apart.
-fn digest(view: &[u8]) -> u64 {
+pub(crate) fn digest(view: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(view);
     hasher.finish()

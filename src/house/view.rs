@@ -1,5 +1,7 @@
 //! What the agent sees and could act on: sight follows from the drawn frame, reach from distance.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::outcome::Reason;
@@ -43,6 +45,25 @@ pub(crate) fn decode(code: u16) -> Option<Instance> {
     }
 }
 
+/// How many pixels of each place of a raster of `side` x `side` show each code but 0; places are numbered row by row.
+pub(crate) fn pixels_by_place(frame: &Frame, side: usize) -> BTreeMap<u16, BTreeMap<usize, u16>> {
+    let mut counts: BTreeMap<u16, BTreeMap<usize, u16>> = BTreeMap::new();
+    for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
+        let down = y * side / frame.height;
+        let mut x = 0;
+        while x < row.len() {
+            let (id, across) = (row[x], x * side / frame.width);
+            let end = ((across + 1) * frame.width).div_ceil(side).min(row.len());
+            let run = row[x..end].iter().take_while(|&&other| other == id).count();
+            if id != 0 {
+                *counts.entry(id).or_default().entry(down * side + across).or_default() += run as u16;
+            }
+            x += run;
+        }
+    }
+    counts
+}
+
 /// An instance in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sighting {
@@ -69,7 +90,7 @@ impl View {
 
     /// Reads the rows of a square image of `size` rows, each pixel as in [`Frame::ids`].
     pub(crate) fn of_rows<Row: Iterator<Item = u16>>(size: usize, rows: impl Iterator<Item = Row>) -> View {
-        let mut found: std::collections::BTreeMap<u16, Sighting> = std::collections::BTreeMap::new();
+        let mut found: BTreeMap<u16, Sighting> = BTreeMap::new();
         for (y, row) in (0u16..).zip(rows) {
             let mut add = |id: u16, left: u16, end: u16| {
                 let Some(instance) = decode(id) else { return };

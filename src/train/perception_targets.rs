@@ -1,8 +1,6 @@
 //! What the visual encoder is trained to predict of a frame, from the simulator's state: labels and depth for each cell of the
 //! 7 x 7 map, and the held class.
 
-use std::collections::HashMap;
-
 use crate::domain::{ActionType, Class, Scene, World};
 use crate::house::view;
 use crate::house::view::{Frame, View, decode};
@@ -35,7 +33,7 @@ impl PerceptionTargets {
     pub(crate) fn of(scene: &Scene, world: &World, frame: &Frame) -> PerceptionTargets {
         let mut cell_labels = vec![0u8; CELL_LABELS * CELLS];
         let candidates = view::candidates(scene, world, &View::of(frame));
-        for (code, pixels) in pixels_by_cell(frame) {
+        for (code, pixels) in view::pixels_by_place(frame, SIDE as usize) {
             let Some(instance) = decode(code) else { continue };
             let class = world.class_of(scene, instance).unwrap_or_default();
             let kinds = candidates.iter().filter(|candidate| candidate.instance == instance);
@@ -46,7 +44,7 @@ impl PerceptionTargets {
             if world.is_open(instance) {
                 labels.push(CELL_LABELS - 1);
             }
-            for (cell, _) in pixels.iter().enumerate().filter(|(_, count)| **count >= FEWEST_PIXELS) {
+            for (&cell, _) in pixels.iter().filter(|(_, count)| **count >= FEWEST_PIXELS) {
                 for &label in &labels {
                     cell_labels[label * CELLS + cell] = 1;
                 }
@@ -59,26 +57,6 @@ impl PerceptionTargets {
             held: if held.in_vocabulary() { held.index() as u8 } else { 0 },
         }
     }
-}
-
-/// How many pixels of each cell show each code.
-fn pixels_by_cell(frame: &Frame) -> HashMap<u16, [u16; CELLS]> {
-    let side = SIDE as usize;
-    let mut counts: HashMap<u16, [u16; CELLS]> = HashMap::new();
-    for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
-        let down = y * side / frame.height;
-        let mut x = 0;
-        while x < row.len() {
-            let (id, across) = (row[x], x * side / frame.width);
-            let cell_end = ((across + 1) * frame.width).div_ceil(side);
-            let run = row[x..cell_end.min(row.len())].iter().take_while(|&&other| other == id).count();
-            if id != 0 {
-                counts.entry(id).or_insert([0; CELLS])[down * side + across] += run as u16;
-            }
-            x += run;
-        }
-    }
-    counts
 }
 
 fn depth_by_cell(frame: &Frame) -> Vec<f32> {
@@ -108,9 +86,9 @@ mod tests {
                 frame.ids[y * 300 + x] = 3;
             }
         }
-        let counts = pixels_by_cell(&frame);
-        assert_eq!(counts[&3][6], 200);
-        assert_eq!(counts[&3].iter().map(|&n| u32::from(n)).sum::<u32>(), 200);
+        let counts = view::pixels_by_place(&frame, SIDE as usize);
+        assert_eq!(counts[&3][&6], 200);
+        assert_eq!(counts[&3].values().map(|&n| u32::from(n)).sum::<u32>(), 200);
         assert!(depth_by_cell(&frame).iter().all(|depth| (depth - 2f32.ln()).abs() < 1e-5));
     }
 }

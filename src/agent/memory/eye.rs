@@ -57,6 +57,7 @@ mod tests {
             world.held = Some(0);
             let frame = renderer.draw(&scene, &world);
             let changed = (0..90_000).filter(|&i| frame.depth[i] != empty.depth[i]);
+            assert!(changed.clone().count() > 0, "{class} is not drawn");
             let strays = changed.filter(|i| !is_in_hand((i % 300) as f32, (i / 300) as f32, frame.depth[*i])).count();
             assert_eq!(strays, 0, "{class}");
         }

@@ -1,6 +1,6 @@
 //! What an agent keeps of what it saw: where it is, where it can walk, and what stands where. It knows its frames and its own
-//! moves, and nothing else of the simulator. Poses are in its own frame: where the episode began is cell (0, 0), faced north; heights are
-//! in metres above the floor.
+//! moves, and nothing else of the simulator. Poses are in its own frame: where the episode began is cell (0, 0), faced north;
+//! heights are in metres above the floor.
 
 mod eye;
 pub(crate) mod navigator;

@@ -119,6 +119,26 @@ mod tests {
     }
 
     #[test]
+    fn whatever_is_in_the_hand_fills_it() {
+        use crate::domain::Room;
+        use crate::domain::world::Parent;
+        use crate::house::{generate, render::Renderer};
+        let mut renderer = Renderer::new(300);
+        let mut missed = Vec::new();
+        for (seed, room) in (0..).zip(Room::ALL) {
+            let (scene, world) = generate::house(room, seed);
+            for index in 0..world.objects.len() {
+                let mut world = world.clone();
+                (world.held, world.objects[index].parent) = (Some(index as u16), Parent::Hand);
+                if !fills_hand(renderer.draw(&scene, &world)) {
+                    missed.push(world.objects[index].class.name());
+                }
+            }
+        }
+        assert!(missed.is_empty(), "{missed:?}");
+    }
+
+    #[test]
     fn an_empty_hand_seldom_looks_full_wherever_one_stands() {
         use crate::domain::Room;
         use crate::house::{generate, render::Renderer};

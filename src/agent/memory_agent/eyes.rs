@@ -1,4 +1,5 @@
-//! What the agent sees with: a trained detector, or for an ablation what the simulator knows to be in view.
+//! What the agent sees with: a trained detector, or for an ablation what the simulator knows to be in view and in
+//! the hand.
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};

@@ -27,7 +27,7 @@ pub(crate) struct Choice {
     pub(crate) classes: Vec<u8>,
 }
 
-/// A list of numbers under construction, so that each has its place and none is forgotten.
+/// A list of numbers under construction: each has its place. The places that are left at the end are spare, and 0.
 struct Numbers(Vec<f32>);
 
 impl Numbers {

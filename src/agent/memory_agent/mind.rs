@@ -6,6 +6,7 @@ use super::features::Choice;
 use super::goal::Goal;
 use super::macro_action::{Failed, MacroAction, available};
 use super::progress::{Attempt, Progress};
+use crate::agent::loop_guard::digest;
 use crate::agent::memory::{Glance, Memory};
 use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::house::view::{Candidate, Frame};
@@ -20,6 +21,7 @@ pub(crate) struct Mind {
     pub(crate) progress: Progress,
     failed: Failed,
     attempt: Option<Attempt>,
+    /// A digest of the picture that was seen last.
     picture: Option<u64>,
 }
 
@@ -39,7 +41,7 @@ impl Mind {
     /// Takes in the next moment, and what came of the last action in it.
     pub(crate) fn observe(&mut self, moment: &Moment<'_>) {
         let before = self.memory.odometry.pose();
-        let picture = Some(fingerprint(&moment.frame.rgb));
+        let picture = Some(digest(&moment.frame.rgb));
         let changed = picture != self.picture;
         let first = std::mem::replace(&mut self.picture, picture).is_none();
         let attempt = self.attempt.take();
@@ -110,11 +112,4 @@ impl Mind {
         let pose = self.memory.odometry.pose();
         pose.cell.ahead(pose.heading)
     }
-}
-
-fn fingerprint(rgb: &[u8]) -> u64 {
-    use std::hash::{DefaultHasher, Hash, Hasher};
-    let mut hasher = DefaultHasher::new();
-    rgb.hash(&mut hasher);
-    hasher.finish()
 }

@@ -27,7 +27,7 @@ pub(crate) struct Attempt {
 pub(crate) struct Progress {
     /// What it is after, in order.
     pub(crate) goals: Vec<Goal>,
-    /// At which of them it is; the number of goals when all are done.
+    /// At which of them it is; it stays at the last one.
     pub(crate) at: usize,
     /// What it holds; no class for something that it did not pick up itself.
     pub(crate) held: Option<Class>,
@@ -59,9 +59,9 @@ impl Progress {
         }
     }
 
-    /// The present goal; the last one when all are done.
+    /// The present goal.
     pub(crate) fn goal(&self) -> Option<&Goal> {
-        self.goals.get(self.at).or(self.goals.last())
+        self.goals.get(self.at)
     }
 
     /// Whether the present goal is the last one.

@@ -32,7 +32,7 @@ pub struct Recollection {
     pub(super) mind: Mind,
     /// The instruction that was read last, and what was read.
     read: Option<(String, Vec<ReadSubtask>)>,
-    /// The step that was seen last, with what could be done in it.
+    /// The step that was seen last.
     pub(super) seen_at: Option<u32>,
     /// What was begun where: a pose, and how much had been done for which goal.
     pub(super) tried: BTreeSet<Tried>,
@@ -71,9 +71,7 @@ impl Recollection {
     pub(super) fn new(seed: u64) -> Recollection {
         Recollection { rng: ChaCha8Rng::seed_from_u64(seed), ..Recollection::default() }
     }
-}
 
-impl Recollection {
     /// Reads the instruction, where it is another one than before.
     pub(super) fn read(&mut self, instruction: &str) -> anyhow::Result<()> {
         let instruction = normalise(instruction);

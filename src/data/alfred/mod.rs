@@ -1,6 +1,7 @@
 //! The ALFRED importer: a checkout as published becomes a dataset folder.
 
 pub(crate) mod bodies;
+pub mod checkout;
 pub(crate) mod cover;
 pub(crate) mod facing;
 pub(crate) mod files;

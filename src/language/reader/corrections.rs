@@ -109,13 +109,7 @@ fn replace(kept: &mut Vec<Token>, rest: &[Token]) -> Option<usize> {
     if let Some(lemma) = first.lemma().filter(|_| !first.is_name()) {
         // "take the mug, no, take the cup"
         let at = kept[..said].iter().rposition(|token| token.lemma() == Some(lemma))?;
-        let meant = kept[at..].iter().find(|token| token.is_name()).cloned();
-        kept.truncate(at);
-        // "it" stands for what is taken back.
-        let it = rest.get(1).is_some_and(|next| matches!(next.text.as_str(), "it" | "them"));
-        let Some(meant) = meant.filter(|_| it) else { return Some(0) };
-        kept.extend([first.clone(), meant]);
-        return Some(2);
+        return Some(begin_anew(kept, at, rest));
     }
     let begin = said - kept[..said].iter().rev().take_while(|token| !token.is_mark()).count();
     if is_preposition(first) {
@@ -124,13 +118,7 @@ fn replace(kept: &mut Vec<Token>, rest: &[Token]) -> Option<usize> {
             kept[at] = first.clone();
             return Some(2);
         }
-        let meant = kept[at..].iter().find(|token| token.is_name()).cloned();
-        kept.truncate(at);
-        // "it" stands for what is taken back.
-        let it = rest.get(1).is_some_and(|next| matches!(next.text.as_str(), "it" | "them"));
-        let Some(meant) = meant.filter(|_| it) else { return Some(0) };
-        kept.extend([first.clone(), meant]);
-        return Some(2);
+        return Some(begin_anew(kept, at, rest));
     }
     let length = rest.iter().position(Token::is_name)? + 1;
     let leads_on = |token: &Token| token.is_mark() || is_preposition(token) || token.lemma().is_some();
@@ -145,6 +133,18 @@ fn replace(kept: &mut Vec<Token>, rest: &[Token]) -> Option<usize> {
     kept.truncate(said);
     kept.splice(start..=at, rest[..length].iter().cloned());
     Some(length)
+}
+
+/// Takes back everything from `at` on; how many of the rest's first words stand for what was said there.
+fn begin_anew(kept: &mut Vec<Token>, at: usize, rest: &[Token]) -> usize {
+    let meant = kept[at..].iter().find(|token| token.is_name()).cloned();
+    kept.truncate(at);
+    let (Some(meant), [first, it, ..]) = (meant, rest) else { return 0 };
+    if !matches!(it.text.as_str(), "it" | "them") {
+        return 0;
+    }
+    kept.extend([first.clone(), meant]);
+    2
 }
 
 #[cfg(test)]

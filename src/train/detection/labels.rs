@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::domain::{Class, Scene, World};
-use crate::house::view::{FEWEST_PIXELS, Frame, decode};
+use crate::house::view::{FEWEST_PIXELS, Frame, decode, pixels_by_place};
 use crate::nets::detector::{GRID, LABELS};
 
 /// Places of a frame.
@@ -39,7 +39,7 @@ impl PlaceLabels {
     pub(crate) fn of(scene: &Scene, world: &World, frame: &Frame) -> PlaceLabels {
         let mut holding: BTreeMap<usize, f32> = BTreeMap::new();
         let mut things = Vec::new();
-        for (code, pixels) in pixels_by_place(frame) {
+        for (code, pixels) in pixels_by_place(frame, GRID) {
             let Some(instance) = decode(code) else { continue };
             let class = world.class_of(scene, instance).unwrap_or_default();
             if !class.in_vocabulary() {
@@ -65,25 +65,6 @@ impl PlaceLabels {
         }
         PlaceLabels { holding, things }
     }
-}
-
-/// How many pixels of each place show each code.
-fn pixels_by_place(frame: &Frame) -> BTreeMap<u16, BTreeMap<usize, u16>> {
-    let mut counts: BTreeMap<u16, BTreeMap<usize, u16>> = BTreeMap::new();
-    for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
-        let down = y * GRID / frame.height;
-        let mut x = 0;
-        while x < row.len() {
-            let (id, across) = (row[x], x * GRID / frame.width);
-            let end = ((across + 1) * frame.width).div_ceil(GRID).min(row.len());
-            let run = row[x..end].iter().take_while(|&&other| other == id).count();
-            if id != 0 {
-                *counts.entry(id).or_default().entry(down * GRID + across).or_default() += run as u16;
-            }
-            x += run;
-        }
-    }
-    counts
 }
 
 #[cfg(test)]

@@ -1,25 +1,29 @@
 //! Re-runs recorded demonstrations in the simulator: are their actions possible, their goals met, their skills complete, and
 //! do their targets appear where they were recorded?
 
+mod boxes;
+mod failure;
+mod sight;
+mod task_sets;
+
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use anyhow::Context;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::agent::{Decision, Policy};
+pub(crate) use self::boxes::BoxReport;
+use self::boxes::{Overlap, box_report, compare, note_moved};
+pub(crate) use self::failure::ReplayFailure;
+use self::sight::unseen;
+pub(crate) use self::task_sets::SetReport;
+use self::task_sets::{recorded, replay_set, scene_of};
 use crate::data::Dataset;
-use crate::domain::task::SceneRef;
 use crate::domain::world::Instance;
-use crate::domain::{ActionType, Scene, Task, Trajectory, World};
-use crate::env::HouseEnvironment;
-use crate::episode::rollout::{Observer, Rollout, Tick};
-use crate::house::bounds::projected_bounds;
+use crate::domain::{ActionType, Scene, Trajectory};
 use crate::house::goals::goal_met;
 use crate::house::grading::{Grader, Grading};
-use crate::house::{House, Outcome, Replay};
+use crate::house::{Outcome, Replay};
 
 /// Which demonstrations to replay, and what to compare beside their outcomes.
 #[derive(Clone, Debug, Default)]
@@ -61,55 +65,11 @@ pub(crate) struct ReplayReport {
     pub(crate) failed: Vec<ReplayFailure>,
 }
 
-/// A check that one demonstration, or task of an official set, did not pass.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct ReplayFailure {
-    /// `legal`, `seen`, `goals`, `skills_class`, `skills_strict`; for a task of an official set, `task_class` or `task_strict`.
-    pub(crate) what: &'static str,
-    /// The id of the trajectory or task.
-    pub(crate) id: String,
-    /// What the simulator found instead.
-    pub(crate) reason: String,
-}
-
-/// How many tasks of a set the expert's recorded actions complete.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct SetReport {
-    /// How many tasks the set has.
-    pub(crate) tasks: usize,
-    /// How many are completed, graded by class.
-    pub(crate) class: usize,
-    /// Completed, graded as the released code does.
-    pub(crate) strict: usize,
-}
-
-/// How well the boxes of targets, as the simulator projects them, fit those that ALFRED recorded.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct BoxReport {
-    /// How many boxes were compared.
-    pub(crate) n: usize,
-    /// Median intersection over union, first pickups of objects that nothing moved before.
-    pub(crate) pickup_median_iou: f64,
-    /// The same of receptacles that something is put into.
-    pub(crate) put_median_iou: f64,
-    /// By what was done and the target's class.
-    pub(crate) per_class: BTreeMap<String, ClassBoxes>,
-}
-
-/// The same for one action and class.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct ClassBoxes {
-    /// How many boxes of it were compared.
-    pub(crate) n: usize,
-    /// Median intersection over union of projected and recorded box.
-    pub(crate) median_iou: f64,
-}
-
 /// What one trajectory came to.
 #[derive(Default)]
 struct Replayed {
     failures: Vec<(&'static str, String)>,
-    ious: Vec<(ActionType, &'static str, f32)>,
+    overlaps: Vec<Overlap>,
 }
 
 /// Replays a dataset's demonstrations on all cores; `progress` is called as they are done.
@@ -155,24 +115,6 @@ pub(crate) fn replay(
     Ok(report)
 }
 
-fn scene_of<'a>(scenes: &'a BTreeMap<String, Arc<Scene>>, reference: &SceneRef) -> anyhow::Result<&'a Arc<Scene>> {
-    match reference {
-        SceneRef::Named(name) => scenes.get(name).with_context(|| format!("no scene {name:?}")),
-        SceneRef::Generated { .. } => anyhow::bail!("generated scenes hold no recordings to replay"),
-    }
-}
-
-fn recorded(dataset: &Dataset, ids: &[&str]) -> anyhow::Result<BTreeMap<String, Trajectory>> {
-    let mut found = BTreeMap::new();
-    for trajectory in dataset.trajectories()? {
-        let trajectory = trajectory?;
-        if ids.contains(&&*trajectory.id) {
-            found.insert(trajectory.id.clone(), trajectory);
-        }
-    }
-    Ok(found)
-}
-
 fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     let mut replayed = Replayed::default();
     let mut replay = Replay::new(scene, trajectory.start.clone(), &trajectory.actions);
@@ -188,7 +130,7 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
             let recorded = trajectory.boxes.get(interactions).copied().unwrap_or_default();
             interactions += 1;
             if boxes && let Some(target) = action.target {
-                replayed.ious.extend(compare(scene, replay.world(), action.kind, target, recorded, &moved));
+                replayed.overlaps.extend(compare(scene, replay.world(), action.kind, target, recorded, &moved));
             }
             if let (ActionType::Pickup, Some(Instance::Object(index))) = (action.kind, action.target) {
                 note_moved(replay.world(), index, &mut moved);
@@ -220,84 +162,6 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     replayed
 }
 
-/// The first action that an agent could not have taken because its target was out of view or reach, if there is one.
-fn unseen(scene: &Arc<Scene>, trajectory: &Trajectory) -> Option<String> {
-    /// Knows which action the rules alone would have allowed.
-    #[derive(Default)]
-    struct Sight {
-        possible: bool,
-        unseen: Option<String>,
-    }
-    impl Observer<HouseEnvironment> for Sight {
-        fn before(
-            &mut self,
-            rollout: &mut Rollout,
-            _policy: Option<&mut dyn Policy>,
-            decision: &Decision,
-        ) -> anyhow::Result<ControlFlow<()>> {
-            let house = &rollout.env.house;
-            let mut by_rules =
-                Replay::new(house.scene(), house.world().clone(), std::slice::from_ref(&decision.action));
-            self.possible = by_rules.step().is_some_and(|(_, outcome)| outcome.is_done());
-            Ok(ControlFlow::Continue(()))
-        }
-
-        fn after(&mut self, _rollout: &mut Rollout, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
-            let Tick { step, decision, outcome, .. } = tick;
-            if let (true, Outcome::Impossible(reason)) = (self.possible, outcome) {
-                self.unseen = Some(format!("action {}, {}: {reason}", step - 1, decision.action.kind));
-                return Ok(ControlFlow::Break(()));
-            }
-            Ok(ControlFlow::Continue(()))
-        }
-    }
-    let house = House::new(scene.clone(), trajectory.start.clone());
-    let mut rollout = Rollout::in_house(house, String::new(), None, None);
-    let mut sight = Sight::default();
-    rollout.replay(trajectory.actions.iter().copied(), &mut sight).ok()?;
-    sight.unseen
-}
-
-/// Marks an object and all it carries as moved.
-fn note_moved(world: &World, index: u16, moved: &mut [bool]) {
-    let carried: Vec<u16> = world.contents(Instance::Object(index)).collect();
-    for index in carried.into_iter().chain([index]) {
-        if let Some(moved) = moved.get_mut(usize::from(index)) {
-            *moved = true;
-        }
-    }
-}
-
-/// How well the projected target fits the recorded box, for the interactions that are compared.
-fn compare(
-    scene: &Scene,
-    world: &World,
-    kind: ActionType,
-    target: Instance,
-    recorded: [u16; 4],
-    moved: &[bool],
-) -> Option<(ActionType, &'static str, f32)> {
-    let counts = match (kind, target) {
-        (ActionType::Pickup, Instance::Object(index)) => moved.get(usize::from(index)) == Some(&false),
-        (ActionType::Put, _) => true,
-        _ => false,
-    };
-    if !counts || recorded == [0; 4] {
-        return None;
-    }
-    let class = world.class_of(scene, target)?.name();
-    let projected = projected_bounds(scene, world, world.agent, target);
-    Some((kind, class, projected.map_or(0.0, |projected| iou(projected, recorded.map(f32::from)))))
-}
-
-/// Intersection over union of two boxes, given by left, top, right and bottom edges.
-pub(crate) fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
-    let area = |[left, top, right, bottom]: [f32; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
-    let shared = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
-    let all = area(a) + area(b) - shared;
-    if all > 0.0 { shared / all } else { 0.0 }
-}
-
 fn summarise(replayed: &[(String, Replayed)], options: &ReplayOptions) -> ReplayReport {
     let mut failures: BTreeMap<&'static str, usize> =
         ["legal", "goals", "skills_class", "skills_strict"].map(|what| (what, 0)).into();
@@ -320,83 +184,19 @@ fn summarise(replayed: &[(String, Replayed)], options: &ReplayOptions) -> Replay
         goals: share("goals"),
         skills_class: share("skills_class"),
         skills_strict: share("skills_strict"),
-        boxes: options.boxes.then(|| box_report(replayed)),
+        boxes: options.boxes.then(|| {
+            let all: Vec<Overlap> = replayed.iter().flat_map(|(_, one)| one.overlaps.iter().copied()).collect();
+            box_report(&all)
+        }),
         task_sets: BTreeMap::new(),
         failures,
         failed,
     }
 }
 
-fn box_report(replayed: &[(String, Replayed)]) -> BoxReport {
-    let all: Vec<_> = replayed.iter().flat_map(|(_, one)| one.ious.iter().copied()).collect();
-    let median_of =
-        |kind: ActionType| median(all.iter().filter(|(k, _, _)| *k == kind).map(|(_, _, iou)| *iou).collect());
-    let mut classes: BTreeMap<String, Vec<f32>> = BTreeMap::new();
-    for (kind, class, iou) in &all {
-        classes.entry(format!("{kind} {class}")).or_default().push(*iou);
-    }
-    let class = |ious: Vec<f32>| ClassBoxes { n: ious.len(), median_iou: median(ious) };
-    BoxReport {
-        n: all.len(),
-        pickup_median_iou: median_of(ActionType::Pickup),
-        put_median_iou: median_of(ActionType::Put),
-        per_class: classes.into_iter().map(|(name, ious)| (name, class(ious))).collect(),
-    }
-}
-
-/// The middle value; 0 of nothing.
-fn median(mut values: Vec<f32>) -> f64 {
-    values.sort_by(f32::total_cmp);
-    values.get(values.len() / 2).copied().map_or(0.0, f64::from)
-}
-
-/// Lets the expert's recorded actions do the tasks of a set.
-fn replay_set(
-    tasks: &[Task],
-    recorded: &BTreeMap<String, Trajectory>,
-    scenes: &BTreeMap<String, Arc<Scene>>,
-    failed: &mut Vec<ReplayFailure>,
-) -> anyhow::Result<SetReport> {
-    let mut report = SetReport { tasks: tasks.len(), ..SetReport::default() };
-    for task in tasks {
-        let scene = scene_of(scenes, &task.scene).with_context(|| task.id.clone())?;
-        let (Some((id, first)), Some(start)) = (&task.source, &task.start) else { continue };
-        let Some(trajectory) = recorded.get(id) else { continue };
-        let from = trajectory.skill_range(usize::from(*first)).start;
-        let rest = trajectory.actions.get(from..).unwrap_or_default();
-        let actions = &rest[..rest.len().min(task.expert_steps as usize)];
-        let mut replay = Replay::new(scene, start.clone(), actions);
-        let new = |grading| Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
-        let mut graders = [new(Grading::Class), new(Grading::Strict)];
-        while let Some((action, outcome)) = replay.step() {
-            for grader in &mut graders {
-                grader.observe(scene, replay.world(), action, outcome);
-            }
-        }
-        let world = replay.finish();
-        report.class += usize::from(graders[0].is_done());
-        report.strict += usize::from(graders[1].is_done());
-        for (what, grader) in [("task_class", &graders[0]), ("task_strict", &graders[1])] {
-            if !grader.is_done() {
-                let reason = format!("{id}: {}", grader.waits_for(scene, &world));
-                failed.push(ReplayFailure { what, id: task.id.clone(), reason });
-            }
-        }
-    }
-    Ok(report)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn overlap_of_boxes_is_one_for_equal_and_zero_for_apart() {
-        let unit = [0.0, 0.0, 10.0, 10.0];
-        assert_eq!(iou(unit, unit), 1.0);
-        assert_eq!(iou(unit, [20.0, 0.0, 30.0, 10.0]), 0.0);
-        assert!((iou(unit, [5.0, 0.0, 15.0, 10.0]) - 1.0 / 3.0).abs() < 1e-6);
-    }
 
     #[test]
     fn alfreds_demonstrations_replay_and_its_counts_and_task_sets_come_out() {
@@ -442,7 +242,7 @@ mod tests {
                 let id = complete.strip_prefix(source.join("data/json_2.1.0_originals/train")).unwrap();
                 let Ok(stripped) = std::fs::read(stripped.join(id)) else { continue };
                 let parse =
-                    |text: &[u8]| crate::data::alfred::import::parse_recording(text, "task/trial", "train").unwrap();
+                    |text: &[u8]| crate::data::alfred::checkout::parse_recording(text, "task/trial", "train").unwrap();
                 assert_eq!(parse(&std::fs::read(&complete).unwrap()), parse(&stripped), "{}", complete.display());
                 compared += 1;
             }
