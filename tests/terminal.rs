@@ -113,10 +113,11 @@ impl Session {
         self.keys.flush().unwrap();
     }
 
-    /// Gives the terminal another size.
+    /// Gives the terminal another size. The screen has it before the program hears of it: what the program draws at once would
+    /// be cut to the old size otherwise.
     pub(crate) fn resize(&self, cols: u16, rows: u16) {
-        self.master.resize(size(cols, rows)).unwrap();
         self.screen.lock().unwrap().screen_mut().set_size(rows.max(2), cols.max(2));
+        self.master.resize(size(cols, rows)).unwrap();
     }
 
     /// Whether the alternate screen is shown.

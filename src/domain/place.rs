@@ -103,6 +103,11 @@ impl Cell {
         Point::new(i32::from(self.x) * Cell::SIDE, y, i32::from(self.z) * Cell::SIDE)
     }
 
+    /// How many cells lie between the two, along x or z, whichever is more: 1 for neighbours, also across a corner.
+    pub(crate) fn apart(self, other: Cell) -> u16 {
+        self.x.abs_diff(other.x).max(self.z.abs_diff(other.z))
+    }
+
     /// The neighbouring cell that lies ahead.
     pub(crate) fn ahead(self, heading: Heading) -> Cell {
         let (dx, dz) = heading.step();

@@ -73,6 +73,12 @@ impl Camera {
         (local.z > Camera::NEAR).then(|| Camera::image(local))
     }
 
+    /// Whether a point (metres) lies inside the image.
+    pub(crate) fn frames(&self, point: Vec3) -> bool {
+        let inside = |at: f32| (0.0..Camera::IMAGE).contains(&at);
+        self.project(point).is_some_and(|at| inside(at.x) && inside(at.y))
+    }
+
     /// The point (metres) that is seen at a column and row of a 300 x 300 image, `depth` metres along the optical axis:
     /// [`Camera::project`] the other way round.
     pub(crate) fn unproject(&self, column: f32, row: f32, depth: f32) -> Vec3 {

@@ -1,5 +1,6 @@
 //! Where a Put leaves an object: the free point of the receptacle that is nearest to the agent.
 
+use super::camera::Camera;
 use super::occlusion::in_sight;
 use crate::domain::place::Rect;
 use crate::domain::world::{Instance, Object, Parent, World};
@@ -72,7 +73,12 @@ pub(crate) fn spot(scene: &Scene, world: &World, object: &Object, receptacle: In
             points.sort_by_key(|&(level, distance, at)| (level, distance, at));
             let eye = world.agent.cell.centre(scene.camera_y());
             let middle = object_height(scene, object) / 2 - object.class.info().rest;
-            let seen = |at: Point| in_sight(fixture, eye, Point::new(at.x - shift.x, at.y + middle, at.z - shift.z));
+            let camera = Camera::of(scene, world.agent);
+            let seen = |at: Point| {
+                let middle = Point::new(at.x, at.y + middle, at.z);
+                camera.frames(middle.metres())
+                    && in_sight(fixture, eye, Point::new(middle.x - shift.x, middle.y, middle.z - shift.z))
+            };
             let fits = |level: usize, at: Point, demand: Demand, wants_sight: bool| {
                 let surface = &fixture.surfaces[level];
                 let ground = outline(scene, object, at);
@@ -102,7 +108,7 @@ pub(crate) fn spot(scene: &Scene, world: &World, object: &Object, receptacle: In
             ];
             let walled = has_walls(fixture);
             // Without walls nothing hides a place, and no place is away from them.
-            let demands = demands.into_iter().filter(|&(demand, sight)| walled || !sight && demand != Demand::Inside);
+            let demands = demands.into_iter().filter(|&(demand, _)| walled || demand != Demand::Inside);
             let heaps = fixture.class.info().heaps;
             let demands = demands.filter(|&(demand, _)| heaps || demand != Demand::Heap);
             let first = |(demand, sight)| points.iter().find(|&&(level, _, at)| fits(level, at, demand, sight));

@@ -1,9 +1,9 @@
 //! What the eyes make of one frame: which classes show where, what stands open, how far it is.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use crate::domain::{Class, Scene, World};
-use crate::house::view::{Frame, decode};
+use crate::house::view::{Frame, decode, pixels_by_place, places_of};
 
 pub(crate) use crate::nets::detector::GRID;
 
@@ -27,30 +27,23 @@ impl Percept {
 
     /// What eyes without fault would make of a frame that was drawn of `world`.
     pub(crate) fn of_truth(scene: &Scene, world: &World, frame: &Frame) -> Percept {
-        /// As few pixels of a cell show a thing there.
-        const FEWEST: u32 = 4;
         /// Even the simulator's word leaves a doubt, as every other evidence does.
         const SURE: f32 = 0.9;
-        let mut counts: Vec<BTreeMap<u16, u32>> = vec![BTreeMap::new(); GRID * GRID];
-        for (y, row) in frame.ids.chunks_exact(frame.width).enumerate() {
-            let down = y * GRID / frame.height * GRID;
-            for (x, &id) in row.iter().enumerate().filter(|(_, id)| **id != 0) {
-                *counts[down + x * GRID / frame.width].entry(id).or_default() += 1;
-            }
-        }
         let mut percept = Percept { detections: vec![], open: vec![0.0; GRID * GRID], depth: median_depths(frame) };
-        for (place, counts) in counts.iter().enumerate() {
-            for (&id, _) in counts.iter().filter(|(_, pixels)| **pixels >= FEWEST) {
-                let Some(instance) = decode(id) else { continue };
-                let class = world.class_of(scene, instance).unwrap_or_default();
-                if class.in_vocabulary() && !percept.detections.contains(&(class, place as u16, SURE)) {
-                    percept.detections.push((class, place as u16, SURE));
+        let mut seen = BTreeSet::new();
+        for (code, pixels) in pixels_by_place(frame, GRID) {
+            let Some(instance) = decode(code) else { continue };
+            let class = world.class_of(scene, instance).unwrap_or_default();
+            for place in places_of(&pixels) {
+                if class.in_vocabulary() {
+                    seen.insert((place as u16, class));
                 }
                 if world.is_open(instance) || world.is_on(instance) {
                     percept.open[place] = 1.0;
                 }
             }
         }
+        percept.detections = seen.into_iter().map(|(place, class)| (class, place, SURE)).collect();
         percept
     }
 

@@ -173,6 +173,14 @@ impl SemanticMap {
 }
 
 impl Thing {
+    /// The cell of it that is nearest to the middle of all of them.
+    pub(crate) fn middle(&self) -> Cell {
+        let sum = |of: fn(Cell) -> i16| self.cells.iter().map(|(cell, _)| i32::from(of(*cell))).sum::<i32>();
+        let (x, z, count) = (sum(|cell| cell.x), sum(|cell| cell.z), self.cells.len() as i32);
+        let off = |cell: Cell| (i32::from(cell.x) * count - x).abs() + (i32::from(cell.z) * count - z).abs();
+        self.cells.iter().map(|(cell, _)| *cell).min_by_key(|&cell| (off(cell), cell)).unwrap_or(self.best)
+    }
+
     /// The thing that these cells make up; `None` without cells.
     fn of(class: Class, cells: Vec<(Cell, Evidence)>) -> Option<Thing> {
         let better = |a: &&(Cell, Evidence), b: &&(Cell, Evidence)| {

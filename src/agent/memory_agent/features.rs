@@ -142,6 +142,7 @@ fn situation(memory: &Memory, progress: &Progress, things: &[Thing]) -> Vec<f32>
     numbers.number(f32::from(memory.odometry.pose().horizon) / 60.0);
     numbers.number(log(progress.steps as f32));
     numbers.flag(memory.odometry.blocked());
+    numbers.flag(progress.placed.iter().any(|(class, _)| is(object, *class)));
     numbers.exactly(SITUATION)
 }
 
@@ -191,18 +192,19 @@ fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &Macr
     numbers.number(beside(&|class| goal.is_some_and(|goal| goal.is_object(class))));
     numbers.number(beside(&|class| goal.is_some_and(|goal| goal.place == Some(class))));
     numbers.number(beside(&|class| goal.is_some_and(|goal| goal.receptacle == Some(class))));
-    let near = |cell: &Cell| at.is_some_and(|at| (at.x - cell.x).abs().max((at.z - cell.z).abs()) <= 2);
+    let near = |cell: &Cell| at.is_some_and(|at| at.apart(*cell) <= 2);
     let touched = progress.done.iter().filter(|done| done.class == class && near(&done.cell));
     numbers.number(touched.clone().count().min(4) as f32 / 2.0);
     numbers.number(touched.filter(|done| Some(done.kind) == kind).count().min(4) as f32 / 2.0);
     numbers.flag(progress.done.last().is_some_and(|last| last.class == class && near(&last.cell)));
     numbers.flag(progress.active.iter().any(|(active, cell)| *active == class && near(cell)));
+    // The one that it put there itself, not another of its kind.
+    numbers.flag(progress.placed.iter().any(|(placed, cell)| *placed == class && near(cell)));
     numbers.exactly(ACTION)
 }
 
 /// Whether two things share a cell, or lie in neighbouring ones.
 fn lie_together(a: &Thing, b: &Thing) -> bool {
     let (small, large) = if a.cells.len() < b.cells.len() { (a, b) } else { (b, a) };
-    let beside = |x: Cell, y: Cell| (x.x - y.x).abs().max((x.z - y.z).abs()) <= 1;
-    small.cells.iter().any(|(cell, _)| large.cells.iter().any(|(other, _)| beside(*cell, *other)))
+    small.cells.iter().any(|(cell, _)| large.cells.iter().any(|(other, _)| cell.apart(*other) <= 1))
 }

@@ -19,7 +19,7 @@ const NOT_THERE: f32 = 0.3;
 const ENDS: usize = 8;
 /// Ways to the edge of what was seen, and how far their ends lie apart at least, in cells.
 const EXPLORATIONS: usize = 2;
-const APART: i16 = 4;
+const APART: u16 = 4;
 /// Turns after which one has looked all around.
 const AROUND: u32 = 3;
 
@@ -83,7 +83,12 @@ pub(crate) fn available(
             continue;
         }
         let thing = nearest_thing(&things, class, pose.cell);
-        let at = thing.map_or(pose.cell.ahead(pose.heading), |index| things[index].best);
+        let ahead = pose.cell.ahead(pose.heading);
+        let at = thing.map_or(ahead, |index| match kind {
+            // Where in it the thing will come to lie is not known: most likely not at its edge.
+            ActionType::Put => things[index].middle(),
+            _ => things[index].best,
+        });
         let purpose = Purpose::Interact(kind, class);
         found.push(MacroAction { purpose, thing, steps: 0, cost: 0.0, first: candidate.action(), at: Some(at) });
     }
@@ -93,7 +98,9 @@ pub(crate) fn available(
         let wanted: Vec<ActionType> = kinds(thing, progress)
             .filter(|&kind| matters(goal, progress, kind, class))
             .filter(|&kind| {
-                !found.iter().any(|now| now.purpose == Purpose::Interact(kind, class) && now.thing == Some(index))
+                // What opens may better be faced first: from its side one does not see what lies in it.
+                let now = |now: &MacroAction| now.purpose == Purpose::Interact(kind, class) && now.thing == Some(index);
+                class.info().openable || !found.iter().any(now)
             })
             .collect();
         // The way does not depend on what is done at its end.
@@ -159,7 +166,7 @@ fn nearest_thing(things: &[Thing], class: Class, from: Cell) -> Option<usize> {
 /// What could be done with a thing as it is remembered.
 fn kinds(thing: &Thing, progress: &Progress) -> impl Iterator<Item = ActionType> {
     let info = thing.class.info();
-    let near = |cell: &Cell| (cell.x - thing.best.x).abs() <= 2 && (cell.z - thing.best.z).abs() <= 2;
+    let near = |cell: &Cell| cell.apart(thing.best) <= 2;
     let by_own_hand = progress.active.iter().any(|(class, cell)| *class == thing.class && near(cell));
     let (open, shut) = (by_own_hand || thing.open > 0.4, !by_own_hand && thing.open < 0.6);
     let empty = progress.held.is_none();
@@ -199,7 +206,7 @@ fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
     let mut chosen: Vec<Cell> = Vec::new();
     let mut found = Vec::new();
     for (cell, route) in ways {
-        let apart = |other: &Cell| (other.x - cell.x).abs().max((other.z - cell.z).abs()) >= APART;
+        let apart = |other: &Cell| other.apart(cell) >= APART;
         if found.len() < EXPLORATIONS
             && chosen.iter().all(apart)
             && let Some(way) = MacroAction::along(Purpose::Explore, None, cell, route)

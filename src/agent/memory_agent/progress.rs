@@ -35,6 +35,8 @@ pub(crate) struct Progress {
     pub(crate) done: Vec<Interaction>,
     /// What it opened or switched on and has not closed or switched off since, in the whole episode.
     pub(crate) active: Vec<(Class, Cell)>,
+    /// What it put where and has not taken again, in the whole episode.
+    pub(crate) placed: Vec<(Class, Cell)>,
     /// Steps since the present goal began.
     pub(crate) steps: u32,
     /// Turns on the spot since it last moved, looked up or down, or acted.
@@ -48,12 +50,10 @@ impl Progress {
         self.done.clear();
     }
 
-    /// What was in the hand from the start is what somebody means who says to put or to wash something.
+    /// What was in the hand from the start is what somebody means who says to put or to wash something next.
     pub(crate) fn name_what_is_held(&mut self) {
-        let meant = self
-            .goals
-            .first()
-            .filter(|goal| !matches!(goal.skill, SkillKind::Pickup | SkillKind::Slice | SkillKind::Toggle));
+        let meant =
+            self.goal().filter(|goal| !matches!(goal.skill, SkillKind::Pickup | SkillKind::Slice | SkillKind::Toggle));
         if let (Some(Class::NONE), Some(goal)) = (self.held, meant) {
             self.held = Some(goal.object);
         }
@@ -85,8 +85,14 @@ impl Progress {
         let Some((class, cell)) = attempt.target.filter(|_| worked) else { return };
         self.done.push(Interaction { kind: attempt.kind, class, cell });
         match attempt.kind {
-            ActionType::Pickup => self.held = Some(class),
-            ActionType::Put => self.held = None,
+            ActionType::Pickup => {
+                self.held = Some(class);
+                self.placed.retain(|(of, at)| *of != class || at.apart(cell) > 1);
+            }
+            ActionType::Put => {
+                let put = self.held.take().filter(|held| *held != Class::NONE);
+                self.placed.extend(put.map(|held| (held, cell)));
+            }
             ActionType::Open | ActionType::ToggleOn => self.active.push((class, cell)),
             ActionType::Close | ActionType::ToggleOff => {
                 // The last one of its class: one shuts what one has just opened.

@@ -199,10 +199,8 @@ impl Recollection {
 
 /// Whether a macro action goes on with what was set out to last.
 fn goes_on(aim: Option<Aim>, action: &MacroAction) -> bool {
-    let near = |a: Cell, b: Cell| (a.x - b.x).abs().max((a.z - b.z).abs()) <= 2;
-    let same =
-        |(purpose, at): Aim| purpose == action.purpose && at.zip(action.at).is_some_and(|(was, is)| near(was, is));
-    aim.is_some_and(same)
+    let near = |(was, is): (Cell, Cell)| was.apart(is) <= 2;
+    aim.is_some_and(|(purpose, at)| purpose == action.purpose && at.zip(action.at).is_some_and(near))
 }
 
 /// How a macro action begins, as the loop guard tells beginnings apart.

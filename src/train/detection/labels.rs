@@ -3,13 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::domain::{Class, Scene, World};
-use crate::house::view::{FEWEST_PIXELS, Frame, decode, pixels_by_place};
+use crate::house::view::{FEWEST_PIXELS, Frame, decode, pixels_by_place, places_of};
 use crate::nets::detector::{GRID, LABELS};
 
 /// Places of a frame.
 pub(crate) const PLACES: usize = GRID * GRID;
-/// So many pixels of a 300 x 300 frame in one place show a thing there: of 56.
-const FEWEST: u16 = 4;
 /// A thing of so many places weighs as much as the same number of places without it; smaller ones weigh more in each.
 const PLAIN: f32 = 36.0;
 
@@ -46,10 +44,7 @@ impl PlaceLabels {
                 continue;
             }
             let total: u32 = pixels.values().map(|&count| u32::from(count)).sum();
-            // What is seen at all shows at least in the place with the most of it.
-            let most = pixels.values().copied().max().unwrap_or(0);
-            let places: Vec<usize> =
-                pixels.iter().filter(|(_, count)| **count >= FEWEST.min(most)).map(|(&place, _)| place).collect();
+            let places = places_of(&pixels);
             if total < FEWEST_PIXELS {
                 continue;
             }

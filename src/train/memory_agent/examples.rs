@@ -21,7 +21,7 @@ use crate::nets::device::set_threads;
 use crate::train::frame_store::FrameStore;
 
 /// A remembered object within so many cells of the one that the demonstrator went for is taken for it.
-const MEANT: i16 = 4;
+const MEANT: u16 = 4;
 
 /// One state, with what is right in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -201,7 +201,7 @@ fn aim(
     };
     let away = |action: &MacroAction| {
         let at = action.at.unwrap_or(place);
-        (at.x - place.x).abs().max((at.z - place.z).abs())
+        at.apart(place)
     };
     let candidates = actions.iter().enumerate().filter(|(_, action)| meant(action).is_some());
     let nearest = candidates
