@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
@@ -10,10 +11,12 @@ use super::progress::Counter;
 use super::streams;
 use super::streams::say;
 use crate::data::Dataset;
-use crate::eval::replay::{ReplayOptions, ReplayReport, replay};
+use crate::eval::replay::{MissCount, ReplayOptions, ReplayReport, replay};
 
 /// How many failures of each kind are listed.
 const LISTED: usize = 500;
+/// How many kinds of interactions out of view or reach are listed.
+const MISSES: usize = 40;
 
 /// Re-runs recorded demonstrations.
 #[derive(Args)]
@@ -29,6 +32,9 @@ pub(crate) struct ReplayArgs {
     /// Ask whether an agent there would have seen and reached what was acted on
     #[arg(long)]
     sight: bool,
+    /// With --sight, a folder for a picture of each interaction whose target was out of view or reach
+    #[arg(long, value_name = "DIR", requires = "sight")]
+    pictures: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -48,7 +54,11 @@ impl ReplayArgs {
             dataset.check_split(split)?;
         }
         let counter = Counter::new("replaying", total);
-        let options = ReplayOptions { split: self.split, boxes: self.boxes, sight: self.sight };
+        let options =
+            ReplayOptions { split: self.split, boxes: self.boxes, sight: self.sight, pictures: self.pictures };
+        if let Some(folder) = &options.pictures {
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        }
         let report = replay(&dataset, &options, &|done| counter.add(done));
         counter.end();
         let report = report?;
@@ -86,6 +96,10 @@ fn print(report: &ReplayReport, out: &mut impl Write) -> std::io::Result<()> {
     }
     if let Some(seen) = report.seen {
         writeln!(out, "seen and reached    {:.2} %", seen * 100.0)?;
+        for MissCount { miss, count } in report.misses.iter().take(MISSES) {
+            let from = miss.receptacle.map_or_else(String::new, |class| format!(" from {class}"));
+            writeln!(out, "  {count:>4}  {} {}{from}: {}", miss.action, miss.object, miss.cause)?;
+        }
     }
     for (name, set) in &report.task_sets {
         writeln!(out, "{name:<20}{} tasks, {} by class, {} strict", set.tasks, set.class, set.strict)?;

@@ -34,9 +34,8 @@ fn overlap(a: &Rect, b: &Rect) -> bool {
 ///
 /// In a fixture: on its lowest surface with room, at the free raster point nearest to the agent. First a point where the whole
 /// outline is free and on the surface, then one where only the pivot is; where walls stand around, before both a free point
-/// away from them, and before all a point that no shelf and no rim hides from the agent; in a garbage can at last on top of the
-/// rest. In a movable receptacle: at its pivot, moved aside for each thing that already lies
-/// there.
+/// away from them, and before all a point in the agent's frame that no shelf and no rim hides; in a garbage can at last on
+/// top of the rest. In a movable receptacle: at its pivot, moved aside for each thing that already lies there.
 pub(crate) fn spot(scene: &Scene, world: &World, object: &Object, receptacle: Instance) -> Option<Point> {
     match receptacle {
         Instance::Object(holder) => {
@@ -107,7 +106,7 @@ pub(crate) fn spot(scene: &Scene, world: &World, object: &Object, receptacle: In
                 (Demand::Heap, false),
             ];
             let walled = has_walls(fixture);
-            // Without walls nothing hides a place, and no place is away from them.
+            // Without walls no place is away from them.
             let demands = demands.into_iter().filter(|&(demand, _)| walled || demand != Demand::Inside);
             let heaps = fixture.class.info().heaps;
             let demands = demands.filter(|&(demand, _)| heaps || demand != Demand::Heap);
@@ -190,6 +189,7 @@ mod tests {
     use crate::domain::place::Cuboid;
     use crate::domain::scene::Surface;
     use crate::domain::{Class, Heading, Pose, Room};
+    use crate::house::testing::{kitchen, named};
 
     /// How many soap bars go into a receptacle of 16 cm a side, of sixty.
     fn held_by(class: &str) -> usize {
@@ -217,5 +217,40 @@ mod tests {
     fn things_heap_up_in_a_garbage_can_but_not_in_a_sink() {
         assert_eq!(held_by("GarbageCan"), 60);
         assert!((1..60).contains(&held_by("Sink")));
+    }
+
+    #[test]
+    fn what_is_put_on_a_table_lies_in_the_frame_although_a_free_place_is_nearer() {
+        let (scene, mut world) = kitchen();
+        let table = named(&scene, &world, "CounterTop");
+        let mug = Object { class: Class::named("Mug").unwrap(), ..Object::default() };
+        let Instance::Fixture(index) = table else { panic!("{table:?} is no furniture") };
+        let body = scene.fixtures[usize::from(index)].body[0];
+        let cell = *scene
+            .cells
+            .iter()
+            .min_by_key(|cell| {
+                let away = cell.centre(0).floor_distance(body.centre());
+                (away.round() as i32, **cell)
+            })
+            .unwrap();
+        world.objects.clear();
+        let mut seen = 0;
+        for quarter in 0..4 {
+            world.agent = Pose { cell, heading: Heading::from_quarters(quarter), horizon: 30 };
+            let nearest = spot(&scene, &world, &mug, table).unwrap();
+            let camera = Camera::of(&scene, world.agent);
+            let anywhere = scene.fixtures[usize::from(index)].surfaces.iter().flat_map(|surface| {
+                surface
+                    .areas
+                    .iter()
+                    .flat_map(move |area| raster(area).map(move |(x, z)| Point::new(x, surface.height + 40, z)))
+            });
+            if anywhere.into_iter().any(|point| camera.frames(point.metres())) {
+                seen += 1;
+                assert!(camera.frames(nearest.metres()), "{nearest:?} from {:?}", world.agent);
+            }
+        }
+        assert!(seen > 0, "the table is seen in no heading");
     }
 }

@@ -217,3 +217,17 @@ pub(crate) fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candi
 pub(crate) fn nearest(candidates: &[Candidate], kind: ActionType, class: Class) -> Option<&Candidate> {
     candidates.iter().find(|candidate| candidate.kind == kind && candidate.class == class)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thing_shows_where_there_is_much_of_it_and_a_small_one_where_there_is_any() {
+        let large = BTreeMap::from([(1, 56), (2, 30), (3, 20), (4, 5)]);
+        assert_eq!(places_of(&large), [1, 2]);
+        let small = BTreeMap::from([(7, 5), (8, 4), (9, 2)]);
+        assert_eq!(places_of(&small), [7, 8]);
+        assert_eq!(places_of(&BTreeMap::from([(7, 1)])), [7]);
+    }
+}

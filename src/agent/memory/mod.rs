@@ -2,6 +2,7 @@
 //! moves, and nothing else of the simulator. Poses are in its own frame: where the episode began is cell (0, 0), faced north;
 //! heights are in metres above the floor.
 
+pub(crate) mod coverage;
 mod eye;
 pub(crate) mod navigator;
 pub(crate) mod occupancy;

@@ -60,6 +60,8 @@ struct Glimpses {
     core: u32,
     /// The highest point that was seen over the cell itself, in metres.
     top: f32,
+    /// From how near it was looked at: the reciprocal of the least distance in metres; 0 for never.
+    nearness: f32,
     /// The agent was there.
     visited: bool,
     /// A move there failed.
@@ -84,13 +86,17 @@ impl Occupancy {
                 let depth = frame.depth[row * frame.width + column];
                 let (x, y) = ((column as f32 + 0.5) * scale, (row as f32 + 0.5) * scale);
                 if depth < self.clearance.farthest && !eye::is_in_hand(x, y, depth) {
-                    self.vote(camera.unproject(x, y, depth), &mut seen);
+                    let point = camera.unproject(x, y, depth);
+                    let glimpses = seen.entry(eye::cell_under(point)).or_default();
+                    glimpses.nearness = glimpses.nearness.max(1.0 / depth);
+                    self.vote(point, &mut seen);
                 }
             }
         }
         for (cell, glimpse) in seen {
             let known = self.cells.entry(cell).or_default();
             known.floor += glimpse.floor;
+            known.nearness = known.nearness.max(glimpse.nearness);
             known.top = known.top.max(glimpse.top);
             if glimpse.body >= u32::from(self.clearance.points) {
                 known.body += glimpse.body;
@@ -158,6 +164,18 @@ impl Occupancy {
     /// The highest point that was seen over a cell, in metres; 0 where nothing was.
     pub(crate) fn top(&self, cell: Cell) -> f32 {
         self.cells.get(&cell).map_or(0.0, |glimpses| glimpses.top)
+    }
+
+    /// The least distance, in metres, from which a cell was looked at.
+    pub(crate) fn looked_from(&self, cell: Cell) -> Option<f32> {
+        let nearness = self.cells.get(&cell).map(|glimpses| glimpses.nearness);
+        nearness.filter(|nearness| *nearness > 0.0).map(|nearness| 1.0 / nearness)
+    }
+
+    /// A cell was looked at from so many metres.
+    #[cfg(test)]
+    pub(crate) fn look_at(&mut self, cell: Cell, away: f32) {
+        self.cells.entry(cell).or_default().nearness = 1.0 / away;
     }
 
     /// Every cell of which something is known, in order.

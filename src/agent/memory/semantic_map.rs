@@ -248,6 +248,17 @@ mod tests {
     const MIDDLE: u16 = (20 * GRID + 20) as u16;
 
     #[test]
+    fn the_middle_of_a_thing_is_a_cell_of_it() {
+        let cells = |cells: &[(i16, i16)]| {
+            let known = Evidence { score: 0.5, ..Evidence::default() };
+            let all = cells.iter().map(|&(x, z)| (Cell::new(x, z), known)).collect();
+            Thing::of(class("Fridge"), all).unwrap().middle()
+        };
+        assert_eq!(cells(&[(0, 0), (1, 0), (2, 0), (2, 1)]), Cell::new(1, 0));
+        assert_eq!(cells(&[(0, 0), (0, 4), (4, 0), (4, 4)]), Cell::new(0, 0));
+    }
+
+    #[test]
     fn what_is_seen_ahead_is_placed_ahead() {
         for heading in Heading::ALL {
             let mut map = SemanticMap::default();

@@ -10,7 +10,7 @@ use crate::domain::{ActionType, Cell, Class};
 /// Numbers of a situation.
 pub(crate) const SITUATION: usize = 56;
 /// Numbers of a macro action.
-pub(crate) const ACTION: usize = 44;
+pub(crate) const ACTION: usize = 48;
 /// Kinds of interaction.
 const INTERACTIONS: usize = ActionType::COUNT - 5;
 
@@ -200,6 +200,10 @@ fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &Macr
     numbers.flag(progress.active.iter().any(|(active, cell)| *active == class && near(cell)));
     // The one that it put there itself, not another of its kind.
     numbers.flag(progress.placed.iter().any(|(placed, cell)| *placed == class && near(cell)));
+    for novelty in action.novelty {
+        numbers.number(novelty.unseen);
+        numbers.number(novelty.nearer);
+    }
     numbers.exactly(ACTION)
 }
 

@@ -6,9 +6,10 @@ use std::collections::BTreeSet;
 use super::goal::Goal;
 use super::progress::Progress;
 use crate::agent::memory::Memory;
+use crate::agent::memory::coverage::Novelty;
 use crate::agent::memory::navigator::{Route, Routes};
 use crate::agent::memory::semantic_map::Thing;
-use crate::domain::{Action, ActionType, Cell, Class, Pose};
+use crate::domain::{Action, ActionType, Cell, Class, Heading, Pose};
 use crate::house::view::{Candidate, nearest};
 
 /// Evidence of at least this score makes a thing.
@@ -47,6 +48,8 @@ pub(crate) struct MacroAction {
     pub(crate) first: Action,
     /// Where it is acted, as far as is known.
     pub(crate) at: Option<Cell>,
+    /// What the glance at its end would show; of a turn, and of another one in the same direction.
+    pub(crate) novelty: [Novelty; 2],
 }
 
 impl MacroAction {
@@ -57,7 +60,8 @@ impl MacroAction {
 
     fn along(purpose: Purpose, thing: Option<usize>, at: Cell, route: Route) -> Option<MacroAction> {
         let first = Action::navigate(route.first?);
-        Some(MacroAction { purpose, thing, steps: route.steps, cost: route.cost, first, at: Some(at) })
+        let novelty = Default::default();
+        Some(MacroAction { purpose, thing, steps: route.steps, cost: route.cost, first, at: Some(at), novelty })
     }
 }
 
@@ -90,7 +94,8 @@ pub(crate) fn available(
             _ => things[index].best,
         });
         let purpose = Purpose::Interact(kind, class);
-        found.push(MacroAction { purpose, thing, steps: 0, cost: 0.0, first: candidate.action(), at: Some(at) });
+        let (first, novelty) = (candidate.action(), Default::default());
+        found.push(MacroAction { purpose, thing, steps: 0, cost: 0.0, first, at: Some(at), novelty });
     }
     for (index, thing) in things.iter().enumerate() {
         let Some(goal) = progress.goal() else { break };
@@ -117,23 +122,8 @@ pub(crate) fn available(
         }
     }
     found.extend(explorations(memory, &routes));
-    for kind in [ActionType::RotateLeft, ActionType::RotateRight, ActionType::LookUp, ActionType::LookDown] {
-        let possible = match kind {
-            ActionType::LookUp => pose.horizon > Pose::UP,
-            ActionType::LookDown => pose.horizon < Pose::DOWN,
-            // With what was in view at first, three turns show everything around.
-            _ => progress.turns < AROUND,
-        };
-        let look = MacroAction {
-            purpose: Purpose::Look(kind),
-            thing: None,
-            steps: 1,
-            cost: 1.0,
-            first: Action::navigate(kind),
-            at: None,
-        };
-        found.extend(possible.then_some(look));
-    }
+    let all_known = found.is_empty();
+    found.extend(looks(memory, progress, all_known));
     (things, found)
 }
 
@@ -198,6 +188,30 @@ fn matters(goal: &Goal, progress: &Progress, kind: ActionType, class: Class) -> 
     }
 }
 
+/// Turns to what was not looked at yet, or to anything when `all_known` leaves nothing else; looks up and down.
+fn looks(memory: &Memory, progress: &Progress, all_known: bool) -> impl Iterator<Item = MacroAction> {
+    use ActionType::{LookDown, LookUp, RotateLeft, RotateRight};
+    let pose = memory.odometry.pose();
+    let novelty = move |heading: Heading| Novelty::of(&memory.occupancy, Pose { heading, ..pose });
+    let [left, behind, right] = [pose.heading.left(), pose.heading.left().left(), pose.heading.right()].map(novelty);
+    // With what was in view at first, three turns show everything around.
+    let turns = |novelty: [Novelty; 2]| {
+        all_known || progress.turns < AROUND && novelty.into_iter().any(Novelty::is_worth_a_glance)
+    };
+    [
+        (RotateLeft, turns([left, behind]), [left, behind]),
+        (RotateRight, turns([right, behind]), [right, behind]),
+        (LookUp, pose.horizon > Pose::UP, Default::default()),
+        (LookDown, pose.horizon < Pose::DOWN, Default::default()),
+    ]
+    .into_iter()
+    .filter(|(_, possible, _)| *possible)
+    .map(|(kind, _, novelty)| {
+        let (purpose, first) = (Purpose::Look(kind), Action::navigate(kind));
+        MacroAction { purpose, thing: None, steps: 1, cost: 1.0, first, at: None, novelty }
+    })
+}
+
 /// Ways to free cells next to what is not known, the nearest first.
 fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
     let mut ways: Vec<(Cell, Route)> =
@@ -211,8 +225,11 @@ fn explorations(memory: &Memory, routes: &Routes) -> Vec<MacroAction> {
             && chosen.iter().all(apart)
             && let Some(way) = MacroAction::along(Purpose::Explore, None, cell, route)
         {
+            let glances =
+                Heading::ALL.map(|heading| Novelty::of(&memory.occupancy, Pose { cell, heading, ..route.end }));
+            let best = glances.into_iter().max_by(|a, b| a.unseen.total_cmp(&b.unseen)).unwrap_or_default();
             chosen.push(cell);
-            found.push(way);
+            found.push(MacroAction { novelty: [best, Novelty::default()], ..way });
         }
     }
     found

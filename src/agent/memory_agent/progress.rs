@@ -148,4 +148,18 @@ mod tests {
         progress.record(Attempt { kind: ActionType::Close, target: Some((fridge, at)) }, true);
         assert!(progress.active.is_empty());
     }
+
+    #[test]
+    fn what_it_put_down_is_known_until_it_takes_that_one_again() {
+        let [mug, sink] = ["Mug", "Sink"].map(|name| Class::named(name).unwrap());
+        let (there, elsewhere) = (Cell::new(4, 0), Cell::new(8, 0));
+        let mut progress = Progress { held: Some(mug), ..Progress::default() };
+        progress.record(Attempt { kind: ActionType::Put, target: Some((sink, there)) }, true);
+        assert_eq!((progress.held, progress.placed.as_slice()), (None, [(mug, there)].as_slice()));
+        progress.record(Attempt { kind: ActionType::Pickup, target: Some((mug, elsewhere)) }, true);
+        assert_eq!(progress.placed, [(mug, there)], "another mug was taken");
+        progress.record(Attempt { kind: ActionType::Put, target: Some((sink, elsewhere)) }, true);
+        progress.record(Attempt { kind: ActionType::Pickup, target: Some((mug, Cell::new(4, 1))) }, true);
+        assert_eq!(progress.placed, [(mug, elsewhere)]);
+    }
 }

@@ -214,7 +214,15 @@ fn beginning(action: &MacroAction) -> (ActionType, Option<Class>) {
 
 fn turn_right() -> MacroAction {
     let first = Action::navigate(ActionType::RotateRight);
-    MacroAction { purpose: Purpose::Look(first.kind), thing: None, steps: 1, cost: 1.0, first, at: None }
+    MacroAction {
+        purpose: Purpose::Look(first.kind),
+        thing: None,
+        steps: 1,
+        cost: 1.0,
+        first,
+        at: None,
+        novelty: Default::default(),
+    }
 }
 
 /// A batch of one choice.

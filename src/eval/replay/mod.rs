@@ -7,6 +7,7 @@ mod sight;
 mod task_sets;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use anyhow::Context;
 use rayon::prelude::*;
@@ -15,7 +16,8 @@ use serde::Serialize;
 pub(crate) use self::boxes::BoxReport;
 use self::boxes::{Overlap, box_report, compare, note_moved};
 pub(crate) use self::failure::ReplayFailure;
-use self::sight::unseen;
+pub(crate) use self::sight::MissCount;
+use self::sight::{Miss, misses, ranked};
 pub(crate) use self::task_sets::SetReport;
 use self::task_sets::{recorded, replay_set, scene_of};
 use crate::data::Dataset;
@@ -34,6 +36,8 @@ pub(crate) struct ReplayOptions {
     pub(crate) boxes: bool,
     /// Ask whether an agent there would have seen and reached what was acted on.
     pub(crate) sight: bool,
+    /// With `sight`, a folder that takes a picture of each interaction whose target was out of view or reach.
+    pub(crate) pictures: Option<PathBuf>,
 }
 
 /// What a replay came to. Shares are of trajectories, from 0 to 1.
@@ -57,6 +61,9 @@ pub(crate) struct ReplayReport {
     /// The official task sets that the dataset holds, with the expert's recorded actions as the policy.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) task_sets: BTreeMap<String, SetReport>,
+    /// What was acted on out of view or reach, by action, class, receptacle and cause, the most frequent first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) misses: Vec<MissCount>,
     /// How well projected boxes fit the recorded ones, where that was asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) boxes: Option<BoxReport>,
@@ -70,6 +77,7 @@ pub(crate) struct ReplayReport {
 struct Replayed {
     failures: Vec<(&'static str, String)>,
     overlaps: Vec<Overlap>,
+    misses: Vec<Miss>,
 }
 
 /// Replays a dataset's demonstrations on all cores; `progress` is called as they are done.
@@ -94,7 +102,12 @@ pub(crate) fn replay(
             let scene = scene_of(&scenes, &trajectory.scene).with_context(|| trajectory.id.clone())?;
             let mut done = replay_one(scene, &trajectory, options.boxes);
             if options.sight {
-                done.failures.extend(unseen(scene, &trajectory).map(|reason| ("seen", reason)));
+                let misses = misses(scene, &trajectory, options.pictures.as_deref())?;
+                let first = misses.first().map(|(number, Miss { action, object, cause, .. })| {
+                    ("seen", format!("action {number}, {action} {object}: {cause}"))
+                });
+                done.failures.extend(first);
+                done.misses = misses.into_iter().map(|(_, miss)| miss).collect();
             }
             progress(1);
             Ok(Some((trajectory.id, done)))
@@ -189,6 +202,7 @@ fn summarise(replayed: &[(String, Replayed)], options: &ReplayOptions) -> Replay
             box_report(&all)
         }),
         task_sets: BTreeMap::new(),
+        misses: ranked(replayed.iter().flat_map(|(_, one)| one.misses.iter().copied())),
         failures,
         failed,
     }
