@@ -94,6 +94,11 @@ impl Routes {
         routes
     }
 
+    /// Where the ways begin.
+    pub(crate) fn start(&self) -> Pose {
+        self.start
+    }
+
     /// The number of a cell of the rectangle.
     fn index(&self, cell: Cell) -> Option<usize> {
         let (x, z) = (cell.x - self.corner.x, cell.z - self.corner.z);

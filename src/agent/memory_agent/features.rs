@@ -64,7 +64,7 @@ impl Choice {
         let goal = progress.goal();
         let class = |class: Option<Class>| class.map_or(0, |class| class.index() as u8);
         let about = |action: &MacroAction| match action.purpose {
-            Purpose::Interact(_, class) => class.index() as u8,
+            Purpose::Interact(_, class) | Purpose::Search(class) => class.index() as u8,
             _ => 0,
         };
         Choice {
@@ -151,10 +151,12 @@ fn numbers(memory: &Memory, progress: &Progress, things: &[Thing], action: &Macr
     let goal = progress.goal();
     let (kind, class) = match action.purpose {
         Purpose::Interact(kind, class) => (Some(kind), class),
+        Purpose::Search(class) => (None, class),
         _ => (None, Class::NONE),
     };
     numbers.one_of(INTERACTIONS, kind.map(interaction));
     numbers.flag(action.purpose == Purpose::Explore);
+    numbers.flag(matches!(action.purpose, Purpose::Search(_)));
     for look in [ActionType::RotateLeft, ActionType::RotateRight, ActionType::LookUp, ActionType::LookDown] {
         numbers.flag(action.purpose == Purpose::Look(look));
     }

@@ -21,6 +21,11 @@ const ENDS: usize = 8;
 /// Ways to the edge of what was seen, and how far their ends lie apart at least, in cells.
 const EXPLORATIONS: usize = 2;
 const APART: u16 = 4;
+/// So many things are searched for the object at most, and each from so many poses.
+const SEARCHED: usize = 6;
+const GLANCES: usize = 3;
+/// How far the camera is tilted down, in degrees, by who walks.
+const LEVEL: i16 = 30;
 /// Turns after which one has looked all around.
 const AROUND: u32 = 3;
 
@@ -29,6 +34,8 @@ const AROUND: u32 = 3;
 pub(crate) enum Purpose {
     /// To act on a thing of this class.
     Interact(ActionType, Class),
+    /// To look from near at a thing of this class, in or on which the goal's object may be.
+    Search(Class),
     /// To see more of the house.
     Explore,
     /// To turn or look on the spot.
@@ -65,14 +72,15 @@ impl MacroAction {
     }
 }
 
-/// What was tried from where in vain.
+/// Things of what class were dealt with from where, in vain.
 pub(crate) type Failed = BTreeSet<(Class, Pose)>;
 
 /// Everything that could be set out to now. `legal` are the interactions that are possible at this moment. Poses from which a
 /// remembered thing cannot be acted on are added to `failed`, and what cannot be acted on from anywhere loses its evidence.
+/// Poses from which things have been searched are added to the progress.
 pub(crate) fn available(
     memory: &mut Memory,
-    progress: &Progress,
+    progress: &mut Progress,
     legal: &[Candidate],
     failed: &mut Failed,
 ) -> (Vec<Thing>, Vec<MacroAction>) {
@@ -103,9 +111,11 @@ pub(crate) fn available(
         let wanted: Vec<ActionType> = kinds(thing, progress)
             .filter(|&kind| matters(goal, progress, kind, class))
             .filter(|&kind| {
+                let now = found.iter().find(|now| now.purpose == Purpose::Interact(kind, class));
                 // What opens may better be faced first: from its side one does not see what lies in it.
-                let now = |now: &MacroAction| now.purpose == Purpose::Interact(kind, class) && now.thing == Some(index);
-                class.info().openable || !found.iter().any(now)
+                now.is_none_or(|now| {
+                    class.info().openable || now.thing != Some(index) && tells_apart(goal, progress, class)
+                })
             })
             .collect();
         // The way does not depend on what is done at its end.
@@ -121,10 +131,17 @@ pub(crate) fn available(
             None => {}
         }
     }
+    found.extend(searches(&things, progress, &routes));
     found.extend(explorations(memory, &routes));
     let all_known = found.is_empty();
     found.extend(looks(memory, progress, all_known));
     (things, found)
+}
+
+/// Whether it matters which thing of a class is taken: one in a named place, or the one that it put down itself. Any will do
+/// otherwise, the nearest first.
+fn tells_apart(goal: &Goal, progress: &Progress, class: Class) -> bool {
+    goal.place.is_some() || progress.placed.iter().any(|(placed, _)| *placed == class)
 }
 
 /// A way that does not end here: what could be done here would be possible already. `can_act`: something else can be done here
@@ -188,21 +205,47 @@ fn matters(goal: &Goal, progress: &Progress, kind: ActionType, class: Class) -> 
     }
 }
 
-/// Turns to what was not looked at yet, or to anything when `all_known` leaves nothing else; looks up and down.
-fn looks(memory: &Memory, progress: &Progress, all_known: bool) -> impl Iterator<Item = MacroAction> {
+/// Ways to look from near at what may hold the goal's object, the nearest things first.
+fn searches(things: &[Thing], progress: &mut Progress, routes: &Routes) -> Vec<MacroAction> {
+    let Some(goal) = progress.goal().filter(|goal| progress.held != Some(goal.object)) else { return Vec::new() };
+    let (object, place) = (goal.object, goal.place);
+    let may_hold = |thing: &&(usize, &Thing)| {
+        let class = thing.1.class;
+        let looked = progress.searched.iter().filter(|(of, _)| *of == class).count();
+        let shows = class.info().receptacle && !class.info().openable && !class.info().pickupable;
+        shows && looked < GLANCES && (place == Some(class) || class.holds(object))
+    };
+    let mut candidates: Vec<(usize, &Thing)> = things.iter().enumerate().filter(|thing| may_hold(&thing)).collect();
+    candidates
+        .sort_by_key(|(index, thing)| (place != Some(thing.class), thing.best.apart(routes.start().cell), *index));
+    let ways = candidates.into_iter().take(SEARCHED).filter_map(|(index, thing)| {
+        let route = way_to(routes, thing, &mut progress.searched, false)?;
+        MacroAction::along(Purpose::Search(thing.class), Some(index), thing.best, route)
+    });
+    ways.collect()
+}
+
+/// Turns to what was not looked at yet, or to anything when `all_known` leaves nothing else; looks up, and down to what is near
+/// and was not looked at.
+fn looks(memory: &Memory, progress: &Progress, all_known: bool) -> Vec<MacroAction> {
     use ActionType::{LookDown, LookUp, RotateLeft, RotateRight};
     let pose = memory.odometry.pose();
-    let novelty = move |heading: Heading| Novelty::of(&memory.occupancy, Pose { heading, ..pose });
-    let [left, behind, right] = [pose.heading.left(), pose.heading.left().left(), pose.heading.right()].map(novelty);
+    let novelty = |pose: Pose| Novelty::of(&memory.occupancy, pose);
+    let turned = [pose.heading.left(), pose.heading.left().left(), pose.heading.right()];
+    let [left, behind, right] = turned.map(|heading| novelty(Pose { heading, ..pose }));
+    let tilted = |by: i16| novelty(Pose { horizon: (pose.horizon + by).clamp(Pose::UP, Pose::DOWN), ..pose });
     // With what was in view at first, three turns show everything around.
     let turns = |novelty: [Novelty; 2]| {
         all_known || progress.turns < AROUND && novelty.into_iter().any(Novelty::is_worth_a_glance)
     };
+    let below = [1, 2].map(|times| tilted(times * Pose::LOOK));
+    let down = pose.horizon < LEVEL || pose.horizon < Pose::DOWN && below.into_iter().any(Novelty::is_worth_a_glance);
+    let up = pose.horizon >= LEVEL || all_known && pose.horizon > Pose::UP;
     [
         (RotateLeft, turns([left, behind]), [left, behind]),
         (RotateRight, turns([right, behind]), [right, behind]),
-        (LookUp, pose.horizon > Pose::UP, Default::default()),
-        (LookDown, pose.horizon < Pose::DOWN, Default::default()),
+        (LookUp, up, Default::default()),
+        (LookDown, down, below),
     ]
     .into_iter()
     .filter(|(_, possible, _)| *possible)
@@ -210,6 +253,7 @@ fn looks(memory: &Memory, progress: &Progress, all_known: bool) -> impl Iterator
         let (purpose, first) = (Purpose::Look(kind), Action::navigate(kind));
         MacroAction { purpose, thing: None, steps: 1, cost: 1.0, first, at: None, novelty }
     })
+    .collect()
 }
 
 /// Ways to free cells next to what is not known, the nearest first.
@@ -293,6 +337,63 @@ mod tests {
         assert!(!matters(&heat, &empty, ActionType::ToggleOn, class("FloorLamp")));
         assert!(matters(&heat, &empty, ActionType::Open, class("Drawer")), "the potato may be in it");
         assert!(matters(&heat, &full, ActionType::Put, class("CounterTop")), "the hand must be freed");
+    }
+
+    /// A mind in the kitchen that has looked around once, and the house.
+    fn looked_around(goal: Goal) -> (Mind, House) {
+        let (scene, world) = kitchen();
+        let mut house = House::new(scene, world);
+        let mut mind = Mind::default();
+        mind.set_goals(vec![goal]);
+        for _ in 0..4 {
+            observe(&mut mind, &mut house);
+            house.step(Action::navigate(ActionType::RotateRight));
+        }
+        (mind, house)
+    }
+
+    fn observe(mind: &mut Mind, house: &mut House) {
+        let (scene, world) = (house.scene().clone(), house.world().clone());
+        let frame = house.frame().clone();
+        let seen = Eyes::Simulator.look_at(&scene, &world, &frame).unwrap();
+        let legal = house.candidates();
+        mind.observe(&Moment { pose: world.agent, frame: &frame, seen: &seen, legal: &legal });
+    }
+
+    #[test]
+    fn what_is_not_seen_is_searched_where_it_may_lie_from_a_few_poses_and_then_no_more() {
+        let (mut mind, mut house) = looked_around(goal(SkillKind::Pickup, "Vase", None));
+        let searches = |mind: &mut Mind, house: &mut House| {
+            let (actions, _) = mind.choice(&house.candidates());
+            actions.into_iter().filter(|it| matches!(it.purpose, Purpose::Search(_))).collect::<Vec<_>>()
+        };
+        let first = searches(&mut mind, &mut house);
+        assert!(!first.is_empty() && first.len() <= SEARCHED, "{first:?}");
+        for search in &first {
+            let Purpose::Search(class) = search.purpose else { panic!("{search:?}") };
+            assert!(class.info().receptacle && !class.info().openable && !search.first.kind.is_interaction());
+        }
+        for step in 0..60 {
+            let Some(next) = searches(&mut mind, &mut house).into_iter().next() else { return };
+            house.step(next.first);
+            observe(&mut mind, &mut house);
+            assert!(step < 59, "it searches for ever: {next:?}");
+        }
+    }
+
+    #[test]
+    fn one_turns_to_what_was_not_looked_at_and_tilts_down_to_what_lies_below_the_frame() {
+        let (mind, _) = looked_around(goal(SkillKind::Pickup, "Vase", None));
+        let kinds = |mind: &Mind, known: bool| -> Vec<ActionType> {
+            looks(&mind.memory, &mind.progress, known).iter().map(|it| it.first.kind).collect()
+        };
+        let fresh = Mind::default();
+        assert!(kinds(&fresh, false).contains(&ActionType::RotateLeft), "nothing is known yet");
+        assert!(!kinds(&mind, false).contains(&ActionType::RotateRight), "it has looked everywhere");
+        assert!(kinds(&mind, false).contains(&ActionType::LookDown));
+        let down =
+            looks(&mind.memory, &mind.progress, false).into_iter().find(|it| it.first.kind == ActionType::LookDown);
+        assert!(down.is_some_and(|it| it.novelty[0].unseen > 0.0), "what is near and low has not been seen");
     }
 
     #[test]

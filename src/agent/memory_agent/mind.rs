@@ -89,7 +89,7 @@ impl Mind {
 
     /// What there is to choose from.
     pub(crate) fn choice(&mut self, legal: &[Candidate]) -> (Vec<MacroAction>, Choice) {
-        let (things, actions) = available(&mut self.memory, &self.progress, legal, &mut self.failed);
+        let (things, actions) = available(&mut self.memory, &mut self.progress, legal, &mut self.failed);
         let choice = Choice::of(&self.memory, &self.progress, &things, &actions);
         (actions, choice)
     }

@@ -1,6 +1,7 @@
 //! How far the agent believes to be: the subtask it is at, what it holds, and what it has done for it.
 
 use super::goal::Goal;
+use super::macro_action::Failed;
 use crate::domain::{ActionType, Cell, Class, SkillKind};
 
 /// An interaction that changed what is seen.
@@ -37,6 +38,8 @@ pub(crate) struct Progress {
     pub(crate) active: Vec<(Class, Cell)>,
     /// What it put where and has not taken again, in the whole episode.
     pub(crate) placed: Vec<(Class, Cell)>,
+    /// From where it has looked at what might hold what it is after.
+    pub(crate) searched: Failed,
     /// Steps since the present goal began.
     pub(crate) steps: u32,
     /// Turns on the spot since it last moved, looked up or down, or acted.
@@ -48,6 +51,7 @@ impl Progress {
     pub(crate) fn set_goals(&mut self, goals: Vec<Goal>) {
         (self.goals, self.at, self.steps, self.turns) = (goals, 0, 0, 0);
         self.done.clear();
+        self.searched.clear();
     }
 
     /// What was in the hand from the start is what somebody means who says to put or to wash something next.
@@ -73,6 +77,7 @@ impl Progress {
     pub(crate) fn advance(&mut self) {
         (self.at, self.steps, self.turns) = (self.at + 1, 0, 0);
         self.done.clear();
+        self.searched.clear();
     }
 
     /// Takes in what came of an action.

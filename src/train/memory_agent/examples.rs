@@ -208,8 +208,16 @@ fn aim(
         .min_by_key(|(_, action)| away(action))
         .filter(|(_, action)| matches!(target, Instance::Fixture(_)) || away(action) <= MEANT);
     let look = || actions.iter().position(|action| action.purpose == Purpose::Look(label.kind));
-    match nearest {
-        Some((at, _)) => Some(at),
+    // What is not seen yet is looked for where it lies.
+    let search = || {
+        let searches = actions.iter().enumerate().filter(|(_, action)| matches!(action.purpose, Purpose::Search(_)));
+        searches
+            .filter(|(_, action)| away(action) <= 2 * MEANT)
+            .min_by_key(|(_, action)| away(action))
+            .map(|(at, _)| at)
+    };
+    match nearest.map(|(at, _)| at).or_else(search) {
+        Some(at) => Some(at),
         None if matches!(label.kind, ActionType::RotateLeft | ActionType::RotateRight) => look(),
         None => None,
     }
