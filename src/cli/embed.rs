@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
+use crate::data::text_file;
 use crate::nets::device::best_device;
 use crate::nets::sentence::{SentenceEncoder, default_folder};
 
@@ -56,5 +57,5 @@ fn next_line(input: &mut impl BufRead, number: &mut usize) -> anyhow::Result<Opt
     }
     *number += 1;
     let line = String::from_utf8(bytes).with_context(|| format!("line {number} is not UTF-8 text"))?;
-    Ok(Some(line.trim_end_matches(['\n', '\r']).to_string()))
+    Ok(Some(text_file::line(&line).trim_end_matches(['\n', '\r']).to_string()))
 }

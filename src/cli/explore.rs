@@ -12,7 +12,7 @@ use super::logging;
 use super::value_names;
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
-use crate::data::{dataset::Dataset, taskset};
+use crate::data::{dataset::Dataset, taskset, text_file};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
 use crate::episode::wish::Expect;
@@ -132,7 +132,7 @@ impl Display {
 fn settings() -> anyhow::Result<ExplorerConfig> {
     let Ok(base) = etcetera::choose_base_strategy() else { return Ok(ExplorerConfig::default()) };
     let path = base.config_dir().join("sprint").join("explorer.toml");
-    match std::fs::read_to_string(&path) {
+    match text_file::read(&path) {
         Ok(text) => ExplorerConfig::parse(&text).with_context(|| path.display().to_string()),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(ExplorerConfig::default()),
         Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),

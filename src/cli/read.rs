@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit_status::ExitStatus;
-use crate::data::dataset;
+use crate::data::{dataset, text_file};
 use crate::domain::{Class, Room};
 use crate::house::generate;
 use crate::language::instruction::{self, InstructionError};
@@ -75,13 +75,14 @@ impl ReadArgs {
         let mut out = std::io::stdout().lock();
         for (number, text) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
             let text = text.with_context(|| format!("line {number} is not UTF-8 text"))?;
-            match instruction::parse(&text) {
+            let text = text_file::line(&text);
+            match instruction::parse(text) {
                 // An empty line asks for nothing.
                 Ok(_) | Err(InstructionError::Empty) => {}
                 Err(error) => bail!("line {number}: {error}"),
             }
-            let reading = reader.read(&text, &context);
-            serde_json::to_writer(&mut out, &Line { text: &text, words: reading.words(), reading: &reading })?;
+            let reading = reader.read(text, &context);
+            serde_json::to_writer(&mut out, &Line { text, words: reading.words(), reading: &reading })?;
             out.write_all(b"\n")?;
             out.flush()?;
         }
@@ -114,12 +115,13 @@ fn house(name: &str) -> anyhow::Result<House> {
 }
 
 fn print_features(words: &Path) -> anyhow::Result<ExitStatus> {
-    let known = std::fs::read_to_string(words).with_context(|| words.display().to_string())?;
+    let known = text_file::read(words).with_context(|| words.display().to_string())?;
     let spelling = Spelling::of(known.lines().map(str::to_string));
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     for (number, line) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
         let line = line.with_context(|| format!("line {number} is not UTF-8 text"))?;
-        let Example { text, object, place } = serde_json::from_str(&line).with_context(|| format!("line {number}"))?;
+        let Example { text, object, place } =
+            serde_json::from_str(text_file::line(&line)).with_context(|| format!("line {number}"))?;
         let all: Vec<String> =
             features_of(&text, Before { object, place }, &spelling).iter().map(u32::to_string).collect();
         writeln!(out, "{}", all.join(" "))?;

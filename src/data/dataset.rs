@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{atomic_file, json, taskset};
+use super::{atomic_file, json, taskset, text_file};
 use crate::domain::{Scene, TaskSet, Trajectory};
 use crate::house::validate;
 
@@ -154,7 +154,8 @@ impl Dataset {
         let reader = BufReader::new(zstd::Decoder::new(file)?);
         Ok(reader.lines().enumerate().map(move |(number, line)| {
             let place = || format!("{}, line {}", path.display(), number + 1);
-            let trajectory: Trajectory = serde_json::from_str(&line.with_context(place)?).with_context(place)?;
+            let line = line.with_context(place)?;
+            let trajectory: Trajectory = serde_json::from_str(text_file::line(&line)).with_context(place)?;
             trajectory.check().map_err(anyhow::Error::msg).with_context(place)?;
             Ok(trajectory)
         }))

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
-use super::atomic_file;
+use super::{atomic_file, text_file};
 
 /// No file of ours comes near this many bytes; a larger one (or an endless device) is refused before it fills the memory.
 const LARGEST: u64 = 1 << 30;
@@ -57,6 +57,7 @@ pub(crate) fn parse<T: DeserializeOwned>(bytes: &[u8], version: u32) -> anyhow::
     struct Versioned {
         format_version: Option<serde_json::Value>,
     }
+    let bytes = text_file::content(bytes)?;
     // Serde would take a list for a struct.
     if bytes.trim_ascii_start().first() == Some(&b'[') {
         bail!("not such a file: its outermost value is a list");
@@ -152,6 +153,14 @@ mod tests {
         assert!(complaint(r#"{"format_version":2,"pages":[]}"#).starts_with("format_version: 2, but"));
         assert!(complaint(r#"{"format_version":"1","rows":[]}"#).starts_with("format_version: \"1\", but"));
         assert!(complaint(r#"{"rows":[]}"#).starts_with("format_version: missing"));
+    }
+
+    #[test]
+    fn a_file_saved_with_a_byte_order_mark_is_read_and_one_saved_as_utf_16_is_named() {
+        let text = "\u{feff}{\"format_version\":1,\"rows\":[{\"at\":7}]}";
+        assert_eq!(parse::<MeasuredTable>(text.as_bytes(), 1).unwrap().rows, [TableRow { at: 7 }]);
+        let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert!(parse::<MeasuredTable>(&wide, 1).unwrap_err().to_string().contains("UTF-16"));
     }
 
     #[test]

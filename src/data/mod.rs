@@ -12,5 +12,6 @@ pub mod schema;
 pub mod selection;
 pub mod summaries;
 pub mod taskset;
+pub(crate) mod text_file;
 
 pub use dataset::Dataset;

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::text_file;
 use crate::language::passage::Passage;
 
 /// A line: the label of one span of one annotator.
@@ -54,8 +55,8 @@ fn read(folder: &Path) -> anyhow::Result<(Vec<SpanSummary>, usize)> {
     let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
     let mut lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
     if let Some(first) = lines.next() {
-        let header: SummariesHeader =
-            serde_json::from_slice(first).with_context(|| format!("{}, line 1", path.display()))?;
+        let header: SummariesHeader = serde_json::from_slice(text_file::content(first)?)
+            .with_context(|| format!("{}, line 1", path.display()))?;
         ensure!(
             header.format_version == FORMAT,
             "{}: format_version: {}, but this program reads {FORMAT}",

@@ -6,6 +6,8 @@ use anyhow::{Context, bail};
 use serde::Deserialize;
 use tch::{Kind, Tensor};
 
+use crate::data::text_file;
+
 /// A way to pool; several are concatenated in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pooling {
@@ -41,7 +43,7 @@ struct PoolingFile {
 impl Pooling {
     /// The ways to pool that a module's `config.json` asks for.
     pub(super) fn read(path: &Path) -> anyhow::Result<Vec<Pooling>> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let text = text_file::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
         let file: PoolingFile = serde_json::from_str(&text).with_context(|| format!("{}", path.display()))?;
         if let Some(mode) = &file.pooling_mode {
             return Ok(vec![match mode.as_str() {

@@ -13,6 +13,7 @@ use super::home;
 use super::pooling::Pooling;
 use super::transformer::Transformer;
 use super::transformer_config::TransformerConfig;
+use crate::data::text_file;
 
 /// The files of the default encoder whose contents set-up vouches for, with their sha256.
 const DEFAULT_FILES: [(&str, &str); 2] = [
@@ -100,7 +101,7 @@ impl SentenceEncoder {
             Ok((path, bytes))
         };
         let (path, bytes) = take(folder.join("modules.json"))?;
-        let modules: Vec<Module> = serde_json::from_slice(&bytes).with_context(|| path.display().to_string())?;
+        let modules: Vec<Module> = parse(&path, &bytes)?;
         let (mut transformer_at, mut pooling_at, mut normalize) = (None, None, false);
         for module in modules {
             match module.kind.rsplit('.').next().unwrap_or_default() {
@@ -117,7 +118,7 @@ impl SentenceEncoder {
         let limits = match root.join("sentence_bert_config.json") {
             path if path.exists() => {
                 let (path, bytes) = take(path)?;
-                serde_json::from_slice(&bytes).with_context(|| path.display().to_string())?
+                parse(&path, &bytes)?
             }
             _ => Limits::default(),
         };
@@ -241,7 +242,8 @@ impl SentenceEncoder {
 
 /// The tokenizer, without the truncation and padding that its file may ask for: both depend on the batch.
 fn tokenizer(bytes: &[u8], config: &TransformerConfig) -> anyhow::Result<Tokenizer> {
-    let mut tokenizer = Tokenizer::from_bytes(bytes).map_err(|error| anyhow!("not a tokenizer: {error}"))?;
+    let mut tokenizer =
+        Tokenizer::from_bytes(text_file::content(bytes)?).map_err(|error| anyhow!("not a tokenizer: {error}"))?;
     tokenizer.with_truncation(None).map_err(|error| anyhow!("{error}"))?;
     tokenizer.with_padding(None);
     let largest = tokenizer.get_vocab(true).into_values().max().unwrap_or(0);
@@ -251,6 +253,11 @@ fn tokenizer(bytes: &[u8], config: &TransformerConfig) -> anyhow::Result<Tokeniz
         config.vocab_size
     );
     Ok(tokenizer)
+}
+
+fn parse<T: serde::de::DeserializeOwned>(path: &Path, bytes: &[u8]) -> anyhow::Result<T> {
+    let text = text_file::content(bytes).with_context(|| path.display().to_string())?;
+    serde_json::from_slice(text).with_context(|| path.display().to_string())
 }
 
 fn read(path: &Path) -> anyhow::Result<Vec<u8>> {

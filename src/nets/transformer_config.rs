@@ -5,6 +5,8 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use serde::Deserialize;
 
+use crate::data::text_file;
+
 /// The architecture's sizes, as `config.json` publishes them.
 #[derive(Clone, Debug, Deserialize)]
 pub(super) struct TransformerConfig {
@@ -38,7 +40,7 @@ fn thirty_two() -> i64 {
 
 impl TransformerConfig {
     pub(super) fn read(path: &Path) -> anyhow::Result<TransformerConfig> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let text = text_file::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
         let config: TransformerConfig = serde_json::from_str(&text).with_context(|| format!("{}", path.display()))?;
         config.check().with_context(|| format!("{}", path.display()))?;
         Ok(config)

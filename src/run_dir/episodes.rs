@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
+use crate::data::text_file;
 use crate::episode::record::{Episode, EpisodeKey};
 
 /// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out; where an episode was
@@ -27,8 +28,9 @@ pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> 
             break;
         }
         whole += line.len() as u64;
-        let episode: Episode =
-            serde_json::from_slice(&line).with_context(|| format!("{name}: line {number} is not an episode"))?;
+        let context = || format!("{name}: line {number} is not an episode");
+        let text = text_file::content(&line).with_context(context)?;
+        let episode: Episode = serde_json::from_slice(text).with_context(context)?;
         let key = episode.key();
         match places.get(&key) {
             Some(&(place, _)) if episodes[place].error.is_some() && episodes[place].attempts < episode.attempts => {
@@ -75,6 +77,15 @@ pub(crate) mod tests {
         assert!(read_episodes(&path).unwrap_err().to_string().contains("line 2"));
         std::fs::write(&path, format!("{line}\n{line}\n")).unwrap();
         assert!(read_episodes(&path).unwrap_err().to_string().contains("lines 1 and 2"));
+    }
+
+    #[test]
+    fn a_file_saved_with_a_byte_order_mark_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("episodes.jsonl");
+        std::fs::write(&path, format!("\u{feff}{}\n", serde_json::to_string(&episode("a")).unwrap())).unwrap();
+        let (episodes, whole) = read_episodes(&path).unwrap();
+        assert_eq!((episodes, whole), (vec![episode("a")], std::fs::metadata(&path).unwrap().len()));
     }
 
     proptest::proptest! {

@@ -10,7 +10,7 @@ use tch::{Device, Tensor, nn};
 use super::eyes::Sight;
 use super::features;
 use crate::agent::config::{CheckpointConfig, Ontology};
-use crate::data::json;
+use crate::data::{json, text_file};
 use crate::nets::chooser::{Chooser, ChooserSpec};
 use crate::nets::detector::{Detector, DetectorSpec};
 use crate::nets::weights::{self, TensorSpec};
@@ -70,7 +70,7 @@ impl MemoryConfig {
         struct Peek {
             agent: Option<AgentKind>,
         }
-        let text = std::fs::read_to_string(folder.join("config.json")).unwrap_or_default();
+        let text = text_file::read(&folder.join("config.json")).unwrap_or_default();
         serde_json::from_str::<Peek>(&text).is_ok_and(|peek| peek.agent.is_some())
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use serde_json::Value;
 
-use crate::data::{json, json_positions, schema, taskset};
+use crate::data::{json, json_positions, schema, taskset, text_file};
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::read_instruction;
@@ -37,9 +37,12 @@ impl std::fmt::Display for Mistake {
 /// When the file cannot be read.
 pub fn mistakes(path: &Path) -> anyhow::Result<Vec<Mistake>> {
     let bytes = json::read_bytes(path)?;
-    let Ok(text) = std::str::from_utf8(&bytes) else {
-        return Ok(vec![Mistake { line: 1, field: String::new(), problem: "not a text in UTF-8".into() }]);
+    let whole = |problem: String| Ok(vec![Mistake { line: 1, field: String::new(), problem }]);
+    let bytes = match text_file::content(&bytes) {
+        Ok(bytes) => bytes,
+        Err(error) => return whole(error.to_string()),
     };
+    let Ok(text) = std::str::from_utf8(bytes) else { return whole("not a text in UTF-8".into()) };
     let document: Value = match serde_json::from_str(text) {
         Ok(document) => document,
         Err(error) => {

@@ -7,6 +7,7 @@ use anyhow::Context;
 
 use super::drawing::{Anchor, Drawing};
 use super::line_chart::{COLOURS, INK, LineChart, Series};
+use crate::data::text_file;
 
 /// The size of a panel.
 const PANEL: (f64, f64) = (380.0, 230.0);
@@ -30,7 +31,7 @@ pub fn read(folder: &Path) -> anyhow::Result<Curves> {
         "{} keeps no training's curves (training/progress.jsonl is missing); `sprint pretrain` writes them",
         folder.display()
     );
-    let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let text = text_file::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
     let mut curves = Curves::new();
     let lines: Vec<&str> = text.lines().collect();
     for (number, line) in lines.iter().enumerate() {

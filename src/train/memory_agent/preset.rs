@@ -9,6 +9,7 @@ use super::chooser::ChooserTraining;
 use crate::agent::memory_agent::config::AgentKind;
 use crate::agent::memory_agent::eyes::Sight;
 use crate::agent::memory_agent::features::{ACTION, SITUATION};
+use crate::data::text_file;
 use crate::nets::chooser::ChooserSpec;
 use crate::nets::detector::DetectorSpec;
 use crate::train::detection::DetectorTraining;
@@ -78,7 +79,7 @@ impl MemoryPreset {
         let table = if name == NAME {
             base
         } else {
-            let Ok(text) = std::fs::read_to_string(Path::new(name)) else { return Ok(None) };
+            let Ok(text) = text_file::read(Path::new(name)) else { return Ok(None) };
             let Ok(mut over) = text.parse::<toml::Table>() else { return Ok(None) };
             if over.get("extends").and_then(toml::Value::as_str) == Some(NAME) {
                 over.remove("extends");

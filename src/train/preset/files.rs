@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::Preset;
+use crate::data::text_file;
 
 const SHIPPED: [(&str, &str); 9] = [
     ("sprint", include_str!("../../../assets/presets/sprint.toml")),
@@ -81,7 +82,7 @@ fn shipped(texts: &[(&'static str, &'static str)], name: &str, what: &str) -> an
         return Ok((*text).to_string());
     }
     let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
-    match std::fs::read_to_string(Path::new(name)) {
+    match text_file::read(Path::new(name)) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             anyhow::bail!("there is no {what} {name:?}, nor a file of that name: use {} or a file", names.join(", "))
         }
