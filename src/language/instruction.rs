@@ -59,6 +59,16 @@ pub(crate) fn parse(text: &str) -> Result<String, InstructionError> {
     if sentence.is_empty() { Err(InstructionError::Empty) } else { Ok(sentence) }
 }
 
+/// A text that somebody else wrote, as it may be kept and shown: trimmed, its line breaks and tabs spaces, without control and
+/// invisible formatting characters; its letters as they were.
+pub(crate) fn visible(text: &str) -> String {
+    let plain = text.chars().filter_map(|c| match c {
+        c if c.is_whitespace() && is_control(c) => Some(' '),
+        c => (!is_control(c)).then_some(c),
+    });
+    plain.collect::<String>().trim().to_owned()
+}
+
 /// Characters that steer terminals, turn text round or show nothing.
 fn is_control(c: char) -> bool {
     let invisible = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}');
@@ -86,6 +96,13 @@ mod tests {
         assert_eq!(normalise("cut\u{1b}[31m \u{202e}bread"), "Cut[31m bread.");
         assert_eq!(normalise("straße"), "Straße.");
         assert_eq!(normalise("ßa"), "ßa.");
+    }
+
+    #[test]
+    fn what_others_wrote_is_kept_without_what_steers_a_terminal_or_shows_nothing() {
+        let odd = "\u{8}Take\tthe \u{200b}Mu\u{ad}g,\r\nplease\u{1b}[31m.\u{feff} ";
+        assert_eq!(visible(odd), "Take the Mug,  please[31m.");
+        assert!(parse(&visible(odd)).is_ok() && parse(odd).is_err());
     }
 
     #[test]

@@ -7,8 +7,10 @@ use anyhow::{Context, bail};
 use rayon::prelude::*;
 
 use super::files::{SceneOnly, TrajData};
+use super::presence;
 use super::recording::{RecordedStart, Recording};
 use crate::data::dataset::Skipped;
+use crate::data::text_file;
 
 /// A `traj_data.json` of a checkout.
 pub(super) struct SourceFile {
@@ -24,8 +26,13 @@ enum Parsed {
     RecordedStart(RecordedStart),
 }
 
-/// Every `traj_data.json` of the checkout.
-pub(super) fn find(source: &Path) -> anyhow::Result<Vec<SourceFile>> {
+/// The folders of a checkout that ALFRED publishes.
+const SPLITS: [&str; 5] = ["train", "valid_seen", "valid_unseen", "tests_seen", "tests_unseen"];
+/// What each trial's folder holds.
+const FILE: &str = "traj_data.json";
+
+/// Every `traj_data.json` of the checkout, and what stands where one should be.
+pub(super) fn find(source: &Path) -> anyhow::Result<(Vec<SourceFile>, Vec<Skipped>)> {
     let folders = ["data/json_2.1.0", "data/full_2.1.0", "data/json_feat_2.1.0"];
     let Some(data) = folders.iter().map(|folder| source.join(folder)).find(|folder| folder.is_dir()) else {
         bail!(
@@ -33,39 +40,97 @@ pub(super) fn find(source: &Path) -> anyhow::Result<Vec<SourceFile>> {
             source.display()
         );
     };
-    let mut files = Vec::new();
-    for split in folders_in(&data)? {
+    let mut found = Found { source, files: Vec::new(), skipped: Vec::new() };
+    let (mut files, mut astray) = (Vec::new(), Vec::new());
+    for split in found.folders_in(&data)? {
         let name = split.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let mut open = vec![(split.clone(), 0)];
+        found.look_in(&split, &name);
+        // A split of one's own holds tasks that hold trials; a folder that holds less is no split.
+        let is_split = |file: &SourceFile| SPLITS.contains(&file.split.as_str()) || file.id.matches('/').count() == 1;
+        let (placed, other): (Vec<_>, Vec<_>) = found.files.drain(..).partition(is_split);
+        files.extend(placed);
+        astray.extend(other);
+    }
+    let splits = SPLITS.join(", ");
+    if let (true, Some(file)) = (files.is_empty(), astray.first()) {
+        bail!(
+            "{} holds no folder of a split ({splits}): {} lies outside of any; put each file at SPLIT/TASK/TRIAL/{FILE}",
+            data.display(),
+            file.shown
+        );
+    }
+    let mut skipped = found.skipped;
+    skipped.extend(
+        astray.into_iter().map(|file| Skipped { file: file.shown, reason: format!("lies in no split ({splits})") }),
+    );
+    if files.is_empty() {
+        let why = skipped.first().map(|skip| format!(" that can be read; {}: {}", skip.file, skip.reason));
+        bail!("{} holds no {FILE}{}", data.display(), why.unwrap_or_default());
+    }
+    files.sort_by(|a, b| a.shown.cmp(&b.shown));
+    Ok((files, skipped))
+}
+
+/// What a search of a checkout finds.
+struct Found<'a> {
+    source: &'a Path,
+    files: Vec<SourceFile>,
+    skipped: Vec<Skipped>,
+}
+
+impl Found<'_> {
+    /// Finds the files of a split.
+    fn look_in(&mut self, split: &Path, name: &str) {
+        let mut open = vec![(split.to_owned(), 0)];
         while let Some((folder, depth)) = open.pop() {
-            let path = folder.join("traj_data.json");
-            if path.is_file() {
-                let shown = path.strip_prefix(source).unwrap_or(&path).display().to_string();
-                let id = folder.strip_prefix(&split).unwrap_or(&folder).to_string_lossy().replace('\\', "/");
-                files.push(SourceFile { path, shown, split: name.clone(), id });
+            let path = folder.join(FILE);
+            match presence::is_file(&path) {
+                Ok(true) => {
+                    let shown = self.shown(&path);
+                    let id = folder.strip_prefix(split).unwrap_or(&folder).to_string_lossy().replace('\\', "/");
+                    self.files.push(SourceFile { path, shown, split: name.to_owned(), id });
+                    continue;
+                }
+                Err(reason) => {
+                    self.skip(&path, reason);
+                    continue;
+                }
+                Ok(false) => {}
+            }
+            if folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with("trial_")) {
+                self.skip(&folder, format!("holds no {FILE}"));
             } else if depth < 3 {
-                open.extend(folders_in(&folder)?.into_iter().map(|inner| (inner, depth + 1)));
+                match self.folders_in(&folder) {
+                    Ok(inner) => open.extend(inner.into_iter().map(|inner| (inner, depth + 1))),
+                    Err(error) => self.skip(&folder, error.root_cause().to_string()),
+                }
             }
         }
     }
-    if files.is_empty() {
-        bail!("{} holds no traj_data.json", data.display());
-    }
-    files.sort_by(|a, b| a.shown.cmp(&b.shown));
-    Ok(files)
-}
 
-fn folders_in(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let mut folders = Vec::new();
-    for entry in entries {
-        let path = entry.with_context(|| folder.display().to_string())?.path();
-        if path.is_dir() {
-            folders.push(path);
+    /// The folders in one; links that lead nowhere are skipped by name, for they may have led to one.
+    fn folders_in(&mut self, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+        let mut folders = Vec::new();
+        for entry in entries {
+            let path = entry.with_context(|| folder.display().to_string())?.path();
+            match path.metadata() {
+                Ok(meant) if meant.is_dir() => folders.push(path),
+                Ok(_) => {}
+                Err(error) => self.skip(&path, format!("a link that leads nowhere ({error})")),
+            }
         }
+        folders.sort();
+        Ok(folders)
     }
-    folders.sort();
-    Ok(folders)
+
+    fn skip(&mut self, path: &Path, reason: String) {
+        self.skipped.push(Skipped { file: self.shown(path), reason });
+    }
+
+    fn shown(&self, path: &Path) -> String {
+        path.strip_prefix(self.source).unwrap_or(path).display().to_string()
+    }
 }
 
 /// Reads and checks all files, on all cores; `progress` is called with how many are read.
@@ -103,13 +168,17 @@ fn parse(file: &SourceFile) -> Result<Parsed, String> {
     parse_recording(&text, &file.id, &file.split).map(|recording| Parsed::Recording(Box::new(recording)))
 }
 
-/// Reads JSON; what is wrong begins with the field.
+/// Reads JSON that is the whole text; what is wrong begins with the field.
 fn read_fields<T: serde::de::DeserializeOwned>(text: &[u8]) -> Result<T, String> {
+    let text = text_file::content(text).map_err(|error| error.to_string())?;
     let mut reader = serde_json::Deserializer::from_slice(text);
-    serde_path_to_error::deserialize(&mut reader).map_err(|error| match error.path().to_string().as_str() {
-        "." => error.inner().to_string(),
-        field => format!("{field}: {}", error.inner()),
-    })
+    let read =
+        serde_path_to_error::deserialize(&mut reader).map_err(|error| match error.path().to_string().as_str() {
+            "." => error.inner().to_string(),
+            field => format!("{field}: {}", error.inner()),
+        })?;
+    reader.end().map_err(|error| format!("something follows the JSON: {error}"))?;
+    Ok(read)
 }
 
 /// Reads and checks one `traj_data.json`.

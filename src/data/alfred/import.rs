@@ -63,7 +63,10 @@ pub fn import(
     options: &ImportOptions,
     progress: &(dyn Fn(ImportProgress) + Sync),
 ) -> anyhow::Result<ImportSummary> {
-    let files = find(source)?;
+    if let Some(folder) = options.eval_lists.as_deref().filter(|folder| !folder.is_dir()) {
+        bail!("{} is no folder with the authors' lists", folder.display());
+    }
+    let (files, absent) = find(source)?;
     let mut entries = Vec::new();
     for set in OFFICIAL {
         let listed = options.eval_lists.as_deref().map(|folder| tasks::listed(set, folder)).transpose()?.flatten();
@@ -72,6 +75,7 @@ pub fn import(
     let mut writer = DatasetWriter::new(out)?;
     let (recordings, settings, mut skipped) =
         read(&files, &|done| progress(ImportProgress::Reading(done, files.len() as u64)));
+    skipped.extend(absent);
     if recordings.is_empty() {
         let why = skipped.first().map(|skip| format!("; {}: {}", skip.file, skip.reason)).unwrap_or_default();
         bail!("{}: none of {} files could be used{why}", source.display(), files.len());
@@ -323,6 +327,93 @@ mod tests {
         let broken = checkout(&[("trial_1", "{".to_owned())]);
         assert!(run(broken.path()).contains("traj_data.json"));
         assert!(!out.path().join("dataset.json").exists());
+    }
+
+    #[test]
+    fn what_stands_where_a_file_should_be_is_named_and_counted() {
+        let source = checkout(&[("trial_1", recording().to_string())]);
+        let task = source.path().join("data/json_2.1.0/train/task");
+        for trial in ["trial_link", "trial_folder", "trial_pipe", "trial_empty"] {
+            std::fs::create_dir_all(task.join(trial)).unwrap();
+        }
+        std::os::unix::fs::symlink("gone.json", task.join("trial_link/traj_data.json")).unwrap();
+        std::os::unix::fs::symlink("gone", task.join("trial_gone")).unwrap();
+        std::fs::create_dir(task.join("trial_folder/traj_data.json")).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(task.join("trial_pipe/traj_data.json")).unwrap();
+        let layouts = source.path().join("gen/layouts");
+        std::fs::create_dir_all(&layouts).unwrap();
+        std::os::unix::fs::symlink("gone.npy", layouts.join("FloorPlan1-layout.npy")).unwrap();
+        let out = tempfile::tempdir().unwrap();
+        let summary = import(source.path(), out.path(), &ImportOptions::default(), &|_| {}).unwrap();
+        assert_eq!(summary.manifest.counts["train"].trajectories, 1);
+        let skipped: Vec<(&str, &str)> =
+            summary.manifest.skipped.iter().map(|skip| (skip.file.as_str(), skip.reason.as_str())).collect();
+        for (file, reason) in [
+            ("task/trial_link/traj_data.json", "a link"),
+            ("task/trial_folder/traj_data.json", "a folder"),
+            ("task/trial_pipe/traj_data.json", "a pipe"),
+            ("task/trial_gone", "a link"),
+            ("task/trial_empty", "no traj_data.json"),
+            ("gen/layouts/FloorPlan1", "a link"),
+        ] {
+            let is_it = |(found, why): &&(&str, &str)| found.ends_with(file) && why.contains(reason);
+            assert!(skipped.iter().any(|skip| is_it(&skip)), "{file} in {skipped:?}");
+        }
+        assert_eq!(skipped.len(), 6, "{skipped:?}");
+    }
+
+    #[test]
+    fn a_checkout_without_the_splits_folders_is_refused_and_a_file_outside_of_them_is_named() {
+        let source = tempfile::tempdir().unwrap();
+        let put = |trial: &str| {
+            let trial = source.path().join("data/json_2.1.0").join(trial);
+            std::fs::create_dir_all(&trial).unwrap();
+            std::fs::write(trial.join("traj_data.json"), recording().to_string()).unwrap();
+        };
+        let out = tempfile::tempdir().unwrap();
+        let run = || import(source.path(), out.path(), &ImportOptions::default(), &|_| {});
+        put("task/trial_1");
+        let error = run().unwrap_err().to_string();
+        assert!(error.contains("valid_unseen") && error.contains("task/trial_1/traj_data.json"), "{error}");
+        assert!(!out.path().join("dataset.json").exists());
+        put("train/task/trial_1");
+        put("own_split/task/trial_1");
+        let manifest = run().unwrap().manifest;
+        assert_eq!(manifest.counts.keys().collect::<Vec<_>>(), ["own_split", "train"]);
+        assert_eq!(manifest.skipped.len(), 1, "{:?}", manifest.skipped);
+    }
+
+    #[test]
+    fn what_follows_the_json_is_refused_and_a_byte_order_mark_before_it_is_passed_over() {
+        let text = recording().to_string();
+        let files = [
+            ("trial_good", format!("\u{feff}{text}\n")),
+            ("trial_junk", format!("{text} and more")),
+            ("trial_nul", format!("{text}\0\0")),
+            ("trial_twice", format!("{text}{text}")),
+        ];
+        let skipped = import_of(&files).0.manifest.skipped;
+        assert_eq!(skipped.len(), 3, "{skipped:?}");
+        assert!(skipped.iter().all(|skip| skip.reason.contains("something follows the JSON")), "{skipped:?}");
+    }
+
+    #[test]
+    fn what_annotators_wrote_is_imported_as_text_that_a_task_may_say() {
+        let mut data = recording();
+        *data.pointer_mut("/turk_annotations/anns/0/task_desc").unwrap() =
+            json!("\u{8}Put the m\u{ad}ug\u{200b} away.");
+        for sentence in data.pointer_mut("/turk_annotations/anns/0/high_descs").unwrap().as_array_mut().unwrap() {
+            *sentence = json!(format!("\u{1b}{}\t", sentence.as_str().unwrap()));
+        }
+        let mut long = recording();
+        *long.pointer_mut("/turk_annotations/anns/0/task_desc").unwrap() = json!("so ".repeat(1000));
+        let (summary, out) = import_of(&[("trial_1", data.to_string()), ("trial_long", long.to_string())]);
+        assert!(summary.manifest.skipped[0].reason.contains("3000 characters"), "{:?}", summary.manifest.skipped);
+        let dataset = crate::data::Dataset::open(out.path()).unwrap();
+        let trajectory = dataset.trajectories().unwrap().next().unwrap().unwrap();
+        let annotation = &trajectory.annotations[0];
+        assert_eq!(annotation.goal, "Put the mug away.");
+        assert_eq!(annotation.steps, ["Take the mug.", "Put it in the sink."]);
     }
 
     /// Every value of a document, by pointer.

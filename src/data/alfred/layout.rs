@@ -6,6 +6,8 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::names::{FARTHEST, Name};
+use super::presence;
+use crate::data::text_file;
 use crate::domain::place::Pose;
 use crate::domain::{Cell, Heading, Point};
 
@@ -26,11 +28,14 @@ impl FloorPlanLayout {
     pub fn read(folder: &Path, name: &str) -> anyhow::Result<FloorPlanLayout> {
         let mut layout = FloorPlanLayout::default();
         let cells = folder.join(format!("{name}-layout.npy"));
-        if cells.is_file() {
+        let is_there = |path: &Path| {
+            presence::is_file(path).map_err(anyhow::Error::msg).with_context(|| path.display().to_string())
+        };
+        if is_there(&cells)? {
             layout.cells = read_cells(&cells).with_context(|| cells.display().to_string())?;
         }
         let stands = folder.join(format!("{name}-openable.json"));
-        if stands.is_file() {
+        if is_there(&stands)? {
             layout.stands = read_stands(&stands).with_context(|| stands.display().to_string())?;
         }
         Ok(layout)
@@ -60,7 +65,7 @@ fn read_cells(path: &Path) -> anyhow::Result<Vec<Cell>> {
 }
 
 fn read_stands(path: &Path) -> anyhow::Result<BTreeMap<Name, Pose>> {
-    let listed: BTreeMap<String, [f64; 4]> = serde_json::from_slice(&std::fs::read(path)?)?;
+    let listed: BTreeMap<String, [f64; 4]> = serde_json::from_str(&text_file::read(path)?)?;
     let mut stands = BTreeMap::new();
     for (id, [x, z, rotation, horizon]) in listed {
         // A type that House has no class for cannot be acted on: it is left out.

@@ -1,5 +1,7 @@
 //! Merging GotoLocation: each walk is prepended to the skill that follows it.
 
+use crate::language::instruction;
+
 /// How the steps of a plan are renumbered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct GotoMerge {
@@ -27,7 +29,7 @@ impl GotoMerge {
     /// The sentences of the merged skills: those of the walks are dropped.
     pub(crate) fn sentences(&self, steps: &[String]) -> Vec<String> {
         let kept = steps.iter().enumerate().filter(|(step, _)| !self.is_goto(*step));
-        kept.map(|(_, sentence)| sentence.trim().to_owned()).collect()
+        kept.map(|(_, sentence)| instruction::visible(sentence)).collect()
     }
 }
 

@@ -14,6 +14,7 @@ pub(crate) mod merge;
 pub(crate) mod meshes;
 pub(crate) mod names;
 pub(crate) mod parents;
+pub(crate) mod presence;
 pub(crate) mod recording;
 pub mod scenes;
 pub(crate) mod support;

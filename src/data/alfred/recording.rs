@@ -8,6 +8,7 @@ use crate::domain::place::Pose;
 use crate::domain::skill::GoalKind;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{ActionType, Class, Goal, Point, Room, SkillKind};
+use crate::language::instruction;
 
 /// A state of a scene: what every file holds, test splits included.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,11 +111,17 @@ impl Recording {
             }
             steps.push(step);
         }
-        let annotations = data
-            .turk_annotations
-            .anns
-            .iter()
-            .map(|ann| Annotation { goal: ann.task_desc.trim().to_owned(), steps: merge.sentences(&ann.high_descs) });
+        for (i, ann) in data.turk_annotations.anns.iter().enumerate() {
+            let longest = ann.high_descs.iter().chain([&ann.task_desc]).map(|text| text.chars().count()).max();
+            if let Some(longest) = longest.filter(|&longest| longest > instruction::LONGEST) {
+                let most = instruction::LONGEST;
+                return Err(format!("turk_annotations.anns[{i}]: a text of {longest} characters, {most} are the most"));
+            }
+        }
+        let annotations = data.turk_annotations.anns.iter().map(|ann| Annotation {
+            goal: instruction::visible(&ann.task_desc),
+            steps: merge.sentences(&ann.high_descs),
+        });
         Ok(Recording {
             id,
             split,

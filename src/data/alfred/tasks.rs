@@ -7,11 +7,14 @@ use std::path::Path;
 use anyhow::Context;
 use serde::Deserialize;
 
+use super::presence;
+use crate::data::text_file;
 use crate::domain::skill::Original;
 use crate::domain::task::{Task, TaskSet};
 use crate::domain::world::{Instance, World};
 use crate::domain::{Role, Scene, Subtask, Trajectory};
 use crate::house::{Outcome, Replay};
+use crate::language::instruction;
 
 /// One of the official sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,11 +100,12 @@ struct Listed {
 /// When the file is there but malformed.
 pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<OfficialTask>>> {
     let path = folder.join(set.list);
-    if !path.is_file() {
+    let shown = || path.display().to_string();
+    if !presence::is_file(&path).map_err(anyhow::Error::msg).with_context(shown)? {
         return Ok(None);
     }
-    let text = std::fs::read(&path).with_context(|| path.display().to_string())?;
-    let mut items: Vec<Listed> = serde_json::from_slice(&text).with_context(|| path.display().to_string())?;
+    let text = text_file::read(&path).with_context(|| path.display().to_string())?;
+    let mut items: Vec<Listed> = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
     // The task number on the authors' command line is the position in this order.
     items.sort_by_key(|item| std::cmp::Reverse(item.subgoal_ids.len()));
     let entry = |(number, item): (usize, Listed)| {
@@ -115,7 +119,7 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Officia
             annotator: item.repeat_id,
             first,
             skills: item.subgoal_ids.len(),
-            wording: TaskText::Given(item.annotation.trim().to_owned()),
+            wording: TaskText::Given(instruction::visible(&item.annotation)),
         })
     };
     items.into_iter().enumerate().map(entry).collect::<anyhow::Result<Vec<_>>>().map(Some)
