@@ -203,6 +203,27 @@ mod tests {
     }
 
     #[test]
+    fn a_checkpoint_whose_policy_critic_or_visual_encoder_holds_no_numbers_is_refused_by_name() {
+        let _chance = crate::nets::testing::chance();
+        for (name, bad) in [("alfred", f64::NAN), ("sprint", f64::INFINITY)] {
+            let shipped = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
+            let config = CheckpointConfig::read(&shipped).unwrap();
+            let whole = weights::read(&shipped.join("model.safetensors")).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            for prefix in ["policy.", "critic.", "target.", "visual."] {
+                let part = whole.iter().find(|(name, tensor)| name.starts_with(prefix) && tensor.is_floating_point());
+                let Some((changed, tensor)) = part else { continue };
+                let mut tensors: weights::Tensors =
+                    whole.iter().map(|(name, tensor)| (name.clone(), tensor.shallow_clone())).collect();
+                let _ = tensors.insert(changed.clone(), tensor.full_like(bad));
+                weights::write(&folder.path().join("model.safetensors"), &tensors, &BTreeMap::new()).unwrap();
+                let error = format!("{:#}", Networks::load(folder.path(), &config, Device::Cpu).unwrap_err());
+                assert!(error.contains(changed) && error.contains("model.safetensors"), "{error}");
+            }
+        }
+    }
+
+    #[test]
     fn missing_extra_and_misshapen_tensors_are_all_named() {
         let _chance = crate::nets::testing::chance();
         let (folder, config) = saved();

@@ -95,7 +95,7 @@ impl Features {
     /// file are read at once.
     ///
     /// # Errors
-    /// When one of them does not exist, or the disk fails.
+    /// When one of them does not exist or holds what is no number, or the disk fails.
     pub(crate) fn gather_all(&self, maps: impl Iterator<Item = usize>, into: &mut Vec<u8>) -> anyhow::Result<()> {
         let mut run = 0..0;
         for map in maps {
@@ -112,7 +112,7 @@ impl Features {
     /// Appends the bytes of maps that follow each other.
     ///
     /// # Errors
-    /// When one of them does not exist, or the disk fails.
+    /// When one of them does not exist or holds what is no number, or the disk fails.
     pub fn gather_run(&self, mut run: Range<usize>, into: &mut Vec<u8>) -> anyhow::Result<()> {
         while !run.is_empty() {
             let position = self.files.partition_point(|maps| maps.range.end <= run.start);
@@ -123,6 +123,13 @@ impl Features {
             let at = maps.offset + ((run.start - maps.range.start) * self.width) as u64;
             let read = maps.file.read_exact_at(&mut into[filled..], at);
             read.with_context(|| format!("{} cannot be read", maps.path.display()))?;
+            if let Some(map) = not_finite(&into[filled..], self.width) {
+                bail!(
+                    "{}: feature map {} holds NaN or an infinite number: delete the file, and it is computed anew",
+                    maps.path.display(),
+                    run.start + map - maps.range.start
+                );
+            }
             run.start = end;
         }
         Ok(())
@@ -142,6 +149,13 @@ impl Features {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+/// The first of these maps that holds NaN or an infinity.
+fn not_finite(bytes: &[u8], width: usize) -> Option<usize> {
+    // Of a little-endian 16-bit float, all bits of the exponent are set. Without a branch, it is as fast as the memory.
+    let any = |bytes: &[u8]| bytes.chunks_exact(2).fold(false, |any, pair| any | (pair[1] & 0x7c == 0x7c));
+    any(bytes).then(|| bytes.chunks(width.max(1)).position(any)).flatten()
 }
 
 /// Writes a feature file; it appears when it is whole. What an earlier, interrupted writer left is taken up.
@@ -212,6 +226,9 @@ impl FeatureWriter {
     pub fn add(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let width = self.header.width().max(1);
         anyhow::ensure!(bytes.len().is_multiple_of(width), "{} bytes are no whole maps of {width}", bytes.len());
+        if let Some(map) = not_finite(bytes, width) {
+            bail!("the encoder's feature map {} holds NaN or an infinite number", self.maps + map as u64);
+        }
         self.file.write_all(bytes).with_context(|| self.complaint())?;
         self.maps += (bytes.len() / width) as u64;
         self.unsynced += bytes.len();
@@ -286,6 +303,24 @@ mod tests {
         assert_eq!(gathered(&[3, 0, 1, 2, 3]).unwrap(), [4, 1, 2, 3, 4]);
         assert!(gathered(&[]).unwrap().is_empty());
         assert!(gathered(&[2, 3, 4]).is_err());
+    }
+
+    #[test]
+    fn maps_that_hold_what_is_no_number_are_neither_written_nor_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let one = FeatureHeader { numbers: 1, ..header() };
+        for number in [0x7e00_u16, 0x7c00, 0xfc00] {
+            let bytes = [[0x00, 0x3c], number.to_le_bytes()].concat();
+            let told = FeatureWriter::open(folder.path(), one.clone()).unwrap().add(&bytes).unwrap_err().to_string();
+            assert!(told.contains("feature map 1 "), "{told}");
+            std::fs::write(folder.path().join(one.file_name()), [one.line().unwrap(), bytes].concat()).unwrap();
+            let features = Features::read(folder.path(), &one).unwrap().unwrap();
+            features.gather_run(0..1, &mut Vec::new()).unwrap();
+            let told = features.gather_run(0..2, &mut Vec::new()).unwrap_err().to_string();
+            assert!(told.contains("features-e-d.bin: feature map 1 ") && told.contains("delete"), "{told}");
+        }
+        // The largest numbers of 16 bits, and what is least.
+        write(folder.path(), FeatureHeader { encoder: "f".into(), ..one }, &[0xff, 0x7b, 0xff, 0xfb]);
     }
 
     #[test]

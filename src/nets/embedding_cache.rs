@@ -128,7 +128,12 @@ impl EmbeddingCache {
             return Ok(None);
         }
         let floats = checked[KEY..].chunks_exact(4);
-        Ok(Some(floats.map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect()))
+        let embedding: Vec<f32> = floats.map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect();
+        if !embedding.iter().all(|number| number.is_finite()) {
+            self.records.remove(&key);
+            return Ok(None);
+        }
+        Ok(Some(embedding))
     }
 
     /// Appends embeddings; texts that are stored already are passed over.

@@ -197,6 +197,11 @@ impl SentenceEncoder {
     /// As [`SentenceEncoder::encode`].
     pub(crate) fn encode_rows(&self, texts: &[&str]) -> anyhow::Result<Vec<Vec<f32>>> {
         let values: Vec<f32> = Vec::try_from(self.encode(texts)?.to_device(Device::Cpu).flatten(0, -1))?;
+        ensure!(
+            values.iter().all(|value| value.is_finite()),
+            "the sentence encoder {}… makes NaN or an infinite number of a text: fetch it anew, or use another",
+            &self.digest[..16]
+        );
         Ok(values.chunks_exact(self.width).map(<[f32]>::to_vec).collect())
     }
 

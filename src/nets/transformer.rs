@@ -36,6 +36,7 @@ impl Transformer {
                 (name, tensor.to_kind(kind).to_device(device))
             })
             .collect();
+        weights::check_finite(path, &tensors)?;
         let checked = CheckedTensors { tensors: &tensors, epsilon: config.layer_norm_eps };
         match config.model_type.as_str() {
             "bert" => {

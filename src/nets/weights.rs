@@ -99,6 +99,23 @@ pub enum WeightsError {
         /// What is wrong.
         reason: String,
     },
+    /// The file is well formed, and nothing can be computed with what it holds.
+    #[error(
+        "{}: the tensor {name} holds {what}{}: its training diverged, or the file is damaged; use another checkpoint, or \
+         train or fetch this one anew",
+        path.display(),
+        if *others > 0 { format!(" (so do {others} more)") } else { String::new() }
+    )]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The first such tensor.
+        name: String,
+        /// What should not be there.
+        what: &'static str,
+        /// How many more tensors are so.
+        others: usize,
+    },
     /// The file is well formed, and belongs to another model.
     #[error("{}: does not fit the model: {differences}", path.display())]
     Unfit {
@@ -120,7 +137,7 @@ pub enum WeightsError {
 /// Reads all tensors of a file, on the CPU.
 ///
 /// # Errors
-/// [`WeightsError::Unreadable`] or [`WeightsError::Malformed`].
+/// [`WeightsError::Unreadable`], [`WeightsError::Malformed`] or [`WeightsError::NotFinite`].
 pub fn read(path: &Path) -> Result<Tensors, WeightsError> {
     Ok(read_with_metadata(path)?.0)
 }
@@ -128,10 +145,35 @@ pub fn read(path: &Path) -> Result<Tensors, WeightsError> {
 /// Reads all tensors of a file, on the CPU, and its `__metadata__`.
 ///
 /// # Errors
-/// [`WeightsError::Unreadable`] or [`WeightsError::Malformed`].
+/// [`WeightsError::Unreadable`], [`WeightsError::Malformed`] or [`WeightsError::NotFinite`].
 pub fn read_with_metadata(path: &Path) -> Result<(Tensors, BTreeMap<String, String>), WeightsError> {
     let bytes = std::fs::read(path).map_err(|source| WeightsError::Unreadable { path: path.into(), source })?;
-    parse(&bytes).map_err(|reason| WeightsError::Malformed { path: path.into(), reason })
+    let read = parse(&bytes).map_err(|reason| WeightsError::Malformed { path: path.into(), reason })?;
+    check_finite(path, &read.0)?;
+    Ok(read)
+}
+
+/// Checks that weights can be computed with: one number that is none makes every result none, or a plausible wrong one.
+///
+/// # Errors
+/// [`WeightsError::NotFinite`], which names the file and the tensor.
+pub(super) fn check_finite(path: &Path, tensors: &Tensors) -> Result<(), WeightsError> {
+    let mut found = tensors.iter().filter_map(|(name, tensor)| Some((name, not_a_weight(name, tensor)?)));
+    let Some((name, what)) = found.next() else { return Ok(()) };
+    Err(WeightsError::NotFinite { path: path.into(), name: name.clone(), what, others: found.count() })
+}
+
+/// What a tensor holds that no weight is.
+fn not_a_weight(name: &str, tensor: &Tensor) -> Option<&'static str> {
+    if !tensor.is_floating_point() || tensor.numel() == 0 {
+        return None;
+    }
+    let any = |which: Tensor| which.any().int64_value(&[]) != 0;
+    if any(tensor.isfinite().logical_not()) {
+        return Some(if any(tensor.isnan()) { "NaN (not a number)" } else { "an infinite number" });
+    }
+    // Whoever normalises takes the root of it.
+    (name.ends_with("running_var") && any(tensor.lt(0.0))).then_some("a variance below zero")
 }
 
 /// Reads tensors from a file's bytes; the error says what is wrong with them.
@@ -360,6 +402,27 @@ mod tests {
             "shop/model.safetensors: does not fit the model: missing head.weight; unknown steps; \
              conv.bias is Float[2] where Float[3] is expected"
         );
+    }
+
+    #[test]
+    fn weights_that_are_no_numbers_are_refused_by_the_tensors_and_the_files_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("w.safetensors");
+        let complaint = |name: &str, values: &[f32], kind: Kind| {
+            let mut tensors = sample();
+            tensors.insert(name.into(), Tensor::from_slice(values).to_kind(kind));
+            write(&path, &tensors, &BTreeMap::new()).unwrap();
+            read(&path).err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for kind in [Kind::Half, Kind::BFloat16, Kind::Float, Kind::Double] {
+            for (number, what) in [(f32::NAN, "NaN"), (f32::INFINITY, "infinite"), (-f32::INFINITY, "infinite")] {
+                let error = complaint("policy.out.weight", &[0.0, 1.0, number], kind);
+                let parts = ["w.safetensors", "policy.out.weight", what, "train or fetch this one anew"];
+                assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+            }
+        }
+        assert_eq!(complaint("policy.out.weight", &[0.0, -1.0, f32::MAX], Kind::Float), "");
+        assert!(complaint("norm.running_var", &[1.0, -1.0], Kind::Float).contains("a variance below zero"));
     }
 
     #[test]
