@@ -102,6 +102,11 @@ impl Episode {
         self.variant.is_original() && self.start_subtask == 0
     }
 
+    /// Whether a person explored it: its first step says who chose.
+    pub(crate) fn is_explored(&self) -> bool {
+        self.trace.first().is_some_and(|step| step.author.is_some())
+    }
+
     /// Whether its own record makes it a success, where that word ended it.
     pub(crate) fn is_success(&self, ended_by: EndedBy) -> bool {
         let is_complete = self.error.is_none() && self.of > 0 && self.completed == self.of;

@@ -60,7 +60,7 @@ pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()>
         task_set: set.name.clone(),
         task_set_hash: json::hex(&Sha256::digest(&bytes)),
         scenes_hash: json::hex(&scenes_digest.finalize()),
-        policy: "explored".into(),
+        policy: RunManifest::EXPLORED.into(),
         checkpoint_hash: None,
         tasks: set.tasks.len(),
         seeds: 1,

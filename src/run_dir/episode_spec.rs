@@ -46,6 +46,13 @@ pub(crate) fn policy_seed(task: usize, seed: u64) -> u64 {
     seed::mix(task as u64, seed)
 }
 
+/// The episodes of a run, or of its share.
+pub(crate) fn own_specs(manifest: &RunManifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
+    let all = episode_specs(manifest, tasks);
+    let own = manifest.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
+    all[own].to_vec()
+}
+
 /// Every episode of a run in its order: by task, then seed, then instruction variant, then start subtask.
 pub(crate) fn episode_specs(manifest: &RunManifest, tasks: &[Task]) -> Vec<EpisodeSpec> {
     let variants: &[InstructionVariant] =

@@ -56,6 +56,8 @@ pub struct RunManifest {
 impl RunManifest {
     /// The format version this program reads and writes.
     pub(crate) const FORMAT: u32 = 2;
+    /// What stands for the policy of a run that a person explored.
+    pub(crate) const EXPLORED: &str = "explored";
     /// The most episodes, other words and starts apart, that a run may have: its episodes are listed in memory.
     const MOST: u64 = 10_000_000;
 

@@ -1,11 +1,11 @@
 //! A run folder read back: to compare it, to merge it, to draw it, to verify it, to open its episodes.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use super::episode_spec::{EpisodeSpec, episode_specs, policy_seed};
+use super::belonging::Belonging;
+use super::episode_spec::{EpisodeSpec, own_specs, policy_seed};
 use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::RunManifest;
@@ -46,9 +46,9 @@ impl RecordedRun {
         manifest.check().with_context(|| manifest_path.display().to_string())?;
         let (set, scenes) = tasks_of(path, &manifest, tasks)?;
         let (episodes, _) = read_episodes(&path.join(EPISODES))?;
-        let known: BTreeSet<&str> = set.tasks.iter().map(|task| task.id.as_str()).collect();
-        if let Some(stranger) = episodes.iter().find(|episode| !known.contains(episode.task.as_str())) {
-            anyhow::bail!("{}: the run has no task {:?}", path.join(EPISODES).display(), stranger.task);
+        let belonging = Belonging::new(&manifest, &set.tasks);
+        if let Some(misfit) = episodes.iter().find_map(|episode| belonging.check(episode).err()) {
+            anyhow::bail!("{}: {misfit}", path.join(EPISODES).display());
         }
         let sources = vec![(path.to_owned(), episodes.len())];
         Ok(RecordedRun { path: path.to_owned(), sources, manifest, set, scenes, episodes })
@@ -115,9 +115,7 @@ impl RecordedRun {
 
     /// Every episode that the run, or its share, comes to.
     pub fn episode_specs(&self) -> Vec<EpisodeSpec> {
-        let all = episode_specs(&self.manifest, &self.set.tasks);
-        let own = self.manifest.shard.map_or(0..all.len(), |shard| shard.range(all.len()));
-        all[own].to_vec()
+        own_specs(&self.manifest, &self.set.tasks)
     }
 
     /// How the explorer is told to open an episode: by the number of its line in the run's order, from 1.

@@ -45,7 +45,7 @@ pub fn verify(
                 let (task_index, task, setting) = run.setting(episode).with_context(|| format!("episode {number}"))?;
                 // An explored run has one episode a task and acts in a policy's first slot.
                 let index =
-                    if is_explored(episode) { 0 } else { specs.get(&episode.key()).map_or(0, |spec| spec.index) };
+                    if episode.is_explored() { 0 } else { specs.get(&episode.key()).map_or(0, |spec| spec.index) };
                 let author = run.author(task_index, episode);
                 let (grading, end) = (run.manifest.grader, run.manifest.end);
                 let recorded = RecordedEpisode { episode, task, setting, author, grading, end, index };
@@ -74,7 +74,7 @@ fn evaluated_again(
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<BTreeMap<EpisodeKey, Agreement>> {
     // What an error cut short, a step without an end among them, is not played on.
-    let is_whole = |episode: &&Episode| !is_explored(episode) && episode.error.is_none();
+    let is_whole = |episode: &&Episode| !episode.is_explored() && episode.error.is_none();
     let mut wanted: Vec<EpisodeSpec> =
         run.episodes.iter().filter(is_whole).filter_map(|episode| specs.get(&episode.key()).copied()).collect();
     wanted.sort_by_key(|spec| spec.index);
@@ -83,11 +83,6 @@ fn evaluated_again(
         Some(source) => evaluated::play_again(run, &wanted, &source, jobs, progress),
         None => Ok(BTreeMap::new()),
     }
-}
-
-/// Whether a person explored it: its first step says who chose.
-fn is_explored(episode: &Episode) -> bool {
-    episode.trace.first().is_some_and(|step| step.author.is_some())
 }
 
 /// How many episodes the summary of a run tells of, where there is one.
