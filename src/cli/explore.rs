@@ -9,6 +9,7 @@ use etcetera::BaseStrategy;
 
 use super::exit_status::ExitStatus;
 use super::logging;
+use super::streams::Printable;
 use super::value_names;
 use crate::agent::policy_source;
 use crate::agent::registry::{Policies, PolicyKind};
@@ -94,7 +95,7 @@ impl Display {
         open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
-            let (input, out) = (std::io::stdin().lock(), std::io::stdout().lock());
+            let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
             plain::run(open()?, input, out)?;
             return Ok(ExitStatus::Ok);
         }

@@ -70,7 +70,7 @@ pub(crate) fn visible(text: &str) -> String {
 }
 
 /// Characters that steer terminals, turn text round or show nothing.
-fn is_control(c: char) -> bool {
+pub(crate) fn is_control(c: char) -> bool {
     let invisible = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}');
     c.is_control() || invisible
 }

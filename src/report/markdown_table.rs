@@ -22,7 +22,9 @@ pub(crate) fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Ite
 pub(crate) fn aligned_table(head: &[String], rows: &[Vec<String>]) -> String {
     let lines = || std::iter::once(head).chain(rows.iter().map(Vec::as_slice));
     let columns = 0..head.len();
-    let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();
+    // A name may hold what would end a cell or a row.
+    let plain = |text: &String| text.replace('|', "/").replace(['\n', '\r'], " ");
+    let cell = |row: &[String], i: usize| row.get(i).map(plain).unwrap_or_default();
     let widths: Vec<usize> =
         columns.clone().map(|i| lines().map(|row| cell(row, i).chars().count()).max().unwrap_or(0)).collect();
     let line = |row: &[String]| {
