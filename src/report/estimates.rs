@@ -8,21 +8,30 @@ use super::stats::Interval;
 /// Drives the resampling of the bootstrap.
 pub(crate) const BOOTSTRAP_SEED: u64 = 0;
 
+/// How [`Mean`]s come by their intervals, in words.
+pub(crate) fn interval_method() -> String {
+    format!(
+        "percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED} (of one task, or where all are alike: a \
+         bound by Wilson's score of how many tasks may differ)",
+        stats::RESAMPLES
+    )
+}
+
 /// A mean and its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Mean {
     /// The mean of all episodes, whatever their task.
     pub(crate) mean: f64,
-    /// Its 95 % interval, lower end first: bootstrap over tasks.
+    /// Its 95 % interval, lower end first: bootstrap over tasks, or, where that has no width, a bound.
     pub(crate) interval: Interval,
 }
 
 impl Mean {
-    /// Of the values of each task's episodes.
-    pub(crate) fn of(groups: &[Vec<f64>]) -> Mean {
+    /// Of the values of each task's episodes, which lie within `bounds`.
+    pub(crate) fn of(groups: &[Vec<f64>], bounds: Interval) -> Mean {
         let mean = stats::mean(groups.iter().flatten().copied());
-        Mean { mean, interval: stats::bootstrap_mean(groups, BOOTSTRAP_SEED) }
+        Mean { mean, interval: stats::bounded_mean(groups, bounds, BOOTSTRAP_SEED) }
     }
 }
 

@@ -125,7 +125,7 @@ impl<'a> EpisodesByTask<'a> {
             successes,
             success: if all.is_empty() { 0.0 } else { successes as f64 / all.len() as f64 },
             success_interval: stats::wilson_of_groups(&self.values(Episode::succeeded)),
-            progress: Mean::of(&self.values(Episode::progress)),
+            progress: Mean::of(&self.values(Episode::progress), [0.0, 1.0]),
         }
     }
 
@@ -149,7 +149,10 @@ impl<'a> EpisodesByTask<'a> {
             successes.map(|episode| f64::from(episode.steps) / f64::from(task.expert_steps)).collect::<Vec<_>>()
         });
         let ratios: Vec<Vec<f64>> = ratios.filter(|group| !group.is_empty()).collect();
-        (!ratios.is_empty()).then(|| Mean::of(&ratios))
+        // No episode takes more steps than its horizon.
+        let most = self.groups.iter().filter(|(task, _)| task.expert_steps > 0);
+        let most = most.map(|(task, _)| f64::from(task.horizon) / f64::from(task.expert_steps)).fold(0.0, f64::max);
+        (!ratios.is_empty()).then(|| Mean::of(&ratios, [0.0, most]))
     }
 }
 

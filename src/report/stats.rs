@@ -72,6 +72,20 @@ pub(crate) fn bootstrap_mean(groups: &[Vec<f64>], seed: u64) -> Interval {
     [quantile(&means, 0.025), quantile(&means, 0.975)]
 }
 
+/// [`bootstrap_mean`] of values within `bounds`. Where it has no width, as of one task or of values that are all alike, it says
+/// nothing of what was not seen: then as many tasks as Wilson's interval allows, of none among so many, may lie anywhere within
+/// the bounds. For a rate of 0 or 1 that is Wilson's interval; of nothing, it is the bounds.
+pub(crate) fn bounded_mean(groups: &[Vec<f64>], bounds: Interval, seed: u64) -> Interval {
+    let [low, high] = bootstrap_mean(groups, seed);
+    if high - low > 1e-9 {
+        return [low, high];
+    }
+    let tasks = groups.iter().filter(|group| !group.is_empty()).count();
+    let mean = mean(groups.iter().flatten().copied());
+    let [_, unseen] = wilson(0, tasks);
+    [mean - unseen * (mean - bounds[0]).max(0.0), mean + unseen * (bounds[1] - mean).max(0.0)]
+}
+
 /// McNemar's exact test, two-sided: how likely so uneven a split of the pairs that differ is when neither side is better.
 pub(crate) fn mcnemar(only_first: usize, only_second: usize) -> f64 {
     let (n, fewer) = (only_first + only_second, only_first.min(only_second));
@@ -153,6 +167,24 @@ mod tests {
     fn the_bootstrap_of_equal_values_is_that_value() {
         assert_eq!(bootstrap_mean(&[vec![2.5], vec![2.5], vec![2.5, 2.5]], 1), [2.5, 2.5]);
         assert_eq!(bootstrap_mean(&[], 1), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn an_interval_of_one_task_or_of_values_that_are_all_alike_has_a_width() {
+        let bounded = |groups: &[Vec<f64>], bounds| bounded_mean(groups, bounds, 1);
+        for tasks in [1, 2, 20, 500] {
+            for rate in [0.0, 1.0] {
+                let found = bounded(&vec![vec![rate]; tasks], [0.0, 1.0]);
+                assert!(close(found, wilson(tasks * rate as usize, tasks), 1e-12), "{found:?}");
+            }
+            let [low, high] = bounded(&vec![vec![0.0]; tasks], [-1.0, 1.0]);
+            assert!(low < 0.0 && (low + high).abs() < 1e-12, "{low} {high}");
+        }
+        let [low, high] = bounded(&[vec![2.0, 1.0, 3.0]], [0.0, 4.0]);
+        assert!(low < 1.0 && high > 3.0, "the seeds of one task say nothing of others: {low} {high}");
+        assert_eq!(bounded(&[], [0.0, 3.0]), [0.0, 3.0]);
+        let many: Vec<_> = (0..40).map(|i| vec![f64::from(i % 2)]).collect();
+        assert_eq!(bounded(&many, [0.0, 1.0]), bootstrap_mean(&many, 1));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::estimates::{BOOTSTRAP_SEED, Mean, SkillRate};
+use super::estimates::{Mean, SkillRate, interval_method};
 use super::groups;
 use super::groups::{EpisodesByTask, ErroredEpisode, FailureCount, GroupFigures, StartSubtaskFigures};
 use super::stats;
@@ -112,7 +112,9 @@ impl RunSummary {
             lengths.iter().map(|&length| (length, stats::mean(of_length(length)))).collect()
         };
         let count = |length| all.iter().filter(|(_, episode)| episode.of == length).count();
-        let interval = |length: u32| Mean::of(&plain.filter(|e| e.of == length).values(Episode::progress)).interval;
+        let interval =
+            |length: u32| Mean::of(&plain.filter(|e| e.of == length).values(Episode::progress), [0.0, 1.0]).interval;
+        let longest = lengths.last().copied().map_or(0.0, f64::from);
         RunSummary {
             format_version: RunSummary::FORMAT,
             task_set: manifest.task_set.clone(),
@@ -125,8 +127,8 @@ impl RunSummary {
             errors: every.iter().iter().filter(|(_, episode)| episode.error.is_some()).count(),
             success: stats::mean(all.iter().map(|(_, episode)| episode.succeeded())),
             success_interval: stats::wilson_of_groups(&plain.values(Episode::succeeded)),
-            completed_subtasks: Mean::of(&plain.values(|episode| f64::from(episode.completed))),
-            progress: Mean::of(&plain.values(Episode::progress)),
+            completed_subtasks: Mean::of(&plain.values(|episode| f64::from(episode.completed)), [0.0, longest]),
+            progress: Mean::of(&plain.values(Episode::progress), [0.0, 1.0]),
             progress_by_length: by_length(Episode::progress),
             progress_interval_by_length: lengths.iter().map(|&length| (length, interval(length))).collect(),
             success_by_length: by_length(Episode::succeeded),
@@ -157,10 +159,7 @@ impl RunSummary {
                         "Wilson score, 95 %, over the effective number of episodes: a task's seeds are alike".into()
                     }
                 },
-                means: format!(
-                    "percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}",
-                    stats::RESAMPLES
-                ),
+                means: interval_method(),
             },
         }
     }
