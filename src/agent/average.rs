@@ -8,6 +8,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
 use super::config::CheckpointConfig;
+use crate::nets::size_differences::size_differences;
 
 /// The mean of checkpoints' policies, each as often as it is named; visual encoder, critic and configuration are the first one's.
 ///
@@ -62,7 +63,12 @@ fn load(folder: &Path, device: Device) -> anyhow::Result<(CheckpointConfig, Netw
 fn same(folder: &Path, found: &CheckpointConfig, first: &CheckpointConfig) -> anyhow::Result<()> {
     let file = folder.join("config.json");
     let (own, others) = (&first.policy, &found.policy);
-    ensure!(others.fits(own), "{}: policy is {others:?}, the first one's is {own:?}", file.display());
+    ensure!(
+        others.fits(own),
+        "{}: its policy is of another size than the first one's: {}",
+        file.display(),
+        size_differences(others, own)
+    );
     ensure!(found.vocabulary == first.vocabulary, "{}: vocabulary is not the first one's", file.display());
     let (own, others) = (&first.sentence_encoder, &found.sentence_encoder);
     ensure!(own == others, "{}: sentence_encoder is {}, the first one's is {}", file.display(), others.name, own.name);
@@ -129,7 +135,9 @@ mod tests {
         let one = checkpoint(1.0, 0.5, |_| ());
         let error = |other: tempfile::TempDir| format!("{:#}", of(&[&one, &other]).unwrap_err());
         assert!(error(checkpoint(1.0, 0.6, |_| ())).contains("another visual encoder"));
-        assert!(error(checkpoint(1.0, 0.5, |config| config.policy.hidden = vec![3])).contains("policy is"));
+        let told = error(checkpoint(1.0, 0.5, |config| config.policy.hidden = vec![3]));
+        assert!(told.contains("its policy is of another size") && told.contains("hidden: 3, not 8"), "{told}");
+        assert!(!told.contains('{') && !told.contains('['), "in words: {told}");
         let strange = |config: &mut CheckpointConfig| config.sentence_encoder.digest = "0".into();
         assert!(error(checkpoint(1.0, 0.5, strange)).contains("sentence_encoder is"));
     }

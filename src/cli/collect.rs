@@ -14,6 +14,7 @@ use super::value_names;
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::house::expert::TurnTiming;
+use crate::language::count::counted;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -90,9 +91,9 @@ impl Collect {
         progress.end();
         let at = collection.out.display();
         say(&format!(
-            "{}{} demonstrations in {at}",
+            "{}{} in {at}",
             if collected.stopped { "stopped; the first " } else { "" },
-            collected.trajectories
+            counted(collected.trajectories, "demonstration")
         ));
         if collected.stopped {
             return Ok(ExitStatus::Interrupted);

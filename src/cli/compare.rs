@@ -9,6 +9,7 @@ use super::exit_status::ExitStatus;
 use super::streams;
 use super::streams::say;
 use crate::data::json;
+use crate::language::count::counted;
 use crate::report::compare::Comparison;
 use crate::report::threshold::Threshold;
 use crate::run_dir::reader::RecordedRun;
@@ -53,7 +54,7 @@ impl CompareArgs {
         out.flush()?;
         let mut status = ExitStatus::Ok;
         if let Some(most) = self.max_regressions.filter(|&most| comparison.regressions() > most) {
-            say(&format!("{} regressions, at most {most} are allowed", comparison.regressions()));
+            say(&format!("{}, at most {most} allowed", counted(comparison.regressions(), "regression")));
             status = ExitStatus::BelowThreshold;
         }
         let last = summaries.last();

@@ -11,6 +11,7 @@ use super::streams::say;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::CheckpointConfig;
 use crate::data::Dataset;
+use crate::language::count::counted;
 use crate::nets::device::best_device;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::resnet18::ResNet18;
@@ -58,7 +59,7 @@ impl Encode {
         };
         let size = (features.len() as f64 * features.width() as f64) / 1e9;
         let seconds = begun.elapsed().as_secs_f64();
-        say(&format!("{} frames, {size:.2} GB of features, in {seconds:.0} s", features.len()));
+        say(&format!("{}, {size:.2} GB of features, in {seconds:.0} s", counted(features.len(), "frame")));
         Ok(ExitStatus::Ok)
     }
 }

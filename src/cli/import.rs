@@ -9,6 +9,7 @@ use super::exit_status::ExitStatus;
 use super::progress;
 use super::streams::say;
 use crate::data::alfred::{self, ImportProgress};
+use crate::language::count::counted;
 
 /// Makes a dataset folder.
 #[derive(Args)]
@@ -71,22 +72,23 @@ impl Alfred {
         }
         for (split, counts) in &manifest.counts {
             say(&format!(
-                "{split}: {} trajectories, {} annotated skills ({} aligned), {} longer spans ({} to train on)",
-                counts.trajectories,
-                counts.annotated_primitives,
+                "{split}: {}, {} ({} aligned), {} ({} to train on)",
+                counted(counts.trajectories, "trajectory"),
+                counted(counts.annotated_primitives, "annotated skill"),
                 counts.aligned_primitives,
-                counts.spans,
+                counted(counts.spans, "longer span"),
                 counts.spans_after_holdout
             ));
         }
         for set in &summary.sets {
             match &set.tasks {
-                Ok(tasks) => say(&format!("{}: {tasks} tasks", set.name)),
+                Ok(tasks) => say(&format!("{}: {}", set.name, counted(*tasks, "task"))),
                 Err(reason) => say(&format!("{}: left out: {reason}", set.name)),
             }
         }
         let skipped = manifest.skipped.len();
-        say(&format!("{} scenes in {}; {skipped} files skipped", manifest.scenes, self.out.display()));
+        let (scenes, files) = (counted(manifest.scenes, "scene"), counted(skipped, "file"));
+        say(&format!("{scenes} in {}; {files} skipped", self.out.display()));
         Ok(if skipped == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
 }

@@ -18,6 +18,14 @@ pub(crate) struct Progress {
     /// Where the stage was when it began: a resumed one does not begin at 0.
     first: u64,
     last_line: Instant,
+    /// The bar tells the time that is left.
+    timed: bool,
+}
+
+/// A bar's parts, with what is said of the time.
+fn style(left: &str) -> ProgressStyle {
+    let template = format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}}{left} {{msg}}");
+    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 /// The time between two lines without a terminal.
@@ -27,7 +35,15 @@ impl Progress {
     /// Shows nothing until the first [`Progress::show`].
     pub(crate) fn new() -> Progress {
         let (terminal, now) = (std::io::stderr().is_terminal(), Instant::now());
-        Progress { terminal, stage: String::new(), bar: ProgressBar::hidden(), began: now, first: 0, last_line: now }
+        Progress {
+            terminal,
+            stage: String::new(),
+            bar: ProgressBar::hidden(),
+            began: now,
+            first: 0,
+            last_line: now,
+            timed: false,
+        }
     }
 
     /// `done` of `total` of a stage; `message` is empty where there is nothing new to say.
@@ -36,6 +52,11 @@ impl Progress {
             self.begin(stage, done);
         }
         if self.terminal {
+            // Before anything is done nobody knows how long the rest takes.
+            if !self.timed && done > self.first {
+                self.timed = true;
+                self.bar.set_style(style(" {eta} left"));
+            }
             self.bar.set_length(total);
             self.bar.set_position(done);
             if !message.is_empty() {
@@ -57,8 +78,8 @@ impl Progress {
         self.began = Instant::now();
         self.last_line = self.began;
         if self.terminal {
-            let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {eta} left {msg}");
-            self.bar = ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            self.timed = false;
+            self.bar = ProgressBar::new(0).with_style(style(""));
             self.bar.set_prefix(stage.to_string());
         }
     }
@@ -66,8 +87,11 @@ impl Progress {
     fn line(&mut self, done: u64, total: u64, message: &str) {
         self.last_line = Instant::now();
         let rate = self.began.elapsed().as_secs_f64() / done.saturating_sub(self.first).max(1) as f64;
-        let left = rate * total.saturating_sub(done) as f64;
-        say(format!("{} {done}/{total}  {left:.0} s left  {message}", self.stage).trim_end());
+        let left = match done > self.first {
+            true => format!("  {:.0} s left", rate * total.saturating_sub(done) as f64),
+            false => String::new(),
+        };
+        say(format!("{} {done}/{total}{left}  {message}", self.stage).trim_end());
     }
 }
 

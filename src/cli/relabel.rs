@@ -8,6 +8,7 @@ use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::stop;
 use super::streams::say;
+use crate::language::count::counted;
 use crate::language::passage::{Concatenation, Summarizer};
 use crate::language::rules::Rules;
 use crate::train::relabel::relabel;
@@ -50,11 +51,11 @@ impl Relabel {
         }
         let (source, version) = (summarizer.source(), summarizer.version());
         say(&format!(
-            "{}: {} spans, {} labelled before, {} texts written by {source} {version}",
+            "{}: {}, {} labelled before, {} written by {source} {version}",
             self.data.join("labels.jsonl").display(),
-            found.spans,
+            counted(found.spans, "span"),
             found.known,
-            found.asked
+            counted(found.asked, "text")
         ));
         Ok(ExitStatus::Ok)
     }

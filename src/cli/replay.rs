@@ -12,6 +12,7 @@ use super::streams;
 use super::streams::say;
 use crate::data::Dataset;
 use crate::eval::replay::{MissCount, ReplayOptions, ReplayReport, replay};
+use crate::language::count::counted;
 
 /// How many failures of each kind are listed.
 const LISTED: usize = 500;
@@ -102,7 +103,7 @@ fn print(report: &ReplayReport, out: &mut impl Write) -> std::io::Result<()> {
         }
     }
     for (name, set) in &report.task_sets {
-        writeln!(out, "{name:<20}{} tasks, {} by class, {} strict", set.tasks, set.class, set.strict)?;
+        writeln!(out, "{name:<20}{}, {} by class, {} strict", counted(set.tasks, "task"), set.class, set.strict)?;
     }
     if let Some(boxes) = &report.boxes {
         writeln!(

@@ -22,6 +22,7 @@ use crate::eval::tasks::check;
 use crate::eval::tasks::sample;
 use crate::eval::tasks::sample::{Phrasing, SampleSpec};
 use crate::house::grading::{Grading, describe};
+use crate::language::count::counted;
 
 /// Samples, checks and shows task sets.
 #[derive(Args)]
@@ -178,15 +179,22 @@ impl CheckArgs {
             &mut |episode| {
                 if !episode.success {
                     unsolved += 1;
-                    let why = episode.error.unwrap_or_else(|| format!("not done after {} steps", episode.steps));
+                    let why =
+                        episode.error.unwrap_or_else(|| format!("not done after {}", counted(episode.steps, "step")));
                     let (done, of) = (episode.completed, episode.of);
-                    writeln!(out, "{}: the expert completes {done} of {of} subtasks: {why}", episode.task)?;
+                    writeln!(
+                        out,
+                        "{}: the expert completes {done} of {}: {why}",
+                        episode.task,
+                        counted(of, "subtask")
+                    )?;
                 }
                 Ok(())
             },
         )?;
         let count = set.value.tasks.len();
-        writeln!(out, "{}: {count} tasks, {} solved by the expert", self.file.display(), count - unsolved)?;
+        let (file, tasks) = (self.file.display(), counted(count, "task"));
+        writeln!(out, "{file}: {tasks}, {} solved by the expert", count - unsolved)?;
         Ok(if unsolved == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
     }
 }
@@ -230,17 +238,17 @@ fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()
     };
     writeln!(out, "steps        the expert takes {expert}, the episode ends after {}", task.horizon)?;
     if let Some((trajectory, first)) = &task.source {
-        writeln!(out, "cut from     {trajectory}, from skill {first}")?;
+        writeln!(out, "cut from     {trajectory}, from skill {}", first + 1)?;
     }
-    for (i, subtask) in task.subtasks.iter().enumerate() {
+    for (i, (subtask, number)) in task.subtasks.iter().zip(1..).enumerate() {
         let sentence = task.sentences.get(i).map(|sentence| format!("   \"{sentence}\"")).unwrap_or_default();
-        writeln!(out, "subtask {i:<4} {}{sentence}", describe(&task.roles, subtask))?;
+        writeln!(out, "subtask {number:<4} {}{sentence}", describe(&task.roles, subtask))?;
     }
     if task.subtasks.is_empty() {
         match read_instruction(task, &setting) {
             Ok(wish) => {
-                for (i, words) in wish.subtasks_in_words().iter().enumerate() {
-                    writeln!(out, "subtask {i:<4} {words}   (as the instruction is read)")?;
+                for (number, words) in (1..).zip(wish.subtasks_in_words()) {
+                    writeln!(out, "subtask {number:<4} {words}   (as the instruction is read)")?;
                 }
             }
             Err(problem) => writeln!(out, "subtasks     {problem}")?,

@@ -11,6 +11,7 @@ use super::{jobs, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
 use crate::eval::verify::{Difference, Mismatch, verify};
+use crate::language::count::counted;
 use crate::run_dir::reader::RecordedRun;
 
 /// Which run.
@@ -57,7 +58,8 @@ impl Verify {
             writeln!(out, "{}", serde_json::to_string(&verdict)?)?;
         } else {
             let (steps, choices) = (verdict.steps, verdict.choices);
-            writeln!(out, "{} episodes, {steps} steps the same, {choices} of them chosen again", verdict.episodes)?;
+            let (episodes, steps) = (counted(verdict.episodes, "episode"), counted(steps, "step"));
+            writeln!(out, "{episodes}, {steps} the same, {choices} of them chosen again")?;
             for policy in &verdict.missing {
                 writeln!(out, "{policy:?} is not at hand: only what its actions came to was compared")?;
             }

@@ -209,11 +209,17 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
         anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
     }
     if options.grading == Grading::Strict {
-        let unrecorded = |task: &Task| task.subtasks.iter().position(|subtask| subtask.literal.is_none());
-        if let Some((i, j)) = tasks.iter().enumerate().find_map(|(i, task)| Some((i, unrecorded(task)?))) {
+        let is_unrecorded = |task: &&Task| task.subtasks.iter().any(|subtask| subtask.literal.is_none());
+        let unrecorded: Vec<&Task> = tasks.iter().filter(is_unrecorded).collect();
+        if let Some(first) = unrecorded.first() {
+            let which = match unrecorded.len() {
+                1 => format!("the task {:?} is not", first.id),
+                many if many == tasks.len() => format!("none of the {many} is ({:?} is the first)", first.id),
+                many => format!("{many} of {} are not ({:?} is the first)", tasks.len(), first.id),
+            };
             anyhow::bail!(
-                "tasks[{i}].subtasks[{j}].literal: missing, so the task {:?} has no recording for the strict grader; use --grader class",
-                tasks[i].id
+                "strict grading needs tasks that were cut from recorded demonstrations (their subtasks[].literal), and \
+                 {which}: use --grader class, or tasks of an imported dataset"
             );
         }
     }
@@ -433,6 +439,17 @@ pub(crate) mod tests {
         assert_eq!(one.lines, four.lines);
         assert_eq!(one.summary, four.summary);
         assert_ne!(one.lines.lines().next(), one.lines.lines().nth(1), "seeds differ");
+    }
+
+    #[test]
+    fn strict_grading_of_tasks_without_recordings_is_refused_in_words() {
+        let (folder, set) = tasks();
+        let scenes = Scenes::of(&folder.path().join("tasks.json"), &set.value);
+        let strict = Options::plain(Grading::Strict);
+        let error = Evaluation::prepare(&set, scenes, strict, "walker", None).err().unwrap().to_string();
+        for part in ["strict grading needs", "recorded demonstrations", "none of the 3", "--grader class"] {
+            assert!(error.contains(part), "{part} in {error}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Instructions: how they are read, and the grammar in which the program itself asks for things.
 
+pub(crate) mod count;
 pub(crate) mod grammar;
 pub(crate) mod instruction;
 pub(crate) mod nouns;

@@ -15,6 +15,7 @@ pub(crate) mod precision;
 pub(crate) mod resize;
 pub mod resnet18;
 pub mod sentence;
+pub(crate) mod size_differences;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod trunk;

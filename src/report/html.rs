@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::charts::drawing::escape;
 use super::charts::progress_by_length;
+use super::shell_word::shell_word;
 use super::summary::RunSummary;
 use crate::domain::Task;
 use crate::episode::record::{Episode, TraceStep};
@@ -55,7 +56,7 @@ pub(crate) fn run_page(run: &RecordedRun, summary: &RunSummary, frames: usize) -
             "error": episode.error,
             "wishes": episode.wishes.iter().map(wish_row).collect::<Vec<_>>(),
             "subtasks": task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect::<Vec<_>>(),
-            "open": format!("sprint open {}#{}", run.path.display(), number + 1),
+            "open": format!("sprint open {}", shell_word(&format!("{}#{}", run.path.display(), number + 1))),
             "frames": frames_of(run, task, episode, frames)?,
         }))
     };

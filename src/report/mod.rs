@@ -8,6 +8,7 @@ pub(crate) mod groups;
 pub(crate) mod html;
 pub(crate) mod markdown_table;
 pub(crate) mod pixmap;
+pub(crate) mod shell_word;
 pub(crate) mod stats;
 pub(crate) mod summary;
 pub(crate) mod summary_files;

@@ -9,6 +9,7 @@ use crate::data::{json, json_positions, schema, taskset, text_file};
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::read_instruction;
+use crate::language::count::counted;
 
 /// A mistake in a task file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -128,7 +129,7 @@ fn meaning(path: &Path, document: &Value, found: &mut Vec<(String, String)>) {
 /// When there are any.
 pub(crate) fn none(mistakes: &[Mistake], path: &Path) -> anyhow::Result<()> {
     let count = mistakes.len();
-    (count == 0).then_some(()).with_context(|| format!("{}: {count} mistakes", path.display()))
+    (count == 0).then_some(()).with_context(|| format!("{}: {}", path.display(), counted(count, "mistake")))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::EndedBy;
+use crate::language::count::counted;
 
 /// What came of verifying.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -99,5 +100,6 @@ impl Mismatch {
 fn counts(episode: &Episode) -> String {
     let own =
         episode.agent_end.map_or(String::new(), |held| format!(", ended by the agent with everything held {held}"));
-    format!("{} subtasks, {} steps, success {}{own}", episode.completed, episode.steps, episode.success)
+    let (completed, steps) = (counted(episode.completed, "subtask"), counted(episode.steps, "step"));
+    format!("{completed}, {steps}, success {}{own}", episode.success)
 }

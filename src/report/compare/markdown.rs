@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::paired::{OutcomeChange, PairedComparison, PairedDifference};
 use super::{Comparison, RunFigures};
+use crate::language::count::counted;
 use crate::report::markdown_table::{aligned_table, between, percent, table};
 
 impl Comparison {
@@ -103,14 +104,15 @@ impl PairedComparison {
         ];
         let lost = match (self.unpaired, self.start_mismatches) {
             (0, _) => String::new(),
+            (1, 0) => " 1 episode has no counterpart and is left out.".into(),
             (n, 0) => format!(" {n} episodes have no counterpart and are left out."),
             (n, m) => format!(" {n} episodes have no counterpart and are left out, {m} of them for another start."),
         };
         let mut text = format!(
-            "## {} against {}\n\n{} pairs of episodes (same task, seed and start).{lost}\n\n{}\n",
+            "## {} against {}\n\n{} of episodes (same task, seed and start).{lost}\n\n{}\n",
             label(&self.second),
             label(&self.first),
-            self.pairs,
+            counted(self.pairs, "pair"),
             table(["measure", "first", "second", "difference", "95 % interval"], rows)
         );
         text += &format!(

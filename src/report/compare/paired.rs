@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::episode::record::{Episode, EpisodeKey};
-use crate::report::estimates::BOOTSTRAP_SEED;
+use crate::report::estimates::{BOOTSTRAP_SEED, interval_method};
+use crate::report::shell_word::shell_word;
 use crate::report::stats;
 use crate::report::stats::Interval;
 use crate::run_dir::reader::RecordedRun;
@@ -21,7 +22,7 @@ pub(crate) struct PairedDifference {
     pub(crate) second: f64,
     /// `second` less `first`.
     pub(crate) difference: f64,
-    /// The 95 % interval of the difference: paired bootstrap over tasks.
+    /// The 95 % interval of the difference: paired bootstrap over tasks, or, where that has no width, a bound.
     pub(crate) interval: Interval,
 }
 
@@ -119,8 +120,8 @@ impl PairedComparison {
                 seed: a.seed,
                 instruction: b.instruction.clone(),
                 completed: [a.completed, b.completed, b.of],
-                open_first: format!("sprint open {}", first.reference(&a.key())?),
-                open_second: format!("sprint open {}", second.reference(&b.key())?),
+                open_first: format!("sprint open {}", shell_word(&first.reference(&a.key())?)),
+                open_second: format!("sprint open {}", shell_word(&second.reference(&b.key())?)),
             })
         };
         let only = |wanted: bool| -> anyhow::Result<Vec<OutcomeChange>> {
@@ -132,6 +133,7 @@ impl PairedComparison {
             let lean = |group: &[_]| solved(|(a, _)| a.success, group).cmp(&solved(|(_, b)| b.success, group));
             groups.iter().filter(|group| lean(group) == toward).count()
         };
+        let longest = all.iter().map(|(episode, _)| episode.of).max().map_or(0.0, f64::from);
         let discordant_tasks = [discordant_tasks(Ordering::Greater), discordant_tasks(Ordering::Less)];
         Ok(PairedComparison {
             first: first.path.display().to_string(),
@@ -139,28 +141,28 @@ impl PairedComparison {
             pairs: all.len(),
             unpaired,
             start_mismatches,
-            success: difference(&groups, Episode::succeeded),
-            completed_subtasks: difference(&groups, |episode| f64::from(episode.completed)),
-            progress: difference(&groups, Episode::progress),
+            success: difference(&groups, Episode::succeeded, 1.0),
+            completed_subtasks: difference(&groups, |episode| f64::from(episode.completed), longest),
+            progress: difference(&groups, Episode::progress, 1.0),
             discordant_tasks,
             mcnemar_p: stats::mcnemar(discordant_tasks[0], discordant_tasks[1]),
             regressions,
             fixes,
             methods: format!(
-                "differences by paired percentile bootstrap over tasks, 95 %, {} resamples, seed {BOOTSTRAP_SEED}; \
-                 success by McNemar's exact test over tasks, two-sided",
-                stats::RESAMPLES
+                "differences by paired {}; success by McNemar's exact test over tasks, two-sided",
+                interval_method()
             ),
         })
     }
 }
 
-fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64) -> PairedDifference {
+/// The difference of a value that is 0 to `most`.
+fn difference(groups: &[Vec<(&Episode, &Episode)>], value: fn(&Episode) -> f64, most: f64) -> PairedDifference {
     let first = stats::mean(groups.iter().flatten().map(|(a, _)| value(a)));
     let second = stats::mean(groups.iter().flatten().map(|(_, b)| value(b)));
     let differences: Vec<Vec<f64>> =
         groups.iter().map(|group| group.iter().map(|(a, b)| value(b) - value(a)).collect()).collect();
-    let interval = stats::bootstrap_mean(&differences, BOOTSTRAP_SEED);
+    let interval = stats::bounded_mean(&differences, [-most, most], BOOTSTRAP_SEED);
     PairedDifference { first, second, difference: second - first, interval }
 }
 
@@ -201,6 +203,8 @@ pub(crate) mod tests {
         assert_eq!(paired.regressions.len(), 1);
         assert_eq!(paired.regressions[0].seed, 1);
         assert_eq!(paired.regressions[0].open_second, "sprint open runs/b#2");
+        let spaced = PairedComparison::of(&a, &run("my runs/b", &[true, false, true, false])).unwrap();
+        assert_eq!(spaced.regressions[0].open_second, "sprint open 'my runs/b#2'");
         assert_eq!(paired.fixes[0].completed, [1, 2, 2]);
         assert_eq!(paired.mcnemar_p, 1.0);
         assert_eq!(paired.success.difference, 0.0);
@@ -237,7 +241,10 @@ pub(crate) mod tests {
     fn a_run_against_itself_differs_in_nothing() {
         let a = run("a", &[true, false, true]);
         let paired = PairedComparison::of(&a, &a).unwrap();
-        assert_eq!((paired.success.difference, paired.success.interval), (0.0, [0.0, 0.0]));
+        assert_eq!(paired.success.difference, 0.0);
+        // One task says little of others: on them the runs may differ either way.
+        let [low, high] = paired.success.interval;
+        assert!(low < -0.5 && low == -high, "{low} to {high}");
         assert!(paired.regressions.is_empty() && paired.fixes.is_empty());
     }
 }

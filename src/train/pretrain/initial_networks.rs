@@ -9,6 +9,7 @@ use super::checkpoint_config::sentence_encoder;
 use super::spec::Pretraining;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::CheckpointConfig;
+use crate::nets::size_differences::size_differences;
 use crate::nets::visual_encoder::VisualEncoder;
 use crate::nets::weights;
 use crate::train::preset::VisualBackbone;
@@ -59,7 +60,12 @@ fn copy_policy(spec: &Pretraining, folder: &Path, networks: &Networks) -> anyhow
     let (config, given) = load_of_same_sentences(spec, folder)?;
     let (found, own) = (&config.policy, &spec.preset.policy);
     let file = folder.join("config.json");
-    anyhow::ensure!(found.fits(own), "{}: policy is {found:?}, the preset's is {own:?}", file.display());
+    anyhow::ensure!(
+        found.fits(own),
+        "{}: policy is of another size than the preset's: {}",
+        file.display(),
+        size_differences(found, own)
+    );
     copy(&given.policy_store, &networks.policy_store)
 }
 
@@ -69,7 +75,12 @@ fn copy_critic(spec: &Pretraining, folder: &Path, networks: &Networks) -> anyhow
     let found =
         CheckpointConfig::read(folder)?.critic.with_context(|| format!("{}: there is no critic", file.display()))?;
     let given = load_of_same_sentences(spec, folder)?.1;
-    anyhow::ensure!(found.fits(own), "{}: critic is {found:?}, the preset's is {own:?}", file.display());
+    anyhow::ensure!(
+        found.fits(own),
+        "{}: critic is of another size than the preset's: {}",
+        file.display(),
+        size_differences(&found, own)
+    );
     match (&given.critic, &networks.critic) {
         (Some(given), Some(own)) => copy(&given.online_store, &own.online_store),
         _ => Ok(()),
@@ -98,7 +109,12 @@ fn load(spec: &Pretraining, folder: &Path) -> anyhow::Result<(CheckpointConfig, 
     let config = CheckpointConfig::read(folder)?;
     let file = folder.join("config.json");
     let (found, own) = (config.visual_encoder.as_ref(), spec.visual_spec());
-    anyhow::ensure!(found == own, "{}: visual_encoder is {found:?}, the preset's is {own:?}", file.display());
+    anyhow::ensure!(
+        found == own,
+        "{}: visual_encoder is of another size than the preset's: {}",
+        file.display(),
+        size_differences(&found, &own)
+    );
     let networks = Networks::load(folder, &config, spec.device)?;
     Ok((config, networks))
 }
