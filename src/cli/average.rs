@@ -11,6 +11,7 @@ use super::progress::Progress;
 use super::validate::validate;
 use crate::agent::average::average;
 use crate::data::ensure_free;
+use crate::data::folder_lock::FolderLock;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -60,7 +61,8 @@ impl Average {
         }
         let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
         config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
-        std::fs::create_dir_all(&self.out).with_context(|| format!("cannot make {}", self.out.display()))?;
+        let _lock = FolderLock::take(&self.out)?;
+        ensure_free::check(&self.out)?;
         networks.save(&self.out, &config)?;
         let tasks = self.validate as usize;
         let swaps = if config.policy.goal_channels.is_some() { 0 } else { tasks / 2 };

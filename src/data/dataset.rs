@@ -9,6 +9,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::folder_lock::FolderLock;
 use super::{atomic_file, json, taskset, text_file};
 use crate::domain::{Scene, TaskSet, Trajectory};
 use crate::house::validate;
@@ -198,7 +199,7 @@ pub fn read_scene(folder: &Path, name: &str) -> anyhow::Result<Scene> {
 
 /// Writes a dataset folder. `dataset.json` comes last: a folder without it is not a dataset.
 pub(crate) struct DatasetWriter {
-    folder: PathBuf,
+    folder: FolderLock,
     trajectories: zstd::Encoder<'static, tempfile::NamedTempFile>,
 }
 
@@ -206,8 +207,17 @@ impl DatasetWriter {
     /// Starts a dataset in `folder`, which is made when absent. An earlier dataset there is replaced.
     ///
     /// # Errors
-    /// When the folder cannot be made or written.
+    /// When the folder cannot be made or written, or another process writes it.
     pub(crate) fn new(folder: &Path) -> anyhow::Result<DatasetWriter> {
+        DatasetWriter::into_folder(FolderLock::take(folder)?)
+    }
+
+    /// The same in a folder that was taken before.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn into_folder(taken: FolderLock) -> anyhow::Result<DatasetWriter> {
+        let folder = taken.folder();
         for part in ["scenes", "tasks"] {
             let part = folder.join(part);
             std::fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
@@ -217,7 +227,8 @@ impl DatasetWriter {
             std::fs::remove_file(&old).with_context(|| old.display().to_string())?;
         }
         let file = atomic_file::begin(&folder.join(TRAJECTORIES)).with_context(|| folder.display().to_string())?;
-        Ok(DatasetWriter { folder: folder.to_owned(), trajectories: zstd::Encoder::new(file, 6)? })
+        let trajectories = zstd::Encoder::new(file, 6)?;
+        Ok(DatasetWriter { folder: taken, trajectories })
     }
 
     /// Writes a scene.
@@ -225,7 +236,7 @@ impl DatasetWriter {
     /// # Errors
     /// When the file cannot be written.
     pub(crate) fn scene(&self, scene: &Scene) -> anyhow::Result<()> {
-        json::write(&self.folder.join("scenes").join(format!("{}.json", scene.name)), scene)
+        json::write(&self.folder.folder().join("scenes").join(format!("{}.json", scene.name)), scene)
     }
 
     /// Appends a trajectory.
@@ -243,7 +254,7 @@ impl DatasetWriter {
     /// # Errors
     /// When the file cannot be written.
     pub(crate) fn tasks(&self, file: &str, set: &TaskSet) -> anyhow::Result<()> {
-        json::write(&self.folder.join("tasks").join(format!("{file}.json")), set)
+        json::write(&self.folder.folder().join("tasks").join(format!("{file}.json")), set)
     }
 
     /// Completes the dataset.
@@ -251,10 +262,11 @@ impl DatasetWriter {
     /// # Errors
     /// When a file cannot be written.
     pub(crate) fn finish(self, manifest: &DatasetManifest) -> anyhow::Result<()> {
-        let path = self.folder.join(TRAJECTORIES);
+        let folder = self.folder.folder();
+        let path = folder.join(TRAJECTORIES);
         let file = self.trajectories.finish()?;
         atomic_file::keep(file, &path).with_context(|| path.display().to_string())?;
-        json::write(&self.folder.join("dataset.json"), manifest)
+        json::write(&folder.join("dataset.json"), manifest)
     }
 }
 
@@ -317,6 +329,16 @@ mod tests {
         assert_eq!(*dataset.scene("hall").unwrap(), scene());
         assert_eq!(dataset.scene_names().unwrap(), ["hall"]);
         assert_eq!(dataset.trajectories().unwrap().count(), 0);
+    }
+
+    #[test]
+    fn two_that_write_one_dataset_at_once_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = DatasetWriter::new(folder.path()).unwrap();
+        let told = DatasetWriter::new(folder.path()).err().unwrap().to_string();
+        assert!(told.contains("another process"), "{told}");
+        first.finish(&manifest()).unwrap();
+        assert!(DatasetWriter::new(folder.path()).is_ok());
     }
 
     #[test]

@@ -6,6 +6,7 @@ pub(crate) mod json_positions;
 pub mod alfred;
 pub mod dataset;
 pub mod features;
+pub(crate) mod folder_lock;
 pub mod items;
 pub mod json;
 pub mod schema;

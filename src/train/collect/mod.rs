@@ -24,6 +24,7 @@ use crate::agent::learned::SharedEmbedder;
 use crate::agent::policy_source;
 use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter};
 use crate::data::ensure_free;
+use crate::data::folder_lock::FolderLock;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Trajectory};
 use crate::episode::scenes::Setting;
@@ -67,8 +68,9 @@ impl Collection {
         if let TaskSource::Tasks { tasks, scenes } = &self.tasks {
             scenes.check(tasks)?;
         }
+        let folder = FolderLock::take(&self.out)?;
         ensure_free::check(&self.out)?;
-        let mut writer = DatasetWriter::new(&self.out)?;
+        let mut writer = DatasetWriter::into_folder(folder)?;
         let mut counts = Counts::default();
         let mut scenes = BTreeSet::new();
         let (mut next, mut stopped) = (0u64, false);

@@ -54,7 +54,7 @@ impl MemoryTraining {
         let datasets = self.data.iter().map(|folder| Dataset::open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         let frame_store = FrameStore::open(&datasets)?;
         let digests = datasets.iter().map(Dataset::digest).collect::<anyhow::Result<Vec<_>>>()?;
-        folder.prepare(has_state, &toml::to_string(&self.preset)?, self.preset.format_version)?;
+        let _lock = folder.prepare(has_state, &toml::to_string(&self.preset)?, self.preset.format_version)?;
         let training = folder.training();
         let mut logger = JsonLinesLogger::open(&training.join("progress.jsonl"), logger)?;
         let mut logger = TensorBoard::open(&training, &mut logger)?;

@@ -49,7 +49,7 @@ impl Pretraining {
         let demonstrations = Demonstrations::open(self)?;
         let networks = initial_networks(self)?;
         let evaluation = self.in_training_eval.as_ref().map(InTrainingEval::prepare).transpose()?;
-        folder.prepare(has_state, &toml::to_string(&self.preset)?, self.preset.format_version)?;
+        let _lock = folder.prepare(has_state, &toml::to_string(&self.preset)?, self.preset.format_version)?;
         let mut logger = JsonLinesLogger::open(&self.training_folder().join("progress.jsonl"), logger)?;
         let mut logger = TensorBoard::open(&self.training_folder(), &mut logger)?;
 

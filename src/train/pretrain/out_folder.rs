@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
+use crate::data::folder_lock::FolderLock;
 use crate::data::{atomic_file, ensure_free};
 
 /// A checkpoint's folder with that of its training.
@@ -40,8 +41,11 @@ impl TrainingFolder<'_> {
     }
 
     /// Makes the folder, and keeps the preset there. A training that ended before it saved a state is begun anew: its preset and
-    /// curves are deleted.
-    pub(crate) fn prepare(&self, has_state: bool, preset: &str, format_version: u32) -> anyhow::Result<()> {
+    /// curves are deleted. No other process may train into the folder while what is returned lives.
+    pub(crate) fn prepare(&self, has_state: bool, preset: &str, format_version: u32) -> anyhow::Result<FolderLock> {
+        let lock = FolderLock::take(self.out)?;
+        // Another training may have ended there since it was looked for.
+        anyhow::ensure!(self.has_state()? == has_state, "{} was just written by another process", self.out.display());
         let training = self.training();
         std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
         if !has_state {
@@ -50,7 +54,8 @@ impl TrainingFolder<'_> {
                 std::fs::remove_file(file).with_context(|| file.display().to_string())?;
             }
         }
-        keep_preset(&training.join("preset.toml"), preset, format_version)
+        keep_preset(&training.join("preset.toml"), preset, format_version)?;
+        Ok(lock)
     }
 }
 
