@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
+use super::streams;
 use crate::data::text_file;
 use crate::nets::device::best_device;
 use crate::nets::sentence::{SentenceEncoder, default_folder};
@@ -30,6 +31,9 @@ impl EmbedArgs {
     /// When the encoder cannot be loaded or a line is not UTF-8.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let encoder = SentenceEncoder::load(&self.encoder.unwrap_or_else(default_folder), best_device())?;
+        for settings in encoder.unread_settings() {
+            streams::say(&format!("settings of the sentence encoder that are not read: {settings}"));
+        }
         let mut lines = BufReader::with_capacity(1 << 16, std::io::stdin());
         let mut out = std::io::stdout().lock();
         let mut number = 0;

@@ -26,6 +26,7 @@ pub mod weights;
 
 mod bert;
 mod bounds;
+mod encoder_settings;
 mod encoder_stack;
 mod mpnet;
 mod pooling;

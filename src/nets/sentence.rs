@@ -9,6 +9,7 @@ use tch::{Device, Kind, Tensor};
 use tokenizers::utils::truncation::TruncationDirection;
 use tokenizers::{Encoding, Tokenizer};
 
+use super::encoder_settings::TextSettings;
 use super::home;
 use super::pooling::Pooling;
 use super::transformer::Transformer;
@@ -58,6 +59,7 @@ pub struct SentenceEncoder {
     pooling: Vec<Pooling>,
     normalize: bool,
     lower_case: bool,
+    unread: Vec<String>,
     longest: usize,
     padding: i64,
     width: usize,
@@ -71,15 +73,6 @@ struct Module {
     path: String,
     #[serde(rename = "type")]
     kind: String,
-}
-
-/// `sentence_bert_config.json`.
-#[derive(Default, Deserialize)]
-struct Limits {
-    #[serde(default)]
-    max_seq_length: Option<usize>,
-    #[serde(default)]
-    do_lower_case: bool,
 }
 
 impl SentenceEncoder {
@@ -105,37 +98,50 @@ impl SentenceEncoder {
         let (mut transformer_at, mut pooling_at, mut normalize) = (None, None, false);
         for module in modules {
             match module.kind.rsplit('.').next().unwrap_or_default() {
-                "Transformer" => transformer_at = Some(folder.join(module.path)),
-                "Pooling" => pooling_at = Some(folder.join(module.path).join("config.json")),
+                "Transformer" if transformer_at.is_none() => transformer_at = Some(folder.join(module.path)),
+                "Pooling" if pooling_at.is_none() => pooling_at = Some(folder.join(module.path).join("config.json")),
+                twice @ ("Transformer" | "Pooling") => bail!("{}: {twice} is there twice", path.display()),
                 "Normalize" => normalize = true,
                 _ => bail!("{}: the module type {:?} is not supported", path.display(), module.kind),
             }
         }
         let root = transformer_at.ok_or_else(|| anyhow!("{} names no Transformer module", path.display()))?;
         let pooling_at = pooling_at.ok_or_else(|| anyhow!("{} names no Pooling module", path.display()))?;
-        let pooling = Pooling::read(&take(pooling_at)?.0)?;
+        let pooling_at = take(pooling_at)?.0;
         let config = TransformerConfig::read(&take(root.join("config.json"))?.0)?;
-        let limits = match root.join("sentence_bert_config.json") {
-            path if path.exists() => {
-                let (path, bytes) = take(path)?;
-                parse(&path, &bytes)?
-            }
-            _ => Limits::default(),
-        };
+        let (pooling, unread) = Pooling::read(&pooling_at, config.hidden_size)?;
+        let own = root.join("sentence_bert_config.json");
+        let own = if own.exists() { Some(take(own)?) } else { None };
+        let mut settings = TextSettings::read(folder, &root, own)?;
+        settings.unread.extend(unread.map(|fields| format!("{fields} (of the pooling)")));
         let (path, bytes) = take(root.join("tokenizer.json"))?;
         let tokenizer = tokenizer(&bytes, &config).with_context(|| path.display().to_string())?;
         let (path, bytes) = take(root.join("model.safetensors"))?;
         let transformer = Transformer::build(&config, &path, &bytes, device)?;
         let most = usize::try_from(config.longest()).unwrap_or(0);
-        let longest = limits.max_seq_length.unwrap_or(most).min(most);
-        ensure!(longest >= 3, "{}: texts of {longest} tokens hold no word (max_seq_length)", folder.display());
+        let told = settings.own_limit.unwrap_or(most).min(most);
+        let longest = settings.tokenizer_limit.unwrap_or(told).min(told);
+        ensure!(
+            longest >= 3,
+            "{}: texts of {longest} tokens hold no word (max_seq_length or model_max_length)",
+            folder.display()
+        );
+        // Who cuts texts elsewhere embeds them otherwise. The tokenizer's settings are no part of the digest where they change
+        // nothing, so that encoders that trained agents know keep theirs.
+        if longest < told {
+            hash.update(longest.to_le_bytes());
+        }
+        for settings in &settings.unread {
+            tracing::warn!("{}: settings that are not read: {settings}", folder.display());
+        }
         Ok(SentenceEncoder {
             tokenizer,
             transformer,
             width: usize::try_from(config.hidden_size)? * pooling.len(),
             pooling,
             normalize,
-            lower_case: limits.do_lower_case,
+            lower_case: settings.lower_case,
+            unread: settings.unread,
             longest,
             padding: config.padding(),
             digest: format!("{:x}", hash.finalize()),
@@ -156,6 +162,11 @@ impl SentenceEncoder {
     /// Identifies the encoder by the contents of its files: 64 hexadecimal digits.
     pub fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// Settings of its folder that nothing here reads, file by file.
+    pub(crate) fn unread_settings(&self) -> &[String] {
+        &self.unread
     }
 
     /// Counts a text's tokens, and how many of them are too many.
@@ -404,6 +415,20 @@ mod tests {
             &["1_Pooling"],
         );
         check("sentence_bert_config.json", "64", "2", &["max_seq_length"]);
+        let twice = r#""1_Pooling", "type": "sentence_transformers.models.Pooling"}, {"path": "1_Pooling","#;
+        check("modules.json", r#""1_Pooling","#, twice, &["modules.json", "Pooling is there twice"]);
+        let digest = SentenceEncoder::load(folder.path(), Device::Cpu).unwrap().digest().to_owned();
+        let limited = |limit: &str| {
+            let text = format!(r#"{{"model_max_length": {limit}}}"#);
+            std::fs::write(folder.path().join("tokenizer_config.json"), text).unwrap();
+            SentenceEncoder::load(folder.path(), Device::Cpu).unwrap()
+        };
+        for (limit, used) in [("1000000000000000019884624838656", 64), ("512", 64), ("7", 7)] {
+            let encoder = limited(limit);
+            assert_eq!(encoder.tokens(&"put the mug ".repeat(90)).unwrap().used, used, "the smallest limit counts");
+            assert_eq!(encoder.digest() == digest, used == 64, "who cuts texts elsewhere embeds otherwise");
+        }
+        std::fs::remove_file(folder.path().join("tokenizer_config.json")).unwrap();
         std::fs::remove_file(folder.path().join("model.safetensors")).unwrap();
         let error = format!("{:#}", SentenceEncoder::load(folder.path(), Device::Cpu).err().unwrap());
         assert!(error.contains("model.safetensors"), "{error}");
