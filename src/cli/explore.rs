@@ -96,8 +96,9 @@ impl Display {
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
-            plain::run(open()?, input, out)?;
-            return Ok(ExitStatus::Ok);
+            // At a terminal a person has seen what was refused; of a script nobody may have.
+            let obeyed = plain::run(open()?, input, out)? || std::io::stdin().is_terminal();
+            return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");

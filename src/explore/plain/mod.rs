@@ -17,6 +17,7 @@ use super::timeline::BranchPosition;
 use super::verb::{Verb, parse};
 use crate::agent::{Decision, Values};
 use crate::analysis::value_map::ValueMap;
+use crate::data::text_file;
 use crate::domain::Heading;
 use render::{at, compare, divergence, opening, reading, step_line, verdict};
 
@@ -37,6 +38,8 @@ struct Plain<W> {
     heading: Option<Heading>,
     /// How choices are sorted.
     sort: Sort,
+    /// Something that was asked for was not done.
+    refused: bool,
 }
 
 /// Whether what was asked for was done. If not, that was told.
@@ -49,11 +52,11 @@ enum Answer {
 /// How long work in the background is waited for before it is asked whether it still goes on.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// Obeys lines until `quit` or the end of the input.
+/// Obeys lines until `quit` or the end of the input; says whether all of them could be obeyed.
 ///
 /// # Errors
 /// When reading or writing fails.
-pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<()> {
+pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<bool> {
     let (tell, events) = channel();
     let session = Session::on_request(exploration, Arc::new(move |event| drop(tell.send(event))));
     let mut plain = Plain {
@@ -68,6 +71,7 @@ pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write
         map: None,
         heading: None,
         sort: Sort::Probability,
+        refused: false,
     };
     opening(&plain.state()?, &mut plain.out)?;
     plain.session.begin();
@@ -75,7 +79,7 @@ pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write
     plain.out.flush()?;
     for line in input.lines() {
         let line = line?;
-        let line = line.trim();
+        let line = text_file::line(&line).trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
@@ -83,14 +87,18 @@ pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write
             Ok(Verb::Quit) => break,
             Ok(verb) => {
                 if let Err(error) = plain.obey(verb) {
+                    plain.refused = true;
                     writeln!(plain.out, "error: {error:#}")?;
                 }
             }
-            Err(complaint) => writeln!(plain.out, "error: {complaint}")?,
+            Err(complaint) => {
+                plain.refused = true;
+                writeln!(plain.out, "error: {complaint}")?;
+            }
         }
         plain.out.flush()?;
     }
-    Ok(())
+    Ok(!plain.refused)
 }
 
 /// What of the events is written.
@@ -150,11 +158,11 @@ impl<W: Write> Plain<W> {
         let out = &mut self.out;
         match event {
             SessionEvent::Refused(reason) | SessionEvent::Failed(reason) => {
-                *answer = Answer::Refused;
+                (*answer, self.refused) = (Answer::Refused, true);
                 writeln!(out, "error: {reason}")?;
             }
             SessionEvent::AlreadyOver(_) => {
-                *answer = Answer::Refused;
+                (*answer, self.refused) = (Answer::Refused, true);
                 writeln!(out, "error: the wish is over; `instruct` tells the next one, or `back`, `reset`, `next`")?;
             }
             SessionEvent::State(now) => self.state = Some(now),

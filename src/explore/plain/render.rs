@@ -190,14 +190,10 @@ pub(super) fn things(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Res
     for thing in inspect::things(now) {
         let state = if thing.state.is_empty() { String::new() } else { format!(" ({})", thing.state) };
         let seen = if thing.seen { "" } else { ", not in view" };
-        writeln!(
-            out,
-            "{}{state}, {}, {:.1} m{seen}: {}",
-            thing.class.spoken(),
-            thing.place,
-            thing.metres,
-            thing.verdict()
-        )?;
+        // What stands by itself is in no place.
+        let place = if thing.place.is_empty() { String::new() } else { format!(", {}", thing.place) };
+        let (name, metres) = (thing.class.spoken(), thing.metres);
+        writeln!(out, "{name}{state}{place}, {metres:.1} m{seen}: {}", thing.verdict())?;
     }
     Ok(())
 }

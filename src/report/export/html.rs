@@ -61,7 +61,7 @@ li{padding:0 .4rem;cursor:pointer;border-radius:3px}li.now{background:#1c1e22;co
 li.bad{color:#b3261e}li.done{color:#14783c;font-weight:600}li.now.bad,li.now.done{color:#fff}
 input{width:100%}h1{font-size:1.15rem;margin:.2rem 0}p{margin:.2rem 0;color:#555}button{font:inherit;padding:.2rem .9rem}
 @media(prefers-color-scheme:dark){body{background:#17181b;color:#e6e6e6}p{color:#aaa}li.now{background:#e6e6e6;color:#17181b}
-li.bad{color:#ff8a80}li.done{color:#6fdc98}}
+li.bad{color:#ff8a80}li.done{color:#6fdc98}li.now.bad,li.now.done{color:#17181b}}
 </style>
 <h1 id="told"></h1><p id="title"></p>
 <main><div><img id="frame" alt="what the agent sees"><input id="at" type="range" min="0" value="0">

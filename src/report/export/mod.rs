@@ -20,6 +20,9 @@ use crate::episode::frames::FrameSequence;
 /// # Errors
 /// When the ending is none of these, or the file cannot be written.
 pub(crate) fn write(recording: &FrameSequence, at: u32, path: &Path) -> anyhow::Result<u64> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
+    }
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().to_lowercase());
     let bytes = if name.ends_with(".strip.png") {
         strip::draw(recording).png()?
@@ -62,6 +65,8 @@ mod tests {
         }
         let error = write(&recording, 0, &folder.path().join("a.doc")).unwrap_err().to_string();
         assert!(error.contains(".strip.png"), "{error}");
+        let error = write(&recording, 0, &folder.path().join("misspelt/a.gif")).unwrap_err().to_string();
+        assert!(error.contains("there is no folder") && !folder.path().join("misspelt").exists(), "{error}");
     }
 
     #[test]
@@ -70,6 +75,8 @@ mod tests {
         recording.shots[0].told = "</script><b>x</b>".into();
         let page = html::write(&recording).unwrap();
         assert!(!page.contains("http") && !page.contains("</script><b>"), "{}", &page[..400]);
+        let dark = page.split_once("prefers-color-scheme:dark").unwrap().1;
+        assert!(dark.contains("li.now.bad,li.now.done{color:#17181b}"), "the step at hand is dark on light there");
         assert_eq!(page.matches("data:image/png;base64,").count(), recording.shots.len());
     }
 }

@@ -32,7 +32,7 @@ pub(crate) fn draw(recording: &FrameSequence) -> Pixmap {
     let words: Vec<Vec<String>> = shots.iter().map(|shot| wrap(&caption(shot), SIDE)).collect();
     let lines = words.iter().map(Vec::len).max().unwrap_or(1);
     let width = MARGIN + shots.len() * (SIDE + MARGIN);
-    let title = wrap(&recording.told(), width - 2 * MARGIN);
+    let title = wrap(&told(recording), width - 2 * MARGIN);
     let top = MARGIN + title.len() * LINE;
     let mut pixmap = Pixmap::new(width, top + SIDE + MARGIN + lines * LINE + MARGIN / 2, PAPER);
     for (row, line) in title.iter().enumerate() {
@@ -51,6 +51,19 @@ pub(crate) fn draw(recording: &FrameSequence) -> Pixmap {
     pixmap
 }
 
+/// What the agent was told, with the step from which it was told something else.
+fn told(recording: &FrameSequence) -> String {
+    let mut last = recording.told();
+    let mut text = last.clone();
+    for shot in recording.shots.iter().skip(1).filter(|shot| shot.did.is_some()) {
+        if shot.told != last {
+            last.clone_from(&shot.told);
+            text += &format!(" From step {}: {last}", shot.step);
+        }
+    }
+    text
+}
+
 fn caption(shot: &Shot) -> String {
     match (&shot.done, shot.step) {
         (Some(done), step) => format!("{step}: {done}"),
@@ -67,4 +80,20 @@ fn chosen(recording: &FrameSequence) -> Vec<&Shot> {
         return found;
     }
     (0..FEWEST).filter_map(|part| recording.shots.get(part * last / (FEWEST - 1))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::episode::frames::tests::recording;
+
+    #[test]
+    fn a_strip_says_what_was_told_later_too() {
+        let mut recording = recording();
+        assert_eq!(told(&recording), "Put the mug in the sink.");
+        for shot in &mut recording.shots[2..] {
+            shot.told = "Take the fork.".into();
+        }
+        assert_eq!(told(&recording), "Put the mug in the sink. From step 2: Take the fork.");
+    }
 }
