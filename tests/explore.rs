@@ -25,8 +25,7 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
     session.press("?");
     session.see("Keys while you act");
     session.press("?");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
     session.is_restored();
 }
 
@@ -35,7 +34,7 @@ fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
     if encoder_home().is_none() {
         return;
     }
-    let mut session = Session::start(&[]);
+    let mut session = Session::start(&["--room", "kitchen"]);
     session.see("· sprint-memory");
     session.see("running");
     session.press(" M");
@@ -43,8 +42,7 @@ fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
     session.press(":checkpoint sprint\r");
     session.see("by probability");
     session.miss("this checkpoint");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 #[test]
@@ -90,8 +88,7 @@ fn time_travel_forks_are_kept_opened_and_verified() {
     session.see("main 2/2");
     session.press("n");
     session.see("main 3/3");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 
     let sprint = |arguments: &[&str]| {
         let output = assert_cmd::Command::new(env!("CARGO_BIN_EXE_sprint")).args(arguments).output().unwrap();
@@ -132,8 +129,7 @@ fn a_huge_paste_and_a_storm_of_resizes_do_no_harm() {
     session.see("space run");
     session.press("n");
     session.see("main 1/1");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
     session.is_restored();
 }
 

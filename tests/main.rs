@@ -20,6 +20,7 @@ mod evaluator;
 mod faults;
 mod scenarios;
 mod training;
+mod start;
 mod terminal;
 mod wishes;
 mod workbench;

@@ -140,6 +140,21 @@ impl Session {
         }
     }
 
+    /// Presses `q`, and again where that would leave something unsaved; it ends well.
+    pub(crate) fn leave(&mut self) {
+        self.press("q");
+        let since = Instant::now();
+        while self.child.try_wait().unwrap().is_none() {
+            if self.text().contains("q again leaves") {
+                self.press("q");
+                break;
+            }
+            assert!(since.elapsed() < PATIENCE, "it does not end:\n{}", self.text());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert_eq!(self.end(), 0);
+    }
+
     /// The alternate screen is left, the cursor shown, pastes no longer marked.
     pub(crate) fn is_restored(&self) {
         self.wait("restored terminal", |session| {

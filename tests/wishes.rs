@@ -59,8 +59,7 @@ fn a_wish_is_read_and_fulfilled_the_next_goes_on_from_there_and_both_are_kept() 
     session.see("In reach");
     session.press(&format!(":save {}\r", kept.display()));
     session.see("sprint open shows it");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 
     let path = kept.display().to_string();
     let verified = sprint(&["verify", &path]);
@@ -72,8 +71,7 @@ fn a_wish_is_read_and_fulfilled_the_next_goes_on_from_there_and_both_are_kept() 
     session.see("Instruction > Please put the mug in the sink.");
     session.press("$t");
     session.see("2 of 2 fulfilled");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 #[test]
@@ -92,8 +90,7 @@ fn what_cannot_be_read_is_refused_with_the_reason_and_a_person_judges_it() {
     session.see("not graded: this house has no baseball bat");
     session.press("t");
     session.see("1 of 2 fulfilled");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 #[test]
@@ -111,8 +108,7 @@ fn what_may_mean_two_things_is_meant_otherwise_with_a_key_and_graded_anew() {
     session.press("z");
     session.see("[>] pick up the knife");
     session.see("2 branches");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 #[test]
@@ -129,8 +125,7 @@ fn a_wish_that_fails_says_why_and_what_to_do() {
             .iter()
             .any(|reason| text.contains(reason))
     });
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 #[test]
@@ -139,8 +134,7 @@ fn nothing_is_expected_where_that_is_asked() {
     let mut session = explorer(folder.path(), "random", &["--expect", "none"]);
     tell(&mut session, "pick up the mug", "Pick up the mug.");
     session.see("not graded: not read (--expect none)");
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
 }
 
 /// A task file whose one task only says an instruction.

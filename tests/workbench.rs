@@ -16,8 +16,7 @@ fn random() -> Session {
 }
 
 fn leave(mut session: Session) {
-    session.press("q");
-    assert_eq!(session.end(), 0);
+    session.leave();
     session.is_restored();
 }
 

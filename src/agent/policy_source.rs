@@ -148,7 +148,7 @@ pub(crate) fn find(
             _ => None,
         });
     };
-    for folder in named.map(Path::to_owned).into_iter().chain(checkpoints()) {
+    for folder in named.map(folder_of).into_iter().chain(checkpoints()) {
         if hash(&folder)? == wanted {
             return PolicySource::checkpoint(folder, sampling).map(Some);
         }
@@ -156,9 +156,16 @@ pub(crate) fn find(
     Ok(None)
 }
 
+/// The folder of a checkpoint that was named: a path, or where there is nothing, the name of one of [`checkpoints`].
+pub(crate) fn folder_of(named: &Path) -> PathBuf {
+    let is_name = named.file_name() == Some(named.as_os_str()) && !named.exists();
+    let known = is_name.then(|| checkpoints().into_iter().find(|folder| folder.file_name() == named.file_name()));
+    known.flatten().unwrap_or_else(|| named.to_owned())
+}
+
 /// The agents that an explorer may let act: the named one first, then those that are found.
 pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
-    let mut folders: Vec<PathBuf> = named.map(Path::to_owned).into_iter().chain(checkpoints()).collect();
+    let mut folders: Vec<PathBuf> = named.map(folder_of).into_iter().chain(checkpoints()).collect();
     let mut seen = Vec::new();
     folders.retain(|folder| {
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.clone());

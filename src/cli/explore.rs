@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -9,6 +10,7 @@ use etcetera::BaseStrategy;
 
 use super::exit_status::ExitStatus;
 use super::logging;
+use super::recorded::recorded;
 use super::streams::Printable;
 use super::value_names;
 use crate::agent::policy_source;
@@ -19,9 +21,12 @@ use crate::episode::scenes::Scenes;
 use crate::episode::wish::Expect;
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
+use crate::explore::kept_session::KeptSession;
 use crate::explore::plain;
+use crate::explore::start_list::{self, Start, StartFolders};
 use crate::tui::config::ExplorerConfig;
 use crate::tui::graphics::Protocol;
+use crate::tui::opening::Opening;
 use crate::tui::screen;
 use crate::tui::update::ExitReason;
 
@@ -32,16 +37,16 @@ pub(crate) struct Explore {
     from: Origin,
     #[command(flatten)]
     display: Display,
-    /// Who acts at first
-    #[arg(long, value_enum, default_value = "agent")]
-    policy: PolicyName,
+    /// Who acts at first [default: agent]
+    #[arg(long, value_enum)]
+    policy: Option<PolicyName>,
 }
 
 /// Where the explorer starts.
-#[derive(Args)]
+#[derive(Args, Clone)]
 struct Origin {
-    /// The checkpoint folder of the agent [default: the shipped one]
-    #[arg(long, value_name = "DIR")]
+    /// The agent's checkpoint: its folder, or its name among checkpoints/ [default: the shipped one]
+    #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// Start where a demonstration of this scene of the dataset began
     #[arg(long, value_name = "NAME", conflicts_with = "task")]
@@ -52,18 +57,18 @@ struct Origin {
     /// The dataset folder that --scene looks in
     #[arg(long, value_name = "DIR", default_value = "data")]
     data: PathBuf,
-    /// The kind of room of a generated house
-    #[arg(long, value_parser = value_names::room(), default_value = "kitchen", conflicts_with_all = ["scene", "task"])]
-    room: Room,
+    /// The kind of room of a generated house [default: kitchen]
+    #[arg(long, value_parser = value_names::room(), conflicts_with_all = ["scene", "task"])]
+    room: Option<Room>,
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
     /// What is made of typed instructions: read ones are graded like tasks, or nothing is expected of them
     #[arg(long, value_enum, default_value = "read")]
     expect: ExpectName,
-    /// The seed of the house and of chance
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// The seed of the house and of chance [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
 }
 
 /// How the explorer is shown.
@@ -100,6 +105,16 @@ impl Display {
             let obeyed = plain::run(open()?, input, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
+        self.show_screen(kind, manual, || Opening::Named(Box::new(open)))
+    }
+
+    /// The same on the screen; `opening` says what is opened, once it is known that there is a screen.
+    fn show_screen(
+        self,
+        kind: PolicyKind,
+        manual: bool,
+        opening: impl FnOnce() -> Opening,
+    ) -> anyhow::Result<ExitStatus> {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
         }
@@ -116,9 +131,11 @@ impl Display {
         let history = Some(logging::path().with_file_name("history"));
         let bandwidth = self.bandwidth.filter(|&kilobytes| kilobytes > 0).map(|kilobytes| 1000 * u64::from(kilobytes));
         let runs = !self.paused;
+        let session = Some(kept_session());
+        let policy = kind;
         let screen =
-            screen::ScreenOptions { protocol, policy: kind, manual, runs, config, memory, history, bandwidth, log };
-        match screen::run(screen, open)? {
+            screen::ScreenOptions { protocol, policy, manual, runs, config, memory, history, session, bandwidth, log };
+        match screen::run(screen, opening())? {
             ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
             ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
         }
@@ -157,6 +174,15 @@ enum ExpectName {
     None,
 }
 
+impl From<ExpectName> for Expect {
+    fn from(name: ExpectName) -> Expect {
+        match name {
+            ExpectName::Read => Expect::Read,
+            ExpectName::None => Expect::None,
+        }
+    }
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum PolicyName {
     Agent,
@@ -174,13 +200,17 @@ impl Explore {
     /// # Errors
     /// When what it should start in cannot be opened, or there is no terminal.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let manual = matches!(self.policy, PolicyName::Manual);
+        let manual = matches!(self.policy, Some(PolicyName::Manual));
         let kind = match self.policy {
-            PolicyName::Agent | PolicyName::Manual => PolicyKind::Agent,
-            PolicyName::Expert => PolicyKind::Expert,
-            PolicyName::Random => PolicyKind::Random,
+            None | Some(PolicyName::Agent | PolicyName::Manual) => PolicyKind::Agent,
+            Some(PolicyName::Expert) => PolicyKind::Expert,
+            Some(PolicyName::Random) => PolicyKind::Random,
         };
+        let is_named = self.policy.is_some() || self.from.is_named();
         let Explore { display, from, .. } = self;
+        if !is_named && !display.plain {
+            return display.show_screen(kind, manual, move || from.list());
+        }
         // The screen shows what is wrong with an agent; a script is told by the exit code.
         let needed = display.plain && from.checkpoint.is_some() && kind == PolicyKind::Agent;
         display.show(kind, manual, move || {
@@ -193,16 +223,59 @@ impl Explore {
     }
 }
 
+/// Where a session is kept as it goes on.
+fn kept_session() -> PathBuf {
+    logging::path().with_file_name("session.json")
+}
+
 impl Origin {
+    /// Whether the command line says where to start, or with whom.
+    fn is_named(&self) -> bool {
+        let texts = [&self.scene, &self.task, &self.instruction];
+        texts.iter().any(|text| text.is_some())
+            || self.checkpoint.is_some()
+            || self.room.is_some()
+            || self.seed.is_some()
+    }
+
+    /// Everything that there is to start with, and how it is opened.
+    fn list(self) -> Opening {
+        let folders = StartFolders {
+            session: kept_session(),
+            data: self.data.clone(),
+            here: ".".into(),
+            checkpoints: policy_source::checkpoints(),
+        };
+        Opening::Picked(start_list::list(&folders), Arc::new(move |start| self.open(start)))
+    }
+
+    /// Opens what was picked from the list.
+    fn open(&self, start: &Start) -> anyhow::Result<Exploration> {
+        let mut from = self.clone();
+        match start {
+            Start::Session(path) => {
+                let policies = Policies::new(policy_source::agents(None));
+                let kept = KeptSession::read(path)?;
+                let taken_up = Exploration::take_up(&kept, policies).context("the last session cannot be taken up")?;
+                return Ok(taken_up.reading_as(self.expect.into()));
+            }
+            Start::Run { folder, number } => {
+                let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, None)?;
+                return open();
+            }
+            Start::House { room, seed } => (from.room, from.seed) = (Some(*room), Some(*seed)),
+            Start::FloorPlan(name) => from.scene = Some(name.clone()),
+            Start::Task { file, number } => from.task = Some(format!("{}#{number}", file.display())),
+            Start::Checkpoint(folder) => from.checkpoint = Some(folder.clone()),
+        }
+        from.exploration(PolicyKind::Agent)
+    }
+
     fn exploration(&self, kind: PolicyKind) -> anyhow::Result<Exploration> {
         let (start, scenes) = self.start()?;
-        let source = EpisodeSource::new(start, self.seed, scenes);
+        let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
         let policies = Policies::new(policy_source::agents(self.checkpoint.as_deref()));
-        let expect = match self.expect {
-            ExpectName::Read => Expect::Read,
-            ExpectName::None => Expect::None,
-        };
-        Exploration::new(source, policies, kind, None)?.expecting(expect, self.instruction.as_deref())
+        Exploration::new(source, policies, kind, None)?.expecting(self.expect.into(), self.instruction.as_deref())
     }
 
     fn start(&self) -> anyhow::Result<(EpisodeOrigin, Scenes)> {
@@ -232,6 +305,6 @@ impl Origin {
             }
             return Ok((EpisodeOrigin::Recorded { scene, trajectories }, none));
         }
-        Ok((EpisodeOrigin::Generated(self.room), none))
+        Ok((EpisodeOrigin::Generated(self.room.unwrap_or(Room::Kitchen)), none))
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
-use super::{open::Reference, streams};
+use super::{recorded::Reference, streams};
 use crate::episode::frames::FrameSequence;
 use crate::report::export;
 

@@ -26,6 +26,7 @@ mod policies;
 mod pretrain;
 mod progress;
 mod read;
+mod recorded;
 mod relabel;
 mod replay;
 mod report;

@@ -9,8 +9,8 @@ use crate::agent::policy_source::{self, PolicySource};
 /// Which policy acts.
 #[derive(Args)]
 pub(crate) struct PolicyChoice {
-    /// The trained agent that acts [default: the shipped one]
-    #[arg(long, value_name = "DIR")]
+    /// The trained agent that acts: its folder, or its name among checkpoints/ [default: the shipped one]
+    #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// Who acts
     #[arg(long, value_enum, default_value = "agent")]
@@ -44,7 +44,10 @@ impl PolicyChoice {
             Kind::Expert => Ok(PolicySource::expert()),
             Kind::Random => Ok(PolicySource::random()),
             Kind::Agent => {
-                let folder = self.checkpoint.clone().map_or_else(policy_source::shipped, Ok)?;
+                let folder = match &self.checkpoint {
+                    Some(named) => policy_source::folder_of(named),
+                    None => policy_source::shipped()?,
+                };
                 PolicySource::checkpoint(folder, sampling)
             }
         }

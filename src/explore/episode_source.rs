@@ -16,7 +16,7 @@ use crate::house::{House, generate};
 
 /// An episode's start.
 #[derive(Clone, Debug)]
-pub(crate) struct EpisodeStart {
+pub struct EpisodeStart {
     /// The floor plan.
     pub(crate) scene: Arc<Scene>,
     /// The state at the start.
@@ -63,6 +63,8 @@ pub enum EpisodeOrigin {
         /// Which one, from 0.
         index: usize,
     },
+    /// Where a session began that is taken up again.
+    Kept(Box<EpisodeStart>),
 }
 
 /// The sequence of episodes.
@@ -81,25 +83,61 @@ impl EpisodeSource {
         EpisodeSource { origin, seed, scenes }
     }
 
+    /// The start of a session that is taken up, which names its floor plan itself.
+    pub(crate) fn kept(origin: EpisodeOrigin, seed: u64) -> EpisodeSource {
+        EpisodeSource::new(origin, seed, Scenes::in_folder(None))
+    }
+
     /// The seed of the present episode.
     pub(crate) fn seed(&self) -> u64 {
         self.seed
     }
 
     /// To the next episode: the next seed, or the next task.
-    pub(crate) fn advance(&mut self) {
+    ///
+    /// # Errors
+    /// When this is the only one.
+    pub(crate) fn advance(&mut self) -> anyhow::Result<()> {
         match &mut self.origin {
-            EpisodeOrigin::Tasks { tasks, index } => *index = (*index + 1) % tasks.len().max(1),
+            EpisodeOrigin::Tasks { tasks, index } => {
+                anyhow::ensure!(
+                    tasks.len() > 1,
+                    "there is no next one: this is a single task or recorded episode; {BACK}"
+                );
+                *index = (*index + 1) % tasks.len();
+            }
             EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = self.seed.wrapping_add(1),
+            EpisodeOrigin::Kept(start) => {
+                let (room, seed) = generated(start)?;
+                (self.origin, self.seed) = (EpisodeOrigin::Generated(room), seed.wrapping_add(1));
+            }
         }
+        Ok(())
     }
 
-    /// To the episode of that seed; for a task set, to the task of that number.
-    pub(crate) fn seek(&mut self, seed: u64) {
+    /// To the episode of that seed; for a task set, to the task of that number from 1.
+    ///
+    /// # Errors
+    /// When there is no such task.
+    pub(crate) fn seek(&mut self, seed: u64) -> anyhow::Result<()> {
         match &mut self.origin {
-            EpisodeOrigin::Tasks { tasks, index } => *index = seed as usize % tasks.len().max(1),
+            EpisodeOrigin::Tasks { tasks, index } => {
+                let wanted = usize::try_from(seed).ok().and_then(|number| number.checked_sub(1));
+                let known = wanted.filter(|&at| at < tasks.len() && tasks.len() > 1);
+                *index = known.with_context(|| match tasks.len() {
+                    1 => {
+                        format!("there is no house of another seed: this is a single task or recorded episode; {BACK}")
+                    }
+                    many => format!("there is no task {seed}; they are numbered 1 to {many}"),
+                })?;
+            }
             EpisodeOrigin::Generated(_) | EpisodeOrigin::Recorded { .. } => self.seed = seed,
+            EpisodeOrigin::Kept(start) => {
+                let (room, _) = generated(start)?;
+                (self.origin, self.seed) = (EpisodeOrigin::Generated(room), seed);
+            }
         }
+        Ok(())
     }
 
     /// Opens the present episode.
@@ -125,6 +163,7 @@ impl EpisodeSource {
                 let (reference, task) = (trajectory.scene.clone(), Some(task_of(trajectory)));
                 Ok(EpisodeStart { scene: scene.clone(), world, reference, task, limited: false })
             }
+            EpisodeOrigin::Kept(start) => Ok((**start).clone()),
             EpisodeOrigin::Tasks { tasks, index } => {
                 let task = tasks.get(*index).context("the task set is empty")?;
                 let setting = self.scenes.setting(task).with_context(|| format!("task {}", task.id))?;
@@ -132,6 +171,17 @@ impl EpisodeSource {
                 Ok(EpisodeStart { scene, world, reference, task: Some(task.clone()), limited: true })
             }
         }
+    }
+}
+
+/// What to do where there is no other episode.
+const BACK: &str = "reset goes back to its start, sprint explore opens other houses";
+
+/// The room and seed of a house that was generated.
+fn generated(start: &EpisodeStart) -> anyhow::Result<(Room, u64)> {
+    match start.reference {
+        SceneRef::Generated { room, seed } => Ok((room, seed)),
+        SceneRef::Named(_) => anyhow::bail!("a session that was taken up has no next one in this floor plan; {BACK}"),
     }
 }
 

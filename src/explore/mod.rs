@@ -6,11 +6,14 @@ pub(crate) mod chain_report;
 pub(crate) mod choices;
 pub mod episode_source;
 pub mod exploration;
+pub(crate) mod example_wishes;
 pub(crate) mod inspect;
+pub(crate) mod kept_session;
 pub(crate) mod plain;
 pub mod session;
 pub(crate) mod session_export;
 pub(crate) mod side_by_side;
+pub(crate) mod start_list;
 pub(crate) mod timeline;
 pub(crate) mod verb;
 #[cfg(test)]

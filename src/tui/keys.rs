@@ -24,6 +24,8 @@ pub(crate) enum Mode {
     Palette,
     /// The help is open.
     Help,
+    /// Wishes for this house are listed.
+    WishList,
 }
 
 /// Keys that do the same, how the help names them, and what they do.
@@ -58,6 +60,7 @@ pub(crate) fn bindings(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &
         Mode::Manual => vec![KeyScope::Manual, KeyScope::Common],
         Mode::Typing | Mode::Palette => vec![KeyScope::Typing],
         Mode::Help => vec![KeyScope::Help],
+        Mode::WishList => vec![KeyScope::WishList],
     };
     scopes.into_iter().flat_map(|scope| BINDINGS.iter().filter(move |binding| binding.scope == scope))
 }
@@ -156,7 +159,7 @@ mod tests {
 
     #[test]
     fn control_c_quits_in_every_mode() {
-        for mode in [Mode::Watch, Mode::Manual, Mode::Typing, Mode::Palette, Mode::Help] {
+        for mode in [Mode::Watch, Mode::Manual, Mode::Typing, Mode::Palette, Mode::Help, Mode::WishList] {
             assert_eq!(
                 verb(mode, ExplorerPage::Main, KeyEvent::new(Char('c'), KeyModifiers::CONTROL)),
                 Some(Verb::Quit)
@@ -185,7 +188,7 @@ mod tests {
 
     #[test]
     fn no_key_means_two_things_among_those_of_one_mode() {
-        for mode in [Mode::Watch, Mode::Manual, Mode::Typing, Mode::Help] {
+        for mode in [Mode::Watch, Mode::Manual, Mode::Typing, Mode::Help, Mode::WishList] {
             let keys: Vec<KeyCode> =
                 bindings(mode, ExplorerPage::Main).flat_map(|binding| &binding.codes).copied().collect();
             for (at, key) in keys.iter().enumerate() {

@@ -13,7 +13,9 @@ mod key_name;
 pub(crate) mod keys;
 pub mod layout;
 pub(crate) mod log;
+pub(crate) mod opening;
 pub mod screen;
+mod start_page;
 pub mod terminal;
 #[cfg(test)]
 mod testing;

@@ -23,13 +23,15 @@ use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::PictureEncoder;
 use super::graphics::{Protocol, detect, inline};
 use super::history;
+use super::opening::{Open, Opening, Picked, StartStyle, pick};
+use super::start_page::StartPage;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
 use super::update::{Effect, ExitReason, Msg, update};
 use super::worker;
 use crate::agent::registry::PolicyKind;
-use crate::explore::exploration::Exploration;
 use crate::explore::session::{RunMode, SessionCommand};
+use crate::explore::start_list::Start;
 
 /// What the screen is started with.
 pub(crate) struct ScreenOptions {
@@ -47,6 +49,8 @@ pub(crate) struct ScreenOptions {
     pub(crate) memory: Option<PathBuf>,
     /// Where instructions are kept for later sessions.
     pub(crate) history: Option<PathBuf>,
+    /// Where the session is kept as it goes on.
+    pub(crate) session: Option<PathBuf>,
     /// The most that a step's picture may cost on the wire, in bytes.
     pub(crate) bandwidth: Option<u64>,
     /// Where libtorch's messages go.
@@ -64,10 +68,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// When there is no terminal, or the worker stopped.
-pub(crate) fn run(
-    screen: ScreenOptions,
-    open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
-) -> anyhow::Result<ExitReason> {
+pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<ExitReason> {
     // The screen strips colours itself where there are none: kitty's placeholders carry a number in theirs.
     crossterm::style::force_color_output(true);
     let ability = ability();
@@ -77,7 +78,31 @@ pub(crate) fn run(
     let guard =
         terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
     let graphics = graphics(screen.protocol, ability, screen.memory.as_deref());
-    let display = Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
+    let mut display =
+        Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
+    read_keys(tell.clone())?;
+    let session = screen.session.clone();
+    let work = |open: Open| start_worker(open, session.clone(), &tell);
+    let (commands, first, goes_on) = match opening {
+        Opening::Named(open) => (work(open)?, Vec::new(), false),
+        Opening::Picked(entries, open) => {
+            let style = StartStyle { scheme: screen.config.scheme, ability };
+            let start = |start: &Start| {
+                let (open, start) = (open.clone(), start.clone());
+                work(Box::new(move || open(&start)))
+            };
+            match pick(StartPage::new(entries), style, &mut display, &messages, start)? {
+                Picked::Started { commands, first, start } => (commands, first, start.goes_on()),
+                Picked::Left { exit, is_opening } => {
+                    drop(guard);
+                    if is_opening {
+                        let_work_end(&messages, Instant::now() + PATIENCE / 2);
+                    }
+                    return Ok(exit);
+                }
+            }
+        }
+    };
     let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
     app.config = screen.config;
     app.traffic.limit = screen.bandwidth;
@@ -92,21 +117,17 @@ pub(crate) fn run(
         keep(path, None);
     }
 
-    let events = tell.clone();
-    let gone = Gone(tell.clone());
-    let tell_event = move |event| {
-        let _ = &gone;
-        // Whoever does not listen any more commands nothing any more either.
-        drop(events.send(Msg::Session(event)));
-    };
-    let commands = worker::start(open, tell_event, terminal::say_last_words)?;
-    let pictures = tell.clone();
-    if screen.runs && !screen.manual {
+    let pictures = tell;
+    if screen.runs && !screen.manual && !goes_on {
         commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
     }
     let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
-    read_keys(tell)?;
-    let exit = run_loop(ScreenLoop::new(app, display, commands, encoder, screen.history), &messages);
+    let mut shown = ScreenLoop::new(app, display, commands, encoder, screen.history);
+    let early = shown.on_messages(first)?;
+    let exit = match early {
+        Some(exit) => Ok(exit),
+        None => run_loop(shown, &messages),
+    };
     drop(guard);
     if !matches!(exit, Ok(ExitReason::WorkerGone)) {
         let_work_end(&messages, Instant::now() + PATIENCE / 2);
@@ -115,6 +136,25 @@ pub(crate) fn run(
         ExitReason::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
         exit => Ok(exit),
     }
+}
+
+/// Starts the worker that opens an exploration, which is kept in that file as it goes on.
+fn start_worker(open: Open, session: Option<PathBuf>, tell: &SyncSender<Msg>) -> io::Result<Sender<SessionCommand>> {
+    let events = tell.clone();
+    let gone = Gone(tell.clone());
+    let tell_event = move |event| {
+        let _ = &gone;
+        // Whoever does not listen any more commands nothing any more either.
+        drop(events.send(Msg::Session(event)));
+    };
+    let open = move || {
+        let exploration = open()?;
+        Ok(match session {
+            Some(path) => exploration.kept_in(path),
+            None => exploration,
+        })
+    };
+    worker::start(open, tell_event, terminal::say_last_words)
 }
 
 /// Keeps an instruction; where that cannot be, the log says why and the session goes on.

@@ -39,6 +39,7 @@ fn work(mut session: Session, inbox: &Receiver<SessionCommand>) {
                 let starts = matches!(command, SessionCommand::Run { .. });
                 let opens = matches!(command, SessionCommand::Next | SessionCommand::Seed(_));
                 session.apply(command);
+                session.autosave();
                 let now = Instant::now();
                 let Some(interval) = session.interval() else { continue };
                 due = match (starts, opens) {
@@ -51,6 +52,7 @@ fn work(mut session: Session, inbox: &Receiver<SessionCommand>) {
             }
             Err(RecvTimeoutError::Timeout) => {
                 session.advance();
+                session.autosave();
                 due = Instant::now() + session.interval().unwrap_or_default();
             }
             Err(RecvTimeoutError::Disconnected) => return,

@@ -111,6 +111,11 @@ impl Tree {
         self.twigs.len() >= MOST
     }
 
+    /// How many states it holds.
+    pub(crate) fn states(&self) -> usize {
+        self.twigs.len()
+    }
+
     /// The state at the start.
     pub(crate) fn start(&self) -> &SavedState {
         &self.twigs[0].moment

@@ -1,6 +1,7 @@
 //! The episode under exploration, without any screen: house, task, policy, everything that was tried, and what can be done
 //! with them. It tells nobody; [`super::session::Session`] drives it and tells what happens.
 
+mod autosave;
 mod open;
 mod policy;
 mod queries;
@@ -12,6 +13,7 @@ mod time;
 mod wishes;
 
 pub(crate) use snapshot::{SessionSnapshot, TaskProgress};
+pub(crate) use state::Unsaved;
 pub(crate) use step::StepTaken;
 
 use std::sync::Arc;
@@ -24,7 +26,7 @@ use crate::episode::branches::{SavedState, Tree};
 use crate::episode::record::Author;
 use crate::episode::rollout::Rollout;
 use crate::episode::wish::{Expect, WishVerdict, Wishes};
-use state::{ActingPolicy, CurrentEpisode, Frames};
+use state::{ActingPolicy, Autosave, CurrentEpisode, Frames};
 
 /// The episode under exploration.
 pub struct Exploration {
@@ -40,6 +42,11 @@ pub struct Exploration {
     expect: Expect,
     /// What was told on the way to the present state.
     wishes: Wishes,
+    /// How many wishes were typed in this episode.
+    told: u32,
+    /// How much of what was tried and told is in a run folder.
+    saved: Unsaved,
+    autosave: Autosave,
 }
 
 impl Exploration {
@@ -74,12 +81,16 @@ impl Exploration {
             frames: Frames::default(),
             expect: Expect::default(),
             wishes: Wishes::new(),
+            told: 0,
+            saved: Unsaved::default(),
+            autosave: Autosave::default(),
         };
         exploration.begin_wishes();
         if let Some(text) = instruction {
             exploration.instruct(text)?;
             exploration.make_start();
         }
+        exploration.count_as_saved();
         Ok(exploration)
     }
 
@@ -94,7 +105,13 @@ impl Exploration {
             self.instruct(text)?;
             self.make_start();
         }
+        self.count_as_saved();
         Ok(self)
+    }
+
+    /// What is made of wishes that are typed from now on.
+    pub(crate) fn reading_as(self, expect: Expect) -> Exploration {
+        Exploration { expect, ..self }
     }
 
     /// The present state becomes the start, while nothing was tried.

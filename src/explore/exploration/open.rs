@@ -9,7 +9,7 @@ impl Exploration {
     /// # Errors
     /// When it cannot be opened; the present one stays.
     pub fn next_episode(&mut self) -> anyhow::Result<()> {
-        self.source.advance();
+        self.source.advance()?;
         self.enter()
     }
 
@@ -18,7 +18,7 @@ impl Exploration {
     /// # Errors
     /// When it cannot be opened; the present one stays.
     pub(crate) fn seed(&mut self, seed: u64) -> anyhow::Result<()> {
-        self.source.seek(seed);
+        self.source.seek(seed)?;
         self.enter()
     }
 
@@ -38,6 +38,7 @@ impl Exploration {
         }
         self.tree = Tree::new(self.saved_state());
         self.begin_wishes();
+        self.count_as_saved();
         Ok(())
     }
 

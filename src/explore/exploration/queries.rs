@@ -10,6 +10,7 @@ use crate::analysis::{chain, instruction_ab};
 use crate::domain::{Role, Subtask};
 use crate::episode::wish::WishGrading;
 use crate::explore::breakpoints::{Facts, gap};
+use crate::explore::example_wishes::example_wishes;
 use crate::language::{instruction, nouns, phrases};
 
 impl Exploration {
@@ -85,6 +86,12 @@ impl Exploration {
                 && (typed.is_empty() || subtasks.iter().zip(&links).all(|(subtask, link)| about(roles, subtask, link)))
         });
         Ok(Chain { scene: house.scene().clone(), start: house.world().clone(), links, graded })
+    }
+
+    /// A few wishes that can be fulfilled from the present state, the same for the same house and seed.
+    pub(crate) fn example_wishes(&self) -> Vec<String> {
+        let house = &self.rollout.env.house;
+        example_wishes(house.scene(), house.world(), self.episode.seed)
     }
 
     /// Instructions that make sense in this house: the task's own, its steps in training's words, and a pickup of each thing.

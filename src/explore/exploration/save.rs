@@ -8,6 +8,7 @@ use super::Exploration;
 use crate::domain::{Scene, Task};
 use crate::episode::branches::{Branch, SavedState};
 use crate::episode::frames::FrameSequence;
+use crate::episode::record::Episode;
 use crate::episode::scenes::Setting;
 use crate::episode::wish::WishGrading;
 use crate::explore::session_export;
@@ -20,12 +21,13 @@ impl Exploration {
     pub(crate) fn explored(&self) -> SessionExport {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
+        SessionExport { scene: self.rollout.env.house.scene().clone(), tasks, episodes: self.branch_episodes() }
+    }
+
+    /// Every branch as an episode, under its name.
+    pub(super) fn branch_episodes(&self) -> Vec<Episode> {
         let episode = |(at, branch): (usize, &Branch)| self.with_open_wishes(at, self.tree.episode(at, &branch.name));
-        SessionExport {
-            scene: self.rollout.env.house.scene().clone(),
-            tasks,
-            episodes: branches().map(episode).collect(),
-        }
+        self.tree.branches().iter().enumerate().map(episode).collect()
     }
 
     /// The branch in hand as a recording.
@@ -72,13 +74,14 @@ impl Exploration {
     ///
     /// # Errors
     /// When the folder holds something else, or cannot be written to.
-    pub(crate) fn keep(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
+    pub(crate) fn keep(&mut self, path: Option<PathBuf>) -> anyhow::Result<String> {
         let path = path.unwrap_or_else(|| {
             let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
             default_path::default_path("explored", since, &|path| path.exists())
         });
         let explored = self.explored();
         session_export::write(&explored, &path)?;
+        self.count_as_saved();
         let many = explored.episodes.len();
         let what = if many == 1 { "branch".to_string() } else { format!("{many} branches") };
         Ok(format!("wrote the {what} as {}; sprint open shows it again", path.display()))

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Exploration;
+use super::{Exploration, Unsaved};
 use crate::agent::Reading;
 use crate::agent::registry::PolicyKind;
 use crate::domain::{Cell, Scene, World};
@@ -60,6 +60,8 @@ pub struct SessionSnapshot {
     pub(crate) reading: Option<Reading>,
     /// Instructions that make sense in this house.
     pub(crate) examples: Arc<Vec<String>>,
+    /// What would be lost with this episode.
+    pub(crate) unsaved: Unsaved,
 }
 
 /// How far a task has come.
@@ -110,6 +112,7 @@ impl Exploration {
             recent,
             reading: self.acting.policy.as_ref().and_then(|policy| policy.reading(&self.rollout.instruction)),
             examples: self.episode.examples.clone(),
+            unsaved: self.unsaved(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What an exploration consists of, beside the house and the tree of what was tried.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::agent::registry::PolicyKind;
@@ -43,4 +44,50 @@ pub(super) struct Frames {
     pub(super) present: Option<Arc<Frame>>,
     /// Snapshots hold the frames before the present one too.
     pub(super) looks_back: bool,
+}
+
+/// Where the session is kept, and what of it is there.
+#[derive(Default)]
+pub(super) struct Autosave {
+    pub(super) path: Option<PathBuf>,
+    pub(super) written: Option<Progress>,
+}
+
+/// What there is to keep: it changes with every step and word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Progress {
+    pub(super) episode: u32,
+    pub(super) states: usize,
+    pub(super) branches: usize,
+    pub(super) told: u32,
+    pub(super) branch: usize,
+    pub(super) step: u32,
+    pub(super) is_over: bool,
+}
+
+/// What is in no run folder yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Unsaved {
+    /// Branches beside the first.
+    pub(crate) branches: usize,
+    /// Wishes that were typed.
+    pub(crate) wishes: u32,
+}
+
+impl Unsaved {
+    /// Whether there is anything.
+    pub(crate) fn is_empty(self) -> bool {
+        self == Unsaved::default()
+    }
+
+    /// How much it is, in words.
+    pub(crate) fn words(self) -> String {
+        let count = |many: usize, one: &str, more: &str| match many {
+            0 => None,
+            1 => Some(format!("1 {one}")),
+            many => Some(format!("{many} {more}")),
+        };
+        let parts = [count(self.branches, "branch", "branches"), count(self.wishes as usize, "wish", "wishes")];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
 }

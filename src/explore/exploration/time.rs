@@ -49,6 +49,7 @@ impl Exploration {
     /// When the name is empty or taken.
     pub(crate) fn rename(&mut self, branch: usize, name: &str) -> anyhow::Result<()> {
         anyhow::ensure!(self.tree.rename(branch, name), "{name:?} is empty, or another branch's name");
+        self.write_again();
         Ok(())
     }
 

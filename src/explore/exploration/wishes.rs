@@ -55,9 +55,11 @@ impl Exploration {
         if is_task && asked {
             self.rollout.instruction = text;
             self.acting.decision = None;
+            self.told += 1;
             return Ok("the task's own words");
         }
         self.tell(text);
+        self.told += 1;
         Ok(match (is_task, asked) {
             (true, _) => "the task no longer applies",
             (false, true) => "the task's words again: reset to be graded by the task",
@@ -154,6 +156,7 @@ impl Exploration {
         let house = &self.rollout.env.house;
         let other = repick(&wish, picked, wish.began, house.scene(), house.world());
         self.begin(other);
+        self.write_again();
         for (decision, author) in again {
             if self.end().is_some() {
                 break;

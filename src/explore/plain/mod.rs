@@ -191,6 +191,11 @@ impl<W: Write> Plain<W> {
                 compare(&contrast, out)?;
                 self.compared = Some(contrast.sides[1].instruction.clone());
             }
+            SessionEvent::Examples(wishes) => {
+                for wish in wishes {
+                    writeln!(out, "{wish}")?;
+                }
+            }
             SessionEvent::Noted(what) => writeln!(out, "{what}")?,
             SessionEvent::Read(wish) => reading(&wish, out)?,
             SessionEvent::AgentDone { likely, graded, .. } => {
@@ -264,6 +269,12 @@ mod tests {
         {
             assert!(text.contains(wanted), "no {wanted:?} in:\n{text}");
         }
+    }
+
+    #[test]
+    fn wishes_for_this_house_are_listed() {
+        let text = say("examples\n");
+        assert!(text.lines().any(|line| line.to_lowercase().contains("mug")), "{text}");
     }
 
     #[test]

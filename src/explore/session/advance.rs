@@ -242,6 +242,39 @@ mod tests {
     }
 
     #[test]
+    fn a_single_task_or_recorded_episode_stays_and_says_that_there_is_no_other() {
+        let (folder, mut set) = crate::eval::evaluation::tests::tasks();
+        let scenes = || crate::episode::scenes::Scenes::of(&folder.path().join("tasks.json"), &set.value);
+        let opened = |tasks: Vec<crate::domain::Task>, scenes| {
+            use crate::agent::registry::{Policies, PolicyKind};
+            use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
+            let source = EpisodeSource::new(EpisodeOrigin::Tasks { tasks, index: 0 }, 0, scenes);
+            listened(Exploration::new(source, Policies::new(Vec::new()), PolicyKind::Random, None).unwrap())
+        };
+        let refused = |events: &Receiver<SessionEvent>| {
+            events.try_iter().find_map(|event| match event {
+                SessionEvent::Refused(why) => Some(why),
+                _ => None,
+            })
+        };
+        let (all, own) = (scenes(), scenes());
+        let tasks = set.value.tasks.clone();
+        let many = tasks.len() as u64;
+        let (mut session, events) = opened(vec![set.value.tasks.remove(0)], own);
+        session.apply(SessionCommand::Act(Action::navigate(ActionType::RotateLeft)));
+        for command in [SessionCommand::Next, SessionCommand::Seed(3)] {
+            session.apply(command);
+            assert!(refused(&events).unwrap().contains("single task or recorded episode"));
+        }
+        assert_eq!(session.exploration.tree().at(), 1, "it is still there");
+        let (mut session, events) = opened(tasks, all);
+        session.apply(SessionCommand::Seed(many + 1));
+        assert!(refused(&events).unwrap().contains(&format!("they are numbered 1 to {many}")));
+        session.apply(SessionCommand::Seed(1));
+        assert_eq!(refused(&events), None);
+    }
+
+    #[test]
     fn the_agents_word_stands_beside_what_the_grader_of_a_task_or_a_reading_has_done() {
         let graded = |exploration: crate::explore::exploration::Exploration| {
             let (mut session, events) = listened(exploration);

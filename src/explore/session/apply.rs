@@ -139,13 +139,27 @@ impl Session {
                 self.jobs.background.stop();
                 self.emit(SessionEvent::Working(None));
             }
-            SessionCommand::Save(path) => self.written(self.exploration.keep(path)),
+            SessionCommand::Save(path) => {
+                let kept = self.exploration.keep(path);
+                let is_kept = kept.is_ok();
+                self.written(kept);
+                // What there is to lose is another now.
+                if is_kept && self.live {
+                    self.show();
+                }
+            }
             SessionCommand::SaveTask(path) => self.written(self.exploration.keep_task(&path)),
             SessionCommand::Export(path) => {
                 self.emit(SessionEvent::Busy(Some(format!("writing {}", path.display()))));
                 let written = self.exploration.export(&path);
                 self.emit(SessionEvent::Busy(None));
                 self.written(written);
+            }
+            SessionCommand::Examples => {
+                self.emit(SessionEvent::Busy(Some("looking for wishes".into())));
+                let wishes = self.exploration.example_wishes();
+                self.emit(SessionEvent::Busy(None));
+                self.emit(SessionEvent::Examples(wishes));
             }
             SessionCommand::LookBack(looks_back) => {
                 self.exploration.set_looking_back(looks_back);

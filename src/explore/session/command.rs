@@ -97,6 +97,8 @@ pub enum SessionCommand {
     SaveTask(PathBuf),
     /// Write the branch in hand in the form that the file's ending asks for.
     Export(PathBuf),
+    /// A few wishes that can be fulfilled in this house.
+    Examples,
     /// Whether snapshots hold the frames before the present one.
     LookBack(bool),
     /// The present state.

@@ -73,6 +73,8 @@ pub enum SessionEvent {
     ValueMap(Arc<ValueMap>, u32),
     /// A chain so far.
     Chain(Box<ChainReport>),
+    /// Wishes that can be fulfilled in this house.
+    Examples(Vec<String>),
     /// Work in the background, with how far it is; nothing when it is over.
     Working(Option<String>),
     /// Something went well and is worth a line.

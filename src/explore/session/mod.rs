@@ -64,6 +64,11 @@ impl Session {
         }
     }
 
+    /// Keeps what was tried, where the exploration has a file for it.
+    pub(crate) fn autosave(&mut self) {
+        self.exploration.autosave(self.run.mode.is_some());
+    }
+
     /// Whether something is computed in the background.
     pub(crate) fn is_working(&self) -> bool {
         self.jobs.background.is_working()

@@ -81,6 +81,7 @@ fn scope(scope: KeyScope) -> Option<&'static str> {
         KeyScope::Manual => Some("you act"),
         KeyScope::Typing => Some("typing"),
         KeyScope::Help => Some("help"),
+        KeyScope::WishList => Some("list of wishes"),
     }
 }
 

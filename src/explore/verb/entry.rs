@@ -60,6 +60,8 @@ pub(crate) enum KeyScope {
     Typing,
     /// While the help is open.
     Help,
+    /// While wishes for this house are listed.
+    WishList,
 }
 
 /// From what follows a verb to what is asked for.

@@ -6,7 +6,7 @@ use super::{ExplorerPage, Verb};
 use crate::domain::{Action, ActionType, Heading};
 use crate::explore::session::SessionCommand as Command;
 
-use KeyScope::{Common, Help, Lists, Manual, Typing, Watch};
+use KeyScope::{Common, Help, Lists, Manual, Typing, Watch, WishList};
 
 /// Every verb, in the order in which palette and help list them.
 #[rustfmt::skip]
@@ -38,6 +38,8 @@ pub(crate) const VERBS: &[VerbEntry] = &[
         .on(&[key(Common, "", &["z"], "the next reading", "")]),
     verb("done", "", "the wish is fulfilled, you say", |_| ask(Command::Say { fulfilled: true })),
     verb("failed", "", "the wish failed, you say", |_| ask(Command::Say { fulfilled: false })),
+    verb("examples", "", "a few wishes that can be fulfilled in this house", |_| ask(Command::Examples))
+        .on(&[key(Watch, "w", &["w"], "wishes for this house", "")]),
     verb("wishes", "", "what was told, and what came of it", |_| Ok(Verb::Wishes)),
     verb("back", "[N]", "N steps back (1)", |line| Ok(Verb::Back(line.count()?)))
         .on(&[
@@ -158,6 +160,8 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     key_verb("select", "another line of the list", |line| Ok(Verb::Select(line.rest.parse().unwrap_or(1))), &[
         key(Lists, "j k", &["j", "down"], "down, up", "1"),
         key(Lists, "", &["k", "up"], "up", "-1"),
+        key(WishList, "j k", &["j", "down", "tab"], "down, up", "1"),
+        key(WishList, "", &["k", "up"], "up", "-1"),
     ]),
     verb("graphics", "", "show pictures another way", |_| Ok(Verb::Graphics))
         .on(&[key(Common, "g", &["g"], "pictures another way", "")]),
@@ -176,11 +180,13 @@ pub(crate) const VERBS: &[VerbEntry] = &[
         .on(&[key(Common, "?", &["?", "f1"], "these keys", "")]),
     verb("quit", "", "end", |_| Ok(Verb::Quit)).or(&["q", "exit"])
         .on(&[key(Common, "q", &["q"], "quit", "")]),
-    key_verb("apply", "tell the agent what was typed, or do it", |_| Ok(Verb::Apply), &[
+    key_verb("apply", "tell the agent what was typed, or do it; put the wish that is selected on the line", |_| Ok(Verb::Apply), &[
         key(Typing, "enter", &["enter"], "tell the agent", ""),
+        key(WishList, "enter", &["enter", "i"], "put it on the line", ""),
     ]),
-    key_verb("cancel", "leave the line or the help", |_| Ok(Verb::Cancel), &[
+    key_verb("cancel", "leave the line, the list or the help", |_| Ok(Verb::Cancel), &[
         key(Typing, "esc", &["esc"], "leave", ""),
+        key(WishList, "esc", &["esc", "w", "q"], "leave", ""),
         key(Help, "esc ? q", &["esc", "?", "q", "f1", "enter", "backspace", "space"], "leave", ""),
     ]),
     key_verb("complete", "complete what was typed", |_| Ok(Verb::Complete), &[

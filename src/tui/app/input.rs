@@ -1,5 +1,6 @@
 //! What keys mean at the moment, and what was typed.
 
+use crate::explore::verb::Verb;
 use crate::tui::editor::Editor;
 use crate::tui::keys::Mode;
 
@@ -15,6 +16,14 @@ pub(crate) struct InputState {
     pub(crate) palette: Editor,
     /// The verb of the palette's list that is selected.
     pub(crate) selected_verb: usize,
+    /// Wishes for this house, while they are listed.
+    pub(crate) wishes: Vec<String>,
+    /// The one of them that is selected.
+    pub(crate) selected_wish: usize,
+    /// What would lose work, and was asked about: done when it is asked for again.
+    pub(crate) asked: Option<Verb>,
+    /// What the key before asked about.
+    pub(crate) confirms: Option<Verb>,
     /// Nobody has explored here before: the last row says how to begin.
     pub(crate) newcomer: bool,
 }
@@ -29,6 +38,10 @@ impl InputState {
             editor: Editor::default(),
             palette: Editor::default(),
             selected_verb: 0,
+            wishes: Vec::new(),
+            selected_wish: 0,
+            asked: None,
+            confirms: None,
             newcomer: false,
         }
     }

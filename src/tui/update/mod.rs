@@ -58,7 +58,7 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
                         app.input.palette.key(key);
                         app.input.selected_verb = 0;
                     }
-                    Mode::Watch | Mode::Manual | Mode::Help => {}
+                    Mode::Watch | Mode::Manual | Mode::Help | Mode::WishList => {}
                 }
                 vec![]
             }
@@ -99,6 +99,7 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
 fn key_after_notice(app: &mut App, key: KeyEvent) -> Option<Verb> {
     app.input.newcomer = false;
     app.notice = None;
+    app.input.confirms = app.input.asked.take();
     key_by_settings(app, key)
 }
 

@@ -15,6 +15,10 @@ use crate::tui::log::Tone;
 
 /// Does what a person asked for.
 pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
+    if asks_first(app, &verb) {
+        app.input.asked = Some(verb);
+        return vec![];
+    }
     match verb {
         Verb::Ask(command) => ask(app, command),
         Verb::ToggleRun | Verb::Continue => run(app, verb == Verb::Continue),
@@ -42,6 +46,11 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
         Verb::Branches | Verb::Wishes => show(app, ExplorerPage::Branches),
         Verb::Think => show(app, ExplorerPage::Mind),
         Verb::Look | Verb::Candidates => show(app, ExplorerPage::World),
+        Verb::Select(by) if app.input.mode == Mode::WishList => {
+            let most = app.input.wishes.len().saturating_sub(1);
+            app.input.selected_wish = app.input.selected_wish.saturating_add_signed(isize::from(by)).min(most);
+            vec![]
+        }
         Verb::Select(by) => select(app, by),
         Verb::Take => send(SessionCommand::Switch((app.branches.selected + 1).to_string())),
         Verb::Sort => {
@@ -98,6 +107,14 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             change_display(app, &verb)
         }
     }
+}
+
+/// Whether a verb would leave what is in no run folder, and was not asked for twice. On a screen too small to ask on, it would
+/// be asked in vain.
+fn asks_first(app: &App, verb: &Verb) -> bool {
+    let leaves = matches!(verb, Verb::Quit | Verb::Ask(SessionCommand::Next | SessionCommand::Seed(_)));
+    let is_unsaved = app.session.now.as_ref().is_some_and(|now| !now.unsaved.is_empty());
+    leaves && is_unsaved && app.layout().is_some() && app.input.confirms.as_ref() != Some(verb)
 }
 
 /// Asks the session, on the page that shows what comes of it.
@@ -165,6 +182,12 @@ fn apply(app: &mut App) -> Vec<Effect> {
         let mut effects = uncover(app);
         effects.extend(on_action(app, verb));
         return effects;
+    }
+    if app.input.mode == Mode::WishList {
+        let wish = app.input.wishes.get(app.input.selected_wish).cloned().unwrap_or_default();
+        app.input.open(Mode::Typing);
+        app.input.editor.open(&wish);
+        return uncover(app);
     }
     app.input.close();
     match app.input.editor.text().trim() {

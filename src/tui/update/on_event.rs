@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::effect::Effect;
+use super::lines::uncover;
 use super::pages::turn_to;
 use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::exploration::SessionSnapshot;
@@ -10,7 +11,7 @@ use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
 use crate::tui::graphics::letters::{self, Letters};
-use crate::tui::keys::with_keys;
+use crate::tui::keys::{Mode, with_keys};
 use crate::tui::log::{LogEntry, Tone};
 
 /// Changes the state by what the session tells.
@@ -145,6 +146,19 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
         SessionEvent::Chain(chain) => {
             app.chain.take_in(*chain);
             vec![]
+        }
+        SessionEvent::Examples(wishes) => {
+            // Whoever does something else meanwhile is not disturbed.
+            if app.input.mode != Mode::Watch {
+                return vec![];
+            }
+            if wishes.is_empty() {
+                app.note(Tone::Note, "no wish was found that can be fulfilled here now");
+                return vec![];
+            }
+            (app.input.wishes, app.input.selected_wish) = (wishes, 0);
+            app.input.open(Mode::WishList);
+            uncover(app)
         }
         SessionEvent::Working(working) => {
             app.session.working = working;

@@ -16,6 +16,7 @@ mod palette;
 mod panel;
 mod picture;
 mod reach;
+pub(super) mod start;
 mod status;
 mod suggestions;
 pub(crate) mod target;
@@ -23,6 +24,7 @@ mod task;
 mod choices;
 mod timeline;
 mod value_colour;
+mod wish_list;
 mod world;
 #[cfg(test)]
 mod tests;
@@ -70,6 +72,7 @@ impl Widget for &App {
             Mode::Help => help::HelpOverlay(self).render(area, buf),
             Mode::Palette => palette::PaletteOverlay(self).render(layout.page, buf),
             Mode::Typing => suggestions::SuggestionsOverlay(self).render(layout.page, buf),
+            Mode::WishList => wish_list::WishListOverlay(self).render(layout.page, buf),
             Mode::Watch | Mode::Manual => {}
         }
         self.config.scheme.paint(buf);

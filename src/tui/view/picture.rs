@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 use super::panel::put;
-use super::{palette, suggestions};
+use super::{palette, suggestions, wish_list};
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
@@ -22,6 +22,7 @@ pub(super) fn picture(app: &App, area: Rect, buf: &mut Buffer) {
             let top = match app.input.mode {
                 Mode::Palette => palette::place(page).y,
                 Mode::Typing => suggestions::place(app, page).map_or(area.bottom(), |area| area.y),
+                Mode::WishList => wish_list::place(app, page).y,
                 Mode::Watch | Mode::Manual | Mode::Help => area.bottom(),
             };
             picture.render(Rect { height: area.height.min(top.saturating_sub(area.y)), ..area }, buf);

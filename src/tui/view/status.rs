@@ -8,8 +8,8 @@ use unicode_width::UnicodeWidthStr;
 
 use super::log::tone;
 use super::panel::fit;
-use crate::explore::session::RunMode;
-use crate::explore::verb::ExplorerPage;
+use crate::explore::session::{RunMode, SessionCommand};
+use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::theme::THEME;
@@ -68,7 +68,7 @@ impl Widget for HeaderRow<'_> {
 const NAME: &str = "SPRINT";
 
 /// For whoever has never been here.
-const WELCOME: &str = "New here? space: it acts, waits · i: tell it something · h l: in time · ?: keys";
+const WELCOME: &str = "New here? space: it acts, waits · w: wishes · i: tell it · h l: time · ?: keys";
 
 /// How pictures are shown and what they cost, as much of it as there is room for.
 fn pictures(app: &App, room: usize) -> String {
@@ -90,12 +90,29 @@ fn pictures(app: &App, room: usize) -> String {
     forms.into_iter().find(|form| form.width() <= room).unwrap_or_default()
 }
 
+/// What would be lost, and how to keep it or go on.
+fn question(app: &App, verb: &Verb) -> String {
+    let unsaved = app.session.now.as_ref().map_or_else(String::new, |now| now.unsaved.words());
+    let is_text = matches!(app.input.mode, Mode::Typing | Mode::Palette);
+    let again = match verb {
+        Verb::Quit if is_text => "ctrl-c again leaves (kept as the last session)",
+        Verb::Quit => "q again leaves (kept as the last session)",
+        Verb::Ask(SessionCommand::Next) => "N again leaves this house without",
+        _ => "the same again leaves this house without",
+    };
+    format!("Not saved: {unsaved}. S saves, {again}")
+}
+
 /// The last row.
 pub(crate) struct StatusRow<'a>(pub(crate) &'a App);
 
 impl Widget for StatusRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
+        if let Some(verb) = &app.input.asked {
+            Line::styled(fit(&question(app, verb), usize::from(area.width)), THEME.bad).render(area, buf);
+            return;
+        }
         if app.input.newcomer && (app.input.mode, app.page) == (Mode::Watch, ExplorerPage::Main) {
             Line::styled(fit(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
             return;
@@ -146,6 +163,7 @@ impl Widget for StatusRow<'_> {
             }
             (Mode::Palette, _) => &[("enter", "do it"), ("tab", "fill in"), ("up down", "select"), ("esc", "leave")],
             (Mode::Help, _) => &[("esc", "close the help")],
+            (Mode::WishList, _) => &[("j k", "select"), ("enter", "put it on the line"), ("esc", "leave")],
         };
         let mut spans = Vec::new();
         let mut used = 0;

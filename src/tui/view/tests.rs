@@ -2,9 +2,14 @@
 
 use std::sync::Arc;
 
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::layout::Rect;
 use termprofile::TermProfile;
 
 use super::panel::{bar, fit, share, wrap};
+use super::start::StartView;
 use crate::agent::registry::{PolicyIdentity, PolicyKind};
 use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
 use crate::analysis::value_map::{CellValue, Measure, ValueMap};
@@ -15,10 +20,11 @@ use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::graphics::Protocol;
-use crate::tui::keys::bindings;
+use crate::tui::keys::{Mode, bindings};
+use crate::tui::start_page::{self, StartPage};
 use crate::tui::testing::{app, decided, exploration, screen, snapshot, values};
-use crate::tui::theme::Ability;
-use crate::tui::update::{Effect, Msg, on_action, update};
+use crate::tui::theme::{Ability, Scheme};
+use crate::tui::update::{Effect, ExitReason, Msg, on_action, update};
 
 /// The smallest screen, and a large one.
 const SIZES: [(u16, u16); 2] = [(80, 24), (120, 36)];
@@ -104,6 +110,92 @@ fn a_wish_is_shown_from_how_it_is_understood_to_what_came_of_it() {
     let mut app = shown("refused", &mut exploration);
     on_action(&mut app, Verb::Show(ExplorerPage::Branches));
     check("wish-list-80x24", &screen(&mut app));
+}
+
+/// The start page as text.
+fn start_screen(page: &StartPage, width: u16, height: u16, ability: Ability) -> String {
+    let area = Rect::new(0, 0, width, height);
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    let view = || StartView { page, scheme: Scheme::default(), ability };
+    terminal.draw(|frame| frame.render_widget(view(), area)).unwrap();
+    terminal.backend().to_string()
+}
+
+#[test]
+fn the_start_page_lists_what_there_is_and_searches_it() {
+    for (width, height) in [(80, 24), (60, 20)] {
+        let mut page = start_page::tests::page();
+        check(&format!("start-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
+        start_page::tests::type_text(&mut page, "bed 7");
+        check(&format!("start-search-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
+        start_page::tests::type_text(&mut page, "zzz");
+        assert!(start_screen(&page, width, height, Ability::FULL).contains("nothing fits"));
+    }
+}
+
+#[test]
+fn the_start_page_says_what_is_opened_and_what_could_not_be() {
+    let mut page = start_page::tests::page();
+    (0..4).for_each(|_| drop(page.on_key(KeyCode::Tab.into())));
+    page.on_key(KeyCode::Enter.into());
+    assert!(start_screen(&page, 60, 20, Ability::FULL).contains("opening alfred ..."));
+    page.fail(
+        "checkpoints/alfred holds no checkpoint: config.json is missing in it, and so is model.safetensors".into(),
+    );
+    let bare = Ability { colours: TermProfile::NoColor, unicode: false };
+    check("start-failed-60x20", &start_screen(&page, 60, 20, bare));
+    for (width, height) in [(1, 1), (29, 20), (30, 8), (60, 9), (200, 60)] {
+        start_screen(&page, width, height, bare);
+    }
+}
+
+#[test]
+fn wishes_for_this_house_are_listed_and_one_is_put_on_the_line() {
+    let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+    let press = |app: &mut App, code: KeyCode| update(app, Msg::Key(code.into()));
+    assert_eq!(press(&mut app, KeyCode::Char('w')), [Effect::Send(SessionCommand::Examples)]);
+    let wishes = ["Pick up the mug.", "Put the plate in the sink.", "Open the fridge."].map(str::to_string).to_vec();
+    update(&mut app, Msg::Session(SessionEvent::Examples(wishes.clone())));
+    press(&mut app, KeyCode::Char('j'));
+    check("wishes-80x24", &screen(&mut app));
+    press(&mut app, KeyCode::Enter);
+    assert_eq!(app.input.editor.text(), "Put the plate in the sink.");
+    let told = Effect::Send(SessionCommand::Instruct("Put the plate in the sink.".into()));
+    assert_eq!(press(&mut app, KeyCode::Enter), [told]);
+    press(&mut app, KeyCode::Char('i'));
+    update(&mut app, Msg::Session(SessionEvent::Examples(wishes)));
+    assert_eq!(app.input.mode, Mode::Typing, "whoever types meanwhile is not disturbed");
+}
+
+#[test]
+fn what_is_not_saved_is_asked_about_before_it_is_left() {
+    let mut app = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+    let quit = [Effect::Quit(ExitReason::Asked)];
+    assert_eq!(on_action(&mut app, Verb::Quit), quit, "nothing would be lost");
+    let mut exploration = exploration();
+    exploration.instruct("open the fridge").unwrap();
+    update(&mut app, Msg::Session(SessionEvent::State(Box::new(snapshot(&mut exploration)))));
+    let key = |app: &mut App, code: KeyCode| update(app, Msg::Key(code.into()));
+    let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+    assert_eq!(key(&mut app, KeyCode::Char('N')), []);
+    check("unsaved-80x24", &screen(&mut app));
+    assert_eq!(key(&mut app, KeyCode::Char('q')), [], "another question");
+    key(&mut app, KeyCode::Char('b'));
+    assert!(!screen(&mut app).contains("Not saved"));
+    for page in [ExplorerPage::Main, ExplorerPage::World] {
+        on_action(&mut app, Verb::Show(page));
+        assert_eq!(key(&mut app, KeyCode::Char('q')), []);
+        assert!(screen(&mut app).contains("q again leaves"), "{page:?}");
+        assert_eq!(key(&mut app, KeyCode::Char('q')), quit);
+    }
+    on_action(&mut app, Verb::Edit);
+    assert_eq!(update(&mut app, Msg::Key(interrupt)), []);
+    assert!(screen(&mut app).contains("ctrl-c again"));
+    assert_eq!(update(&mut app, Msg::Key(interrupt)), quit);
+    assert_eq!(update(&mut app, Msg::Signal(15)), [Effect::Quit(ExitReason::Signal(15))], "a signal is not asked");
+    on_action(&mut app, Verb::Cancel);
+    update(&mut app, Msg::Resize(ratatui::layout::Size { width: 40, height: 10 }));
+    assert_eq!(key(&mut app, KeyCode::Char('q')), quit, "nobody could read the question");
 }
 
 #[test]

@@ -1,0 +1,96 @@
+//! The page before any house is open. It needs no more than 60 x 20 cells, and no colour.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Widget, Wrap};
+use unicode_width::UnicodeWidthStr;
+
+use super::panel::{fit, put, wrap};
+use crate::tui::start_page::StartPage;
+use crate::tui::theme::{Ability, Scheme, THEME};
+
+/// The page, in the person's colours.
+pub(crate) struct StartView<'a> {
+    pub(crate) page: &'a StartPage,
+    pub(crate) scheme: Scheme,
+    pub(crate) ability: Ability,
+}
+
+/// The smallest screen that is drawn.
+const SMALLEST: (u16, u16) = (30, 8);
+/// Columns of the kind of an entry.
+const KIND: usize = 13;
+
+impl Widget for StartView<'_> {
+    fn render(self, area: Rect, buf: &mut Buffer) {
+        if area.width < SMALLEST.0 || area.height < SMALLEST.1 {
+            let text = "This terminal is too small. Make it larger; enter starts, ctrl-c leaves.";
+            Paragraph::new(text).wrap(Wrap { trim: true }).render(area, buf);
+            return;
+        }
+        let page = self.page;
+        let count = match page.typed().text() {
+            "" => format!("{} to choose from", page.total()),
+            _ => format!("{} of {}", page.found.len(), page.total()),
+        };
+        Line::from(vec![Span::styled("SPRINT", THEME.title), Span::raw("  Where do you want to start?")])
+            .render(area, buf);
+        let line = Rect { y: area.y + 1, height: 1, ..area };
+        buf.set_string(line.x, line.y, "Search > ", THEME.title);
+        let right = count.width() as u16;
+        let typed = Rect { x: line.x + 9, width: line.width.saturating_sub(right + 11), ..line };
+        page.typed().area().render(typed, buf);
+        buf.set_string(area.right() - right, line.y, &count, THEME.quiet);
+        let foot = foot(page, area.width);
+        let list = Rect { y: area.y + 3, height: area.height - 4 - foot.len() as u16, ..area };
+        entries(page, list, buf);
+        for (row, (text, style)) in (0u16..).zip(&foot) {
+            put(buf, area, area.height - foot.len() as u16 + row, text, *style);
+        }
+        self.scheme.paint(buf);
+        self.ability.adapt(buf);
+    }
+}
+
+fn entries(page: &StartPage, area: Rect, buf: &mut Buffer) {
+    if page.found.is_empty() {
+        put(buf, area, 0, "  nothing fits: esc lists everything again", THEME.note);
+        return;
+    }
+    let room = usize::from(area.height);
+    let first = (page.selected + 1).saturating_sub(room).min(page.found.len().saturating_sub(room));
+    let width = usize::from(area.width);
+    let names = page.found.iter().map(|entry| entry.name.width() + entry.choice().width() + 1).max().unwrap_or(0);
+    let names = names.min(width.saturating_sub(KIND + 3) * 6 / 10).max(16);
+    for (row, (at, entry)) in area.rows().zip(page.found.iter().enumerate().skip(first)) {
+        let is_selected = at == page.selected;
+        let (mark, style) = if is_selected { ("> ", THEME.chosen) } else { ("  ", Style::new()) };
+        let name = fit(format!("{} {}", entry.name, entry.choice()).trim_end(), names);
+        let note = fit(&entry.note, width.saturating_sub(KIND + names + 4));
+        Line::from(vec![
+            Span::styled(mark, style),
+            Span::styled(format!("{:<KIND$} ", entry.start.kind()), THEME.quiet),
+            Span::styled(format!("{name:<names$} "), style),
+            Span::styled(note, THEME.quiet),
+        ])
+        .render(row, buf);
+    }
+}
+
+/// What goes on, or what a number means, and the keys.
+fn foot(page: &StartPage, width: u16) -> Vec<(String, Style)> {
+    let width = usize::from(width);
+    let mut lines: Vec<(String, Style)> = match (&page.opening, &page.complaint) {
+        (Some(what), _) => vec![(format!("opening {what} ..."), THEME.note)],
+        (None, Some(why)) => wrap(why, width, "  ").into_iter().take(3).map(|line| (line, THEME.bad)).collect(),
+        (None, None) => {
+            vec![("Letters search; a number: seed, task or episode (bedroom 7)".into(), THEME.quiet)]
+        }
+    };
+    let keys = "enter open  up down select  tab next kind  esc first one  ctrl-c leave";
+    let short = "enter open  up down  tab next kind  esc first  ctrl-c leave";
+    lines.push((if width < keys.width() { short } else { keys }.into(), THEME.quiet));
+    lines
+}
