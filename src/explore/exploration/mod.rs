@@ -67,7 +67,7 @@ impl Exploration {
             checkpoints: Arc::new(policies.agents()),
             policies,
             tree: Tree::new(SavedState::of(&rollout, &author, PolicyState::Nothing)),
-            acting: ActingPolicy { kind, policy: None, author, decision: None },
+            acting: ActingPolicy { kind, policy: None, author, decision: None, redirected: false },
             rollout,
             episode: CurrentEpisode {
                 number: 1,

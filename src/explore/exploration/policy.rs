@@ -12,8 +12,11 @@ impl Exploration {
     /// When it cannot be loaded; the one before stays.
     pub fn choose(&mut self, kind: PolicyKind) -> anyhow::Result<()> {
         let Loaded { policy, checkpoint } = self.policies.make(kind)?;
+        let before = self.acting.policy.as_ref().map(|_| self.acting.author.clone());
         self.acting.author.policy = policy.name().to_string();
         self.acting.author.checkpoint = checkpoint;
+        // The one that is loaded first is no other.
+        self.acting.redirected |= before.is_some_and(|before| before != self.acting.author);
         self.acting.policy = Some(policy);
         self.acting.kind = kind;
         self.look_back();
@@ -66,6 +69,7 @@ impl Exploration {
 
     /// Gives the policy another chance from here on; with `samples` it draws its actions instead of taking the likeliest.
     pub(crate) fn reseed(&mut self, seed: u64, samples: bool) {
+        self.acting.redirected |= (self.acting.author.seed, self.acting.author.sampling) != (seed, samples);
         self.acting.author.seed = seed;
         self.acting.author.sampling = samples;
         self.look_back();

@@ -35,6 +35,8 @@ pub(super) struct ActingPolicy {
     pub(super) author: Author,
     /// What it decided in the present state, once it was asked.
     pub(super) decision: Option<(Decision, Option<Values>)>,
+    /// Somebody was told or made to decide something else in the present state.
+    pub(super) redirected: bool,
 }
 
 /// What is drawn of the present state.

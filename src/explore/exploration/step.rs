@@ -93,6 +93,7 @@ impl Exploration {
         };
         let Tick { step, outcome, completed_one, .. } = tick;
         self.frames.present = None;
+        self.acting.redirected = false;
         let by_hand = taken.author.is_hand();
         let distribution = taken.decision.distribution.clone().filter(|_| !by_hand);
         let why = self.why(&taken, &words);

@@ -83,6 +83,7 @@ impl Exploration {
         self.wishes.clone_from(&moment.wishes);
         self.frames.present = None;
         self.acting.decision = None;
+        self.acting.redirected = false;
         if moment.author == self.acting.author && !matches!(moment.carried, PolicyState::Nothing) {
             if let Some(policy) = self.acting.policy.as_deref_mut() {
                 policy.restore(0, moment.carried);
@@ -90,6 +91,17 @@ impl Exploration {
         } else {
             self.look_back();
         }
+    }
+
+    /// Whether going on from here follows what was recorded: there is something, and what was told or chosen here since is not
+    /// something else.
+    pub(crate) fn follows_recording(&self) -> bool {
+        let Some(next) = self.tree.next() else { return false };
+        let is_told = match (&next.wish, self.wishes.last()) {
+            (Some(next), Some(wish)) => next.is_same(wish),
+            _ => *next.instruction == *self.rollout.instruction,
+        };
+        !self.acting.redirected || (is_told && (next.author == self.acting.author || next.author.is_hand()))
     }
 
     /// The policy begins anew here, having seen the frames before this one.

@@ -53,6 +53,7 @@ impl Exploration {
             .as_ref()
             .is_some_and(|task| instruction::normalise(&task.instruction) == instruction::normalise(&text));
         if is_task && asked {
+            self.acting.redirected |= self.rollout.instruction != text;
             self.rollout.instruction = text;
             self.acting.decision = None;
             self.told += 1;
@@ -177,6 +178,7 @@ impl Exploration {
         self.rollout.env.grader = wish.grader(house.scene(), house.world());
         self.rollout.horizon = wish.limit().map(|limit| now + limit);
         self.acting.decision = None;
+        self.acting.redirected = true;
         if self.wishes.last().is_some_and(|last| last.began == now && last.verdict.is_none()) {
             self.wishes.pop();
         }

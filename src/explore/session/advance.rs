@@ -43,6 +43,11 @@ impl Session {
     }
 
     pub(super) fn start(&mut self, mode: RunMode, until: Option<Condition>) {
+        // Whoever said or chose something else here wants that, not what was done before.
+        let mode = match mode {
+            RunMode::Replay if !self.exploration.follows_recording() => RunMode::Policy,
+            mode => mode,
+        };
         let can_run = match mode {
             RunMode::Replay => self.exploration.tree().next().is_some(),
             // That there is no policy was told to whoever looks on.
@@ -226,6 +231,41 @@ mod tests {
         session.apply(SessionCommand::Say { fulfilled: true });
         assert_eq!(last_word(&events), "done, you say; the agent: done at step 3");
         assert_eq!(session.exploration.end(), Some(WishVerdict::SaidDone));
+    }
+
+    #[test]
+    fn going_on_in_the_past_follows_what_was_done_until_something_else_is_told_or_chosen_there() {
+        let goes_on = |change: Option<SessionCommand>| {
+            let mut exploration = testing::exploration();
+            exploration.choose(crate::agent::registry::PolicyKind::Random).unwrap();
+            let (mut session, _) = listened(exploration);
+            run(&mut session, 6);
+            session.apply(SessionCommand::Seek(2));
+            if let Some(change) = change {
+                session.apply(change);
+            }
+            session.apply(SessionCommand::Run { mode: RunMode::Replay, until: None });
+            for _ in 0..2 {
+                session.advance();
+            }
+            let tree = session.exploration.tree();
+            (tree.branches().len(), session.exploration.instruction().to_string(), tree.at())
+        };
+        let task = "Put the mug in the sink.".to_string();
+        assert_eq!(goes_on(None), (1, task.clone(), 4));
+        assert_eq!(
+            goes_on(Some(SessionCommand::Instruct("pick up the mug".into()))),
+            (2, "Pick up the mug.".into(), 4)
+        );
+        assert_eq!(goes_on(Some(SessionCommand::Instruct("dance".into()))), (2, "Dance.".into(), 4));
+        assert_eq!(
+            goes_on(Some(SessionCommand::Choose(crate::agent::registry::PolicyKind::Expert))),
+            (2, task.clone(), 4)
+        );
+        assert_eq!(goes_on(Some(SessionCommand::Sample(77))), (2, task.clone(), 4));
+        let same = SessionCommand::Choose(crate::agent::registry::PolicyKind::Random);
+        assert_eq!(goes_on(Some(same)), (1, task, 4), "the same policy again is nothing else");
+        assert_eq!(goes_on(Some(SessionCommand::Reset)).0, 1, "a reset alone follows what was done");
     }
 
     #[test]
