@@ -22,5 +22,6 @@ mod scenarios;
 mod training;
 mod start;
 mod terminal;
+mod terminal_habits;
 mod wishes;
 mod workbench;

@@ -88,6 +88,34 @@ impl Session {
         written.windows(sequence.len()).any(|bytes| bytes == sequence.as_bytes())
     }
 
+    /// How often that sequence was written to the terminal.
+    pub(crate) fn times_written(&self, sequence: &str) -> usize {
+        let written = self.written.lock().unwrap();
+        written.windows(sequence.len()).filter(|bytes| *bytes == sequence.as_bytes()).count()
+    }
+
+    /// Whether the program is stopped, and may go on later.
+    pub(crate) fn is_stopped(&self) -> bool {
+        let state = std::fs::read_to_string(format!("/proc/{}/stat", self.child.process_id().unwrap())).unwrap();
+        state.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T'))
+    }
+
+    fn stty(&self, arguments: &[&str]) -> String {
+        let name = self.master.tty_name().unwrap();
+        let output = std::process::Command::new("stty").arg("-F").arg(name).args(arguments).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Whether the terminal hands on whole lines, as a shell's does.
+    pub(crate) fn takes_lines(&self) -> bool {
+        self.stty(&["-a"]).split_whitespace().any(|mode| mode == "icanon")
+    }
+
+    /// Makes the terminal what a shell makes of it.
+    pub(crate) fn reset_modes(&self) {
+        self.stty(&["sane"]);
+    }
+
     /// Waits until something holds.
     pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Session) -> bool) {
         let since = Instant::now();

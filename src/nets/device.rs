@@ -70,7 +70,7 @@ fn load_cuda() {
     });
 }
 
-/// The only unsafe call of the program.
+/// One of the two unsafe calls of the program.
 #[allow(unsafe_code)]
 fn open_library(path: &Path) {
     use std::os::unix::ffi::OsStrExt;

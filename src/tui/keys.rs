@@ -70,6 +70,7 @@ pub(crate) fn verb(mode: Mode, page: ExplorerPage, key: KeyEvent) -> Option<Verb
     if key.modifiers.contains(KeyModifiers::CONTROL) {
         return match key.code {
             Char('c') => Some(Verb::Quit),
+            Char('z') => Some(Verb::Suspend),
             Char('p') if matches!(mode, Mode::Watch | Mode::Manual) => Some(Verb::Palette(String::new())),
             _ => None,
         };

@@ -10,13 +10,17 @@ pub(crate) mod editor;
 pub mod graphics;
 pub(crate) mod history;
 mod key_name;
+mod keyboard;
 pub(crate) mod keys;
 pub mod layout;
 pub(crate) mod log;
 pub(crate) mod opening;
+mod pacing;
 pub mod screen;
+mod signals;
 mod start_page;
 pub mod terminal;
+mod terminal_input;
 #[cfg(test)]
 mod testing;
 pub mod theme;

@@ -3,27 +3,26 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use crossterm::clipboard::CopyToClipboard;
-use crossterm::event::Event;
 use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
 use ratatui::backend::{Backend, ClearType, CrosstermBackend};
-use ratatui::layout::Size;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use termprofile::TermProfile;
 
 use super::app::{App, Graphics};
 use super::config::ExplorerConfig;
-use super::graphics::coarse::COARSEST;
 use super::graphics::encoder::PictureEncoder;
 use super::graphics::{Protocol, detect, inline};
 use super::history;
+use super::keyboard::Keyboard;
 use super::opening::{Open, Opening, Picked, StartStyle, pick};
+use super::pacing::{self, Pacer};
+use super::signals::{self, PATIENCE};
 use super::start_page::StartPage;
 use super::terminal::{self, Counted};
 use super::theme::Ability;
@@ -61,8 +60,6 @@ pub(crate) struct ScreenOptions {
 const QUEUE: usize = 64;
 /// How long the meter of bytes a second counts.
 const METERED: Duration = Duration::from_secs(1);
-/// How long a screen that does not react to a signal is waited for.
-const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Shows the explorer until it ends.
 ///
@@ -74,13 +71,14 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
     let ability = ability();
     terminal::catch_panics();
     let (tell, messages) = sync_channel(QUEUE);
-    watch_signals(tell.clone())?;
+    signals::watch(tell.clone())?;
     let guard =
         terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref());
+    let mut keyboard = Keyboard::default();
+    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref(), &mut keyboard);
     let mut display =
         Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
-    read_keys(tell.clone())?;
+    keyboard.listen(tell.clone())?;
     let session = screen.session.clone();
     let work = |open: Open| start_worker(open, session.clone(), &tell);
     let (commands, first, goes_on) = match opening {
@@ -194,6 +192,9 @@ pub struct ScreenLoop<W: Write> {
     metered: (u32, u64),
     /// When the meter of bytes a second began to count, and the bytes written until then.
     since: (Instant, u64),
+    pacer: Pacer,
+    /// The program was stopped, and has not been let go on yet: the terminal is another's.
+    is_stopped: bool,
 }
 
 impl<W: Write> ScreenLoop<W> {
@@ -206,7 +207,8 @@ impl<W: Write> ScreenLoop<W> {
         history: Option<PathBuf>,
     ) -> ScreenLoop<W> {
         let since = (Instant::now(), terminal::WRITTEN.load(Ordering::Relaxed));
-        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since }
+        let pacer = Pacer::new(first_answer());
+        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since, pacer, is_stopped: false }
     }
 
     /// Draws the state and sends it out whole.
@@ -220,6 +222,41 @@ impl<W: Write> ScreenLoop<W> {
         Write::flush(self.display.backend_mut())
     }
 
+    /// Draws the state where the terminal has taken in what was drawn before, and asks it to say when it has taken in this.
+    /// Returns how long that has to wait otherwise.
+    fn show_when_ready(&mut self) -> io::Result<Option<Duration>> {
+        let now = Instant::now();
+        if self.is_stopped {
+            return Ok(None);
+        }
+        if let Some(left) = self.pacer.waits(now) {
+            return Ok(Some(left));
+        }
+        self.show()?;
+        if self.pacer.sends(now) {
+            self.display.backend_mut().write_all(pacing::QUESTION)?;
+            Write::flush(self.display.backend_mut())?;
+        }
+        Ok(None)
+    }
+
+    /// Gives the terminal back and stops, with all that was started together with it; whoever lets it go on says so by a signal.
+    fn stop(&mut self) -> io::Result<()> {
+        Write::flush(self.display.backend_mut())?;
+        terminal::give_back();
+        self.is_stopped = true;
+        rustix::process::kill_current_process_group(rustix::process::Signal::STOP)?;
+        Ok(())
+    }
+
+    /// Takes the terminal again: whoever had it meanwhile left it as they like it.
+    fn go_on(&mut self) -> io::Result<()> {
+        terminal::take_again()?;
+        self.is_stopped = false;
+        self.pacer = Pacer::new(first_answer());
+        self.repaint()
+    }
+
     /// Takes in messages; says when one of them ends it.
     ///
     /// # Errors
@@ -227,6 +264,9 @@ impl<W: Write> ScreenLoop<W> {
     pub fn on_messages(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<ExitReason>> {
         let mut encode = false;
         for msg in messages {
+            if matches!(msg, Msg::Ready) {
+                self.pacer.answered();
+            }
             for effect in update(&mut self.app, msg) {
                 match effect {
                     // A worker that is gone says so itself.
@@ -241,7 +281,10 @@ impl<W: Write> ScreenLoop<W> {
                         }
                     }
                     Effect::Mouse(on) => terminal::report_mouse(self.display.backend_mut(), on)?,
+                    Effect::Repaint if self.is_stopped => {}
                     Effect::Repaint => self.repaint()?,
+                    Effect::Stop => self.stop()?,
+                    Effect::GoOn => self.go_on()?,
                     Effect::Quit(exit) => return Ok(Some(exit)),
                 }
             }
@@ -273,25 +316,16 @@ impl<W: Write> ScreenLoop<W> {
         Ok(())
     }
 
-    /// Makes pictures coarser or finer, so that steps keep to what they may cost.
-    fn budget(&mut self) {
-        let (Some(most), Some(cost)) = (self.app.traffic.limit, self.app.traffic.of_step) else { return };
-        if cost > most {
-            self.app.traffic.coarseness = (self.app.traffic.coarseness + 1).min(COARSEST);
-        } else if 3 * cost < most {
-            self.app.traffic.coarseness = self.app.traffic.coarseness.saturating_sub(1);
-        }
-    }
-
     /// Notes what the newest steps cost on the wire.
     fn meter(&mut self) {
         let step = self.app.session.now.as_ref().map_or(0, |now| now.step);
         let (before, bytes_before) = self.metered;
         if step != before {
             let bytes = terminal::WRITTEN.load(Ordering::Relaxed);
-            self.app.traffic.of_step = (step > before).then(|| (bytes - bytes_before) / u64::from(step - before));
+            let steps = step.saturating_sub(before);
+            self.app.traffic.of_step = (steps > 0).then(|| (bytes - bytes_before) / u64::from(steps));
             self.metered = (step, bytes);
-            self.budget();
+            self.app.traffic.keep_to_limit(bytes - bytes_before, steps);
         }
         let (since, before) = self.since;
         if since.elapsed() >= METERED {
@@ -304,12 +338,27 @@ impl<W: Write> ScreenLoop<W> {
 
 /// Takes in messages until one of them ends it.
 fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<ExitReason> {
+    // Something changed that is not drawn yet.
+    let mut is_stale = true;
     loop {
         screen.measure()?;
-        screen.show()?;
-        let first = messages.recv().context("all threads are gone")?;
+        let mut wait = None;
+        if is_stale {
+            wait = screen.show_when_ready()?;
+            is_stale = wait.is_some();
+        }
+        let first = match wait {
+            None => Some(messages.recv().context("all threads are gone")?),
+            Some(wait) => match messages.recv_timeout(wait) {
+                Ok(msg) => Some(msg),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => anyhow::bail!("all threads are gone"),
+            },
+        };
         // What came meanwhile is taken in before the next drawing: only the newest state is drawn.
-        let all = std::iter::once(first).chain(messages.try_iter().take(4 * QUEUE));
+        let all: Vec<Msg> = first.into_iter().chain(messages.try_iter().take(4 * QUEUE)).collect();
+        // That the terminal is ready changes nothing on the screen.
+        is_stale |= all.iter().any(|msg| !matches!(msg, Msg::Ready));
         if let Some(exit) = screen.on_messages(all)? {
             return Ok(exit);
         }
@@ -335,8 +384,26 @@ fn ability() -> Ability {
     Ability { colours, unicode: detect::shows_unicode(variable) }
 }
 
+/// Whether the terminal is at the other end of a link.
+fn is_remote() -> bool {
+    std::env::var_os("SSH_CONNECTION").is_some()
+}
+
+/// How long the first answer of a terminal is waited for: most answer at once, and a link takes its time.
+fn first_answer() -> Duration {
+    if is_remote() { Duration::from_secs(3) } else { Duration::from_millis(300) }
+}
+
+/// Asks the terminal whether it shows sixels. An answer that comes later does no harm: it is no key.
+fn has_sixel(keyboard: &mut Keyboard, patience: Duration) -> io::Result<bool> {
+    let mut out = io::stdout();
+    out.write_all(detect::QUESTION)?;
+    out.flush()?;
+    Ok(keyboard.attributes(patience)?.is_some_and(|numbers| numbers.contains(&detect::SIXEL)))
+}
+
 /// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
-fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) -> Graphics {
+fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>, keyboard: &mut Keyboard) -> Graphics {
     let cell_pixels = match crossterm::terminal::window_size() {
         Ok(window) if window.width > 0 && window.height > 0 => {
             ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
@@ -347,8 +414,8 @@ fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) ->
         Some(protocol) => (protocol, "asked for".to_string()),
         None => {
             let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
-            let patience = if std::env::var_os("SSH_CONNECTION").is_some() { 700 } else { 250 };
-            let ask = || detect::has_sixel(Duration::from_millis(patience)).unwrap_or(false);
+            let patience = Duration::from_millis(if is_remote() { 700 } else { 250 });
+            let ask = || has_sixel(keyboard, patience).unwrap_or(false);
             let name =
                 ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
             if reason == detect::UNKNOWN && detect::remembered(memory, &name, ask) {
@@ -362,41 +429,6 @@ fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>) ->
     };
     let in_tmux = std::env::var_os("TMUX").is_some();
     Graphics { protocol, reason, cell_pixels, in_tmux }
-}
-
-fn read_keys(tell: SyncSender<Msg>) -> io::Result<()> {
-    let read = move || {
-        while let Ok(event) = crossterm::event::read() {
-            let msg = match event {
-                Event::Key(key) => Msg::Key(key),
-                Event::Mouse(event) => Msg::Mouse(event),
-                Event::Paste(text) => Msg::Paste(text),
-                Event::Resize(width, height) => Msg::Resize(Size { width, height }),
-                _ => continue,
-            };
-            if tell.send(msg).is_err() {
-                break;
-            }
-        }
-    };
-    std::thread::Builder::new().name("keys".into()).spawn(read).map(drop)
-}
-
-/// A signal asks the screen to end; when it does not in time, the terminal is given back here and the program ends.
-fn watch_signals(tell: SyncSender<Msg>) -> io::Result<()> {
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-    let watch = move || {
-        if let Some(number) = signals.forever().next() {
-            let asked = Instant::now();
-            while tell.try_send(Msg::Signal(number)).is_err() && asked.elapsed() < PATIENCE {
-                std::thread::sleep(Duration::from_millis(10));
-            }
-            std::thread::sleep(PATIENCE.saturating_sub(asked.elapsed()));
-            terminal::give_back();
-            std::process::exit(128 + number);
-        }
-    };
-    std::thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
 }
 
 #[cfg(test)]

@@ -79,6 +79,7 @@ impl<W: Write> Plain<W> {
             | Verb::Labels
             | Verb::Bandwidth(_)
             | Verb::FullFrame
+            | Verb::Suspend
             | Verb::Mouse => anyhow::bail!("that is about the screen, and there is none"),
             // Keys of the screen; no line says them.
             Verb::Edit

@@ -81,6 +81,8 @@ pub(crate) enum Verb {
     Palette(String),
     /// The keys of this screen.
     Help,
+    /// Stop, and go on when the shell says so.
+    Suspend,
     /// End the session.
     Quit,
     /// While typing: tell the agent.

@@ -6,6 +6,7 @@ use ratatui::layout::Size;
 
 use crate::tui::graphics::Picture;
 use crate::tui::graphics::Protocol;
+use crate::tui::graphics::coarse::COARSEST;
 use crate::tui::graphics::letters::{Letters, Names};
 use crate::tui::theme::Ability;
 
@@ -56,4 +57,71 @@ pub struct Traffic {
     pub(crate) of_step: Option<u64>,
     /// What a second cost, over the last while.
     pub(crate) of_second: Option<u64>,
+    /// What was written beyond what the steps so far may cost.
+    pub(crate) debt: u64,
+    /// Steps since a picture was left out for that.
+    pub(crate) left_out: u32,
+}
+
+/// Steps after which a picture is shown whatever the others cost.
+const LONGEST_WAIT: u32 = 10;
+
+impl Traffic {
+    /// Takes in what the newest steps cost. Pictures get coarser or finer, so that steps keep to what they may cost; where the
+    /// coarsest still cost more, pictures are left out until that is made up for.
+    pub(crate) fn keep_to_limit(&mut self, bytes: u64, steps: u32) {
+        let Some(most) = self.limit else { return };
+        if steps == 0 {
+            self.debt = 0;
+            return;
+        }
+        let may = most * u64::from(steps);
+        self.debt = (self.debt + bytes).saturating_sub(may);
+        self.left_out = if self.debt > 0 { self.left_out + steps } else { 0 };
+        if self.left_out >= LONGEST_WAIT {
+            (self.debt, self.left_out) = (0, 0);
+        }
+        if bytes > may {
+            self.coarseness = (self.coarseness + 1).min(COARSEST);
+        } else if 3 * bytes < may && self.debt == 0 {
+            self.coarseness = self.coarseness.saturating_sub(1);
+        }
+    }
+
+    /// Whether a run may show another picture.
+    pub(crate) fn affords_picture(&self) -> bool {
+        self.limit.is_none() || self.debt == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_cost_too_much_are_coarser_and_then_rarer_until_steps_keep_to_their_limit() {
+        let mut traffic = Traffic { limit: Some(4000), ..Traffic::default() };
+        let mut written = 0;
+        for _ in 0..100 {
+            // A picture of 9 kB, or of 6 at the coarsest, and a kB of text.
+            let picture = if traffic.affords_picture() { 9000 - 1000 * u64::from(traffic.coarseness) } else { 0 };
+            written += picture + 1000;
+            traffic.keep_to_limit(picture + 1000, 1);
+        }
+        assert!((300_000..=410_000).contains(&written), "{written} bytes in 100 steps");
+    }
+
+    #[test]
+    fn no_limit_leaves_pictures_alone_and_text_alone_does_not_end_them() {
+        let mut traffic = Traffic::default();
+        traffic.keep_to_limit(1_000_000, 1);
+        assert!(traffic.affords_picture() && traffic.coarseness == 0);
+        let mut traffic = Traffic { limit: Some(1000), ..Traffic::default() };
+        traffic.keep_to_limit(1_000_000, 1);
+        let pictures = (0..40).filter(|_| {
+            traffic.keep_to_limit(1900, 1);
+            traffic.affords_picture()
+        });
+        assert_eq!(pictures.count(), 4);
+    }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use ratatui::style::Style;
+
 use crate::house::view::Frame;
 
 /// The coarsest that pictures get.
@@ -24,9 +26,48 @@ pub(crate) fn coarse(frame: Arc<Frame>, coarseness: u8) -> Arc<Frame> {
     Arc::new(Frame { rgb, ..(*frame).clone() })
 }
 
+/// The cells of a picture in larger blocks: neighbours that are alike are not sent one by one, and change together. Blocks are
+/// two columns to a row, as cells are narrow.
+pub(crate) fn coarse_cells(cells: &mut [(char, Style)], columns: usize, coarseness: u8) {
+    let (wide, high) = (1usize << coarseness.min(COARSEST), 1usize << coarseness.min(COARSEST).saturating_sub(1));
+    let rows = cells.len() / columns.max(1);
+    for row in 0..rows {
+        for column in 0..columns {
+            let middle = |at: usize, side: usize, most: usize| (at / side * side + side / 2).min(most - 1);
+            let from = middle(row, high, rows) * columns + middle(column, wide, columns);
+            // Only what comes before is overwritten; the middle of a block is read before its turn, or stays as it is.
+            cells[row * columns + column] = plain(cells[from]);
+        }
+    }
+}
+
+/// A letter stays; a cut between two colours would be repeated as a pattern, so one of them fills the cell.
+fn plain((symbol, style): (char, Style)) -> (char, Style) {
+    match (symbol.is_ascii(), style.bg) {
+        (false, Some(colour)) => (' ', Style::new().bg(colour)),
+        _ => (symbol, style),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ratatui::style::Color;
+
+    #[test]
+    fn coarse_cells_are_blocks_of_their_middle() {
+        let grey = |value| Style::new().bg(Color::Rgb(value, value, value)).fg(Color::Reset);
+        let fine: Vec<(char, Style)> = (0..8 * 4).map(|at| ('▀', grey(at))).collect();
+        for coarseness in 1..=3 {
+            let mut cells = fine.clone();
+            coarse_cells(&mut cells, 8, coarseness);
+            let kinds = cells.iter().map(|(_, style)| style.bg).collect::<std::collections::HashSet<_>>().len();
+            assert_eq!(kinds, [16, 4, 1][usize::from(coarseness) - 1], "{coarseness}");
+        }
+        let mut letters = vec![('a', Style::new()), ('b', Style::new())];
+        coarse_cells(&mut letters, 2, 1);
+        assert_eq!(letters, [('b', Style::new()); 2]);
+    }
 
     #[test]
     fn coarse_frames_have_fewer_different_pixels() {

@@ -1,11 +1,7 @@
 //! A guess at how the terminal can show pictures: from the environment, and from one question that every terminal answers.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use serde::{Deserialize, Serialize};
 
@@ -95,40 +91,10 @@ pub(crate) fn remembered(memory: Option<&Path>, name: &str, ask: impl FnOnce() -
     answer
 }
 
-/// Asks the terminal what it is ("primary device attributes") and reads its answer until `patience` is over. Attribute 4
-/// means sixel. A later answer does no harm: crossterm knows this one and drops it.
-///
-/// # Errors
-/// When the terminal cannot be written or read.
-pub(crate) fn has_sixel(patience: Duration) -> std::io::Result<bool> {
-    let mut out = std::io::stdout();
-    out.write_all(b"\x1b[c")?;
-    out.flush()?;
-    let stdin = std::io::stdin();
-    let deadline = Instant::now() + patience;
-    let mut answer = Vec::new();
-    while !answer.ends_with(b"c") && answer.len() < 256 {
-        let left = deadline.saturating_duration_since(Instant::now());
-        let timeout = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: i64::from(left.subsec_nanos()) };
-        let mut waiting = [PollFd::new(&stdin, PollFlags::IN)];
-        if left.is_zero() || poll(&mut waiting, Some(&timeout))? == 0 {
-            break;
-        }
-        let mut byte = [0];
-        if rustix::io::read(&stdin, &mut byte)? == 0 {
-            break;
-        }
-        answer.push(byte[0]);
-    }
-    Ok(attributes(&answer).contains(&4))
-}
-
-/// The numbers in a "primary device attributes" answer.
-fn attributes(answer: &[u8]) -> Vec<u32> {
-    let text = String::from_utf8_lossy(answer);
-    let Some((_, rest)) = text.split_once("\x1b[?") else { return Vec::new() };
-    rest.trim_end_matches('c').split(';').filter_map(|number| number.parse().ok()).collect()
-}
+/// Asks a terminal what it is ("primary device attributes"); attribute 4 of its answer means sixel.
+pub(crate) const QUESTION: &[u8] = b"\x1b[c";
+/// The attribute of a terminal that shows sixels.
+pub(crate) const SIXEL: u32 = 4;
 
 #[cfg(test)]
 mod tests {
@@ -171,12 +137,5 @@ mod tests {
         assert!(!remembered(Some(&path), "vt100", || false));
         std::fs::write(&path, "nonsense").unwrap();
         assert!(!remembered(Some(&path), "xterm", || false), "what cannot be read is asked anew");
-    }
-
-    #[test]
-    fn the_attributes_of_a_terminal_are_read_from_its_answer() {
-        assert_eq!(attributes(b"\x1b[?62;4;22c"), [62, 4, 22]);
-        assert_eq!(attributes(b"\x1b[?1;2c"), [1, 2]);
-        assert!(attributes(b"q\x1b[1;1R").is_empty());
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn over_cells(labels: &[ThingLabel], frame: &Frame, size: Cells, cell
         let middle = (left + right) / 2 * columns / width;
         let start = middle.saturating_sub(length / 2).min(columns.saturating_sub(length));
         let [r, g, b] = colour(label);
-        let style = Style::new().fg(Color::Black).bg(Color::Rgb(r, g, b)).add_modifier(Modifier::BOLD);
+        let style = Style::new().fg(Color::Rgb(0, 0, 0)).bg(Color::Rgb(r, g, b)).add_modifier(Modifier::BOLD);
         for (column, symbol) in (start..columns).zip(text.chars()) {
             if let Some(cell) = cells.get_mut(row * columns + column) {
                 *cell = (symbol, style);

@@ -40,9 +40,16 @@ impl Picture {
     pub fn encode(job: &Job) -> Picture {
         let frame = coarse::coarse(overlay::shown(job.overlay, &job.frame, &job.recent), job.coarseness);
         let job = &Job { frame, recent: Vec::new(), ..job.clone() };
+        let in_blocks = |mut cells: Vec<(char, Style)>| {
+            // Numbers in the picture have to stay legible.
+            if job.coarseness > 0 && job.labels.is_empty() {
+                coarse::coarse_cells(&mut cells, usize::from(job.cells.width), job.coarseness);
+            }
+            Content::Cells(cells)
+        };
         let content = match job.protocol {
-            Protocol::HalfBlocks => Content::Cells(blocks::draw(job)),
-            Protocol::Ascii => Content::Cells(classes::draw(job)),
+            Protocol::HalfBlocks => in_blocks(blocks::draw(job)),
+            Protocol::Ascii => in_blocks(classes::draw(job)),
             Protocol::Kitty if job.in_tmux => Content::Placed(inline::kitty(job)),
             Protocol::Kitty => Content::Laid(inline::kitty(job), job.frame.height),
             Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),

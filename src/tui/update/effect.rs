@@ -17,6 +17,10 @@ pub(crate) enum Effect {
     Remember(String),
     /// Hear the mouse, or no longer.
     Mouse(bool),
+    /// Give the terminal back and stop until somebody lets the program go on.
+    Stop,
+    /// Take the terminal again after that.
+    GoOn,
     /// End the program, for that reason.
     Quit(ExitReason),
 }

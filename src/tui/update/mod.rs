@@ -38,6 +38,12 @@ pub enum Msg {
     Session(SessionEvent),
     /// A frame was encoded.
     Picture(Picture),
+    /// The terminal has taken in all that was written.
+    Ready,
+    /// A signal asks the program to stop for a while.
+    StopAsked,
+    /// The program goes on after it was stopped.
+    Continued,
     /// A signal asks the program to end.
     Signal(i32),
     /// The worker stopped.
@@ -85,10 +91,18 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         Msg::Session(event) => on_event(app, event),
         Msg::Picture(picture) => {
             let fits = app.picture_area().is_some_and(|area| area.as_size() == picture.cells);
-            if fits && picture.protocol == app.terminal.graphics.protocol {
+            let spared =
+                app.session.run_mode.is_some() && !app.traffic.affords_picture() && app.frame.picture.is_some();
+            if fits && !spared && picture.protocol == app.terminal.graphics.protocol {
                 app.frame.picture = Some(picture);
             }
             vec![]
+        }
+        Msg::Ready => vec![],
+        Msg::StopAsked => vec![Effect::Stop],
+        Msg::Continued => {
+            app.frame.picture = None;
+            vec![Effect::GoOn, Effect::Encode]
         }
         Msg::Signal(number) => vec![Effect::Quit(ExitReason::Signal(number))],
         Msg::WorkerGone => vec![Effect::Quit(ExitReason::WorkerGone)],

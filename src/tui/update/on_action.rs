@@ -101,6 +101,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             complete(app);
             vec![]
         }
+        Verb::Suspend => vec![Effect::Stop],
         Verb::Quit => vec![Effect::Quit(ExitReason::Asked)],
         Verb::Copy => copy(app),
         Verb::Graphics | Verb::Overlay | Verb::Labels | Verb::Bandwidth(_) | Verb::FullFrame | Verb::Mouse => {

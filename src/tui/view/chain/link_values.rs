@@ -49,7 +49,7 @@ impl Widget for LinkValueStrips<'_> {
                     let share = if high > low { (value - low) / (high - low) } else { 0.0 };
                     // A digit says it without colours too.
                     let digit = char::from_digit((share * 9.0).round() as u32, 10).unwrap_or('9');
-                    let ink = if share > 0.55 { Color::Black } else { Color::White };
+                    let ink = if share > 0.55 { Color::Rgb(0, 0, 0) } else { Color::White };
                     let style = Style::new().fg(ink).bg(value_colour(share));
                     let in_force = play.in_force.get(step) == Some(&link);
                     let force = if in_force { Modifier::BOLD | Modifier::UNDERLINED } else { Modifier::empty() };
