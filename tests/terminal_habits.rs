@@ -118,3 +118,30 @@ fn an_answer_in_two_pieces_is_no_key_and_keys_before_it_are_kept() {
     assert_eq!(session.end(), 0);
     session.is_restored();
 }
+
+#[test]
+fn a_small_screen_shows_everything_a_smaller_one_the_frame_and_a_tiny_one_waits() {
+    let state = tempfile::tempdir().unwrap();
+    let arguments = ["--policy", "random", "--graphics", "halfblocks", "--seed", "3"];
+    let mut session = Session::open(state.path(), (60, 20), "explore", &arguments);
+    for panel in ["Mind", "In reach", "Task", "Log", "Map", "Instruction >", "running"] {
+        session.see(panel);
+    }
+    // A pane of a terminal that tmux has split.
+    session.resize(40, 23);
+    session.miss("Mind");
+    session.see("Instruction >");
+    session.resize(20, 5);
+    session.see("too small");
+    session.press(" n");
+    session.resize(80, 23);
+    session.see("paused");
+    session.see("Mind");
+    session.press("f");
+    session.miss("Mind");
+    session.press("f");
+    session.see("Mind");
+    session.press("q");
+    assert_eq!(session.end(), 0);
+    session.is_restored();
+}

@@ -1,6 +1,6 @@
 //! `sprint explore`: opens what the explorer starts in, and starts it.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -40,6 +40,9 @@ pub(crate) struct Explore {
     /// Who acts at first [default: agent]
     #[arg(long, value_enum)]
     policy: Option<PolicyName>,
+    /// Print a file of settings with a comment on each, and end
+    #[arg(long)]
+    print_config: bool,
 }
 
 /// Where the explorer starts.
@@ -200,6 +203,10 @@ impl Explore {
     /// # Errors
     /// When what it should start in cannot be opened, or there is no terminal.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
+        if self.print_config {
+            write!(std::io::stdout(), "{}", ExplorerConfig::commented())?;
+            return Ok(ExitStatus::Ok);
+        }
         let manual = matches!(self.policy, Some(PolicyName::Manual));
         let kind = match self.policy {
             None | Some(PolicyName::Agent | PolicyName::Manual) => PolicyKind::Agent,

@@ -64,6 +64,9 @@ fn thing(now: &SessionSnapshot, instance: Instance) -> Option<Thing> {
             Err(reason) => impossible.push((kind, reason.to_string())),
         }
     }
+    if class.info().receptacle && world.held.is_none() {
+        impossible.push((ActionType::Put, "the hand is empty".into()));
+    }
     Some(Thing {
         instance,
         class,
@@ -196,6 +199,8 @@ mod tests {
         assert_eq!(things.len(), now.scene.fixtures.len() + now.world.objects.len());
         let could: usize = things.iter().map(|thing| thing.possible.len()).sum();
         assert_eq!(could, now.candidates.len(), "what is possible here is what is a candidate there");
+        let table = things.iter().find(|thing| thing.class.name() == "DiningTable").unwrap();
+        assert_eq!(table.verdict(), "no Put: the hand is empty", "a place for things is of use, if not now");
         let first_without = things.iter().position(|thing| thing.possible.is_empty()).unwrap();
         assert!(things[first_without..].iter().all(|thing| thing.possible.is_empty()), "candidates come first");
         let far = things.iter().find(|thing| !thing.seen && !thing.impossible.is_empty()).unwrap();

@@ -14,6 +14,7 @@ pub mod session;
 pub(crate) mod session_export;
 pub(crate) mod side_by_side;
 pub(crate) mod start_list;
+pub(crate) mod terms;
 pub(crate) mod timeline;
 pub(crate) mod verb;
 #[cfg(test)]

@@ -128,6 +128,40 @@ impl Timeline {
     }
 }
 
+/// A step in the list of actions.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ActionLine {
+    /// What was done, on what, and what came of it.
+    pub(crate) words: String,
+    /// What the agent was told.
+    pub(crate) told: Arc<str>,
+    /// Who chose.
+    pub(crate) by: String,
+    /// It could be done.
+    pub(crate) done: bool,
+    /// It completed a subtask.
+    pub(crate) completed: bool,
+}
+
+impl ActionLine {
+    pub(crate) fn of(taken: &TakenStep) -> ActionLine {
+        ActionLine {
+            words: words(taken),
+            told: taken.instruction.clone(),
+            by: if taken.author.is_hand() { "you".into() } else { taken.author.policy.clone() },
+            done: taken.step.outcome.is_done(),
+            completed: taken.step.subtask.is_some(),
+        }
+    }
+
+    /// In one line, with its number, and with what was told and by whom it was chosen where that is another than before.
+    pub(crate) fn line(&self, step: usize, before: Option<&ActionLine>) -> String {
+        let told = before.is_none_or(|before| before.told != self.told).then(|| format!("  told: {}", self.told));
+        let by = before.is_none_or(|before| before.by != self.by).then(|| format!("  by {}", self.by));
+        format!("{step:>4} {:<38}{}{}", self.words, by.unwrap_or_default(), told.unwrap_or_default())
+    }
+}
+
 /// Which step of which branch is in hand.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BranchPosition {
@@ -223,6 +257,25 @@ mod tests {
         assert_eq!(time.event(true), 6);
         exploration.seek(0);
         assert_eq!(Timeline::of(exploration.tree()).event(true), events[0]);
+    }
+
+    #[test]
+    fn actions_are_listed_with_what_was_told_where_that_changed() {
+        let mut exploration = testing::exploration();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        exploration.act(Action::navigate(ActionType::LookUp)).unwrap();
+        exploration.instruct("dance").unwrap();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        let lines: Vec<ActionLine> = exploration.tree().steps().map(ActionLine::of).collect();
+        let before = |at: usize| at.checked_sub(1).map(|before| &lines[before]);
+        let texts: Vec<String> = (0..3).map(|at| lines[at].line(at + 1, before(at))).collect();
+        assert!(
+            texts[0].starts_with("   1 RotateLeft (you)")
+                && texts[0].ends_with("by you  told: put the mug in the sink"),
+            "{texts:?}"
+        );
+        assert_eq!(texts[1].trim_end(), "   2 LookUp (you)");
+        assert!(texts[2].ends_with("told: Dance."), "{texts:?}");
     }
 
     #[test]

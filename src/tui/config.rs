@@ -23,6 +23,11 @@ struct File {
     keys: BTreeMap<String, String>,
 }
 
+#[cfg(test)]
+impl File {
+    const FIELDS: [&str; 4] = ["format_version", "theme", "mouse", "keys"];
+}
+
 /// What a person has set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExplorerConfig {
@@ -39,6 +44,9 @@ pub struct ExplorerConfig {
 pub(crate) struct Remapped {
     code: KeyCode,
     modifiers: KeyModifiers,
+    /// The key and the line that the file says.
+    pub(crate) name: String,
+    pub(crate) line: String,
     /// What it does.
     pub(crate) verb: Verb,
 }
@@ -59,9 +67,27 @@ impl ExplorerConfig {
         for (name, line) in &file.keys {
             let (code, modifiers) = parse_key(name).ok_or_else(|| anyhow::anyhow!("keys: {name:?} is no key"))?;
             let verb = verb::parse(line).map_err(|complaint| anyhow::anyhow!("keys.{name}: {complaint}"))?;
-            keys.push(Remapped { code, modifiers, verb });
+            keys.push(Remapped { code, modifiers, name: name.clone(), line: line.clone(), verb });
         }
         Ok(ExplorerConfig { scheme: file.theme, mouse: file.mouse, keys })
+    }
+
+    /// A file that sets everything as it is without one, with a line on each.
+    pub fn commented() -> String {
+        let format = ExplorerConfig::FORMAT;
+        format!(
+            "# Settings of `sprint explore`: sprint/explorer.toml in the configuration folder.\n\
+             format_version = {format}\n\n\
+             # Colours: auto (legible on dark and on light backgrounds), dark, light, high-contrast, no-colour.\n\
+             theme = \"auto\"\n\n\
+             # Hear the mouse: clicks select, the wheel goes in time. The terminal's own selection then needs shift.\n\
+             mouse = false\n\n\
+             # Keys of your own: any verb of `:`, as it is typed there. They come before the program's own keys.\n\
+             # Names: x, X, space, enter, tab, esc, left, home, pageup, f1 to f12; ctrl-x, alt-x.\n\
+             [keys]\n\
+             # ctrl-r = \"policy random\"\n\
+             # f5 = \"run\"\n"
+        )
     }
 
     /// What a key means by these settings.
@@ -92,6 +118,15 @@ mod tests {
         );
         assert_eq!(press(KeyCode::F(5), KeyModifiers::NONE), Some(Verb::ToggleRun));
         assert_eq!(press(KeyCode::Char('r'), KeyModifiers::NONE), None);
+    }
+
+    #[test]
+    fn the_commented_settings_are_what_holds_without_any_and_its_examples_are_settings() {
+        let text = ExplorerConfig::commented();
+        assert_eq!(ExplorerConfig::parse(&text).unwrap(), ExplorerConfig::default());
+        let all = text.replace("# ctrl-r", "ctrl-r").replace("# f5", "f5");
+        assert_eq!(ExplorerConfig::parse(&all).unwrap().keys.len(), 2);
+        assert!(File::FIELDS.iter().all(|field| text.contains(field)), "{text}");
     }
 
     #[test]

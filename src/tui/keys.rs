@@ -147,7 +147,8 @@ mod tests {
         check(Mode::Typing, Char('q'), None);
         check(Mode::Typing, Enter, Some(Verb::Apply));
         check(Mode::Help, Char('q'), Some(Verb::Cancel));
-        check(Mode::Watch, Char('f'), None);
+        check(Mode::Watch, Char('f'), Some(Verb::Show(ExplorerPage::Frame)));
+        check(Mode::Watch, Char('Z'), None);
     }
 
     #[test]

@@ -4,8 +4,10 @@ use ratatui::layout::Rect;
 
 use super::graphics::Protocol;
 
+/// The smallest screen with all panels; a smaller one shows the frame alone.
+pub(crate) const SMALLEST: (u16, u16) = (60, 20);
 /// The smallest screen that is drawn.
-pub(crate) const SMALLEST: (u16, u16) = (80, 24);
+pub(crate) const TINIEST: (u16, u16) = (24, 9);
 /// Rows under the picture for the letters' meaning, where letters are the picture.
 pub(crate) const LEGEND: u16 = 3;
 
@@ -50,6 +52,8 @@ pub(crate) struct ScreenLayout {
     pub(crate) meaning: Rect,
     /// The last row.
     pub(crate) status: Rect,
+    /// The frame has all the room; panels and pages have none.
+    pub(crate) is_frame_alone: bool,
 }
 
 /// The parts of the page of branches.
@@ -67,28 +71,37 @@ pub(crate) struct BranchesLayout {
     pub(crate) frames: Rect,
 }
 
-/// What the panels on the right need: the map, a gap, and words.
-const NARROWEST_RIGHT: u16 = 46;
+/// What the panels on the right need: the map, a gap, and words; and on a narrow screen.
+const NARROWEST_RIGHT: (u16, u16) = (46, 38);
 
 impl ScreenLayout {
-    /// The layout of a screen; `None` when it is too small.
+    /// The layout of a screen; `None` when it is too small for anything.
     pub(crate) fn of(screen: Rect) -> Option<ScreenLayout> {
         if screen.width < SMALLEST.0 || screen.height < SMALLEST.1 {
-            return None;
+            return ScreenLayout::frame_alone(screen);
         }
         let rect = |x: u16, y: u16, width: u16, height: u16| Rect { x: screen.x + x, y: screen.y + y, width, height };
         let (width, height) = (screen.width, screen.height);
         let body = height - 5;
         // The picture is square, two columns to a row; what remains of its column lists the interactions.
-        let listed = if body < 30 { 5 } else { 8 };
-        let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - NARROWEST_RIGHT).min(140);
+        let listed = match body {
+            ..18 => 4,
+            18..30 => 5,
+            30.. => 8,
+        };
+        let narrowest = if width < 80 { NARROWEST_RIGHT.1 } else { NARROWEST_RIGHT.0 };
+        let left = (2 * (body - 2 - listed)).min(width * 45 / 100).min(width - 2 - narrowest).min(140);
         let sees = 1 + left / 2;
         let right = width - left - 2;
-        let distribution = if body >= 30 { 13 } else { 9 };
+        let distribution = match body {
+            ..19 => 8,
+            19..30 => 9,
+            30.. => 13,
+        };
         let below = body - distribution;
-        let map = (right * 45 / 100).max(22).min(2 * below + 2).min(80);
+        let map = (right * 45 / 100).max(22).min(right - 20).min(2 * below + 2).min(80);
         let words = right - map - 2;
-        let task = (below / 2).clamp(6, 12);
+        let task = if below < 10 { below.div_ceil(2) } else { (below / 2).clamp(6, 12) };
         let x = left + 2;
         Some(ScreenLayout {
             header: rect(0, 0, width, 1),
@@ -103,12 +116,39 @@ impl ScreenLayout {
             instruction: rect(0, height - 3, width, 1),
             meaning: rect(0, height - 2, width, 1),
             status: rect(0, height - 1, width, 1),
+            is_frame_alone: false,
+        })
+    }
+
+    /// The frame at the largest size, with what is said and told; `None` when the screen is too small for anything.
+    pub(crate) fn frame_alone(screen: Rect) -> Option<ScreenLayout> {
+        if screen.width < TINIEST.0 || screen.height < TINIEST.1 {
+            return None;
+        }
+        let rect = |y: u16, height: u16| Rect { y: screen.y + y, height, ..screen };
+        let height = screen.height;
+        let time = u16::from(height >= 12);
+        let (page, none) = (rect(1, height - 4 - time), Rect { width: 0, height: 0, ..screen });
+        Some(ScreenLayout {
+            header: rect(0, 1),
+            sees: page,
+            reach: none,
+            distribution: none,
+            task: none,
+            log: none,
+            map: none,
+            time: rect(height - 3 - time, time),
+            page,
+            instruction: rect(height - 3, 1),
+            meaning: rect(height - 2, 1),
+            status: rect(height - 1, 1),
+            is_frame_alone: true,
         })
     }
 
     /// The cells that a square picture fills, in the middle of its panel.
     pub(crate) fn picture(&self, protocol: Protocol, cell_pixels: (u16, u16)) -> Rect {
-        let legend = if protocol == Protocol::Ascii { LEGEND } else { 0 };
+        let legend = if protocol == Protocol::Ascii && self.sees.height > 2 * LEGEND { LEGEND } else { 0 };
         let inner = Rect { y: self.sees.y + 1, height: self.sees.height.saturating_sub(1 + legend), ..self.sees };
         let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
         let widest = u32::from(inner.height) * down / across;
@@ -139,6 +179,9 @@ impl ScreenLayout {
 
     /// How many interactions the list shows at a time.
     pub(crate) fn interactions(&self) -> usize {
+        if self.is_frame_alone {
+            return 9;
+        }
         let rows = usize::from(self.reach.height.saturating_sub(1));
         let columns = if self.reach.width >= 60 { 2 } else { 1 };
         (rows * columns).min(9)
@@ -151,7 +194,10 @@ mod tests {
 
     #[test]
     fn panels_fill_the_screen_without_overlap_at_every_size() {
-        for (width, height) in [(80, 24), (81, 25), (100, 30), (120, 36), (200, 60), (250, 24), (80, 100), (400, 120)] {
+        let large = [(80, 24), (81, 25), (100, 30), (120, 36), (200, 60), (250, 24), (80, 100), (400, 120)];
+        let small = [(60, 20), (80, 23), (79, 24), (60, 60), (61, 21), (200, 20)];
+        for (width, height) in large.into_iter().chain(small) {
+            let narrowest = if width < 80 || height < 24 { 16 } else { 22 };
             let layout = ScreenLayout::of(Rect::new(0, 0, width, height)).unwrap();
             let panels = [
                 layout.header,
@@ -168,7 +214,7 @@ mod tests {
             ];
             for (at, panel) in panels.iter().enumerate() {
                 assert!(panel.right() <= width && panel.bottom() <= height, "{width}x{height}: {panel:?}");
-                assert!(panel.width >= 22 && panel.height >= 1, "{width}x{height}: {panel:?}");
+                assert!(panel.width >= narrowest && panel.height >= 1, "{width}x{height}: {panel:?}");
                 for other in &panels[at + 1..] {
                     assert!(!panel.intersects(*other), "{width}x{height}: {panel:?} {other:?}");
                 }
@@ -182,14 +228,28 @@ mod tests {
             assert!(layout.interactions() >= 4);
             for protocol in Protocol::ALL {
                 let picture = layout.picture(protocol, (8, 16));
-                assert!(layout.sees.union(picture) == layout.sees && picture.width >= 18, "{picture:?}");
+                let least = if narrowest < 22 { 12 } else { 18 };
+                assert!(layout.sees.union(picture) == layout.sees && picture.width >= least, "{picture:?}");
             }
         }
     }
 
     #[test]
-    fn a_smaller_screen_is_not_drawn() {
-        assert!(ScreenLayout::of(Rect::new(0, 0, 79, 24)).is_none());
-        assert!(ScreenLayout::of(Rect::new(0, 0, 80, 23)).is_none());
+    fn a_smaller_screen_shows_the_frame_alone_and_only_a_tiny_one_nothing() {
+        for (width, height) in [(59, 20), (60, 19), (40, 23), (24, 9), (300, 9), (24, 90)] {
+            let layout = ScreenLayout::of(Rect::new(0, 0, width, height)).unwrap();
+            assert!(layout.is_frame_alone && layout.interactions() == 9);
+            for protocol in Protocol::ALL {
+                let picture = layout.picture(protocol, (8, 16));
+                assert!(
+                    layout.sees.union(picture) == layout.sees && picture.width >= 2,
+                    "{width}x{height} {picture:?}"
+                );
+            }
+            let rows = [layout.header, layout.sees, layout.time, layout.instruction, layout.meaning, layout.status];
+            assert_eq!(rows.iter().map(|row| row.height).sum::<u16>(), height);
+        }
+        assert!(ScreenLayout::of(Rect::new(0, 0, 23, 24)).is_none());
+        assert!(ScreenLayout::of(Rect::new(0, 0, 80, 8)).is_none());
     }
 }

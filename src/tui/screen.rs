@@ -116,7 +116,7 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
     }
 
     let pictures = tell;
-    if screen.runs && !screen.manual && !goes_on {
+    if screen.runs && !screen.manual && !goes_on && app.layout().is_some() {
         commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
     }
     let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;

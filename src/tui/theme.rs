@@ -47,8 +47,10 @@ pub(crate) const THEME: Theme = Theme {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Scheme {
-    /// For dark backgrounds.
+    /// For any background: in between, where the terminal has the colours for it.
     #[default]
+    Auto,
+    /// For dark backgrounds.
     Dark,
     /// For light backgrounds: yellow and grey would fade there.
     Light,
@@ -63,6 +65,16 @@ impl Scheme {
     pub(crate) fn paint(self, buf: &mut Buffer) {
         let bend: fn(Color) -> Color = match self {
             Scheme::Dark => return,
+            Scheme::Auto => |colour| match colour {
+                Color::Yellow => Color::Rgb(166, 118, 0),
+                Color::DarkGray => Color::Rgb(122, 122, 122),
+                Color::Cyan => Color::Rgb(0, 138, 158),
+                Color::Green => Color::Rgb(0, 142, 60),
+                Color::Red => Color::Rgb(214, 58, 50),
+                Color::Blue => Color::Rgb(52, 120, 218),
+                Color::Magenta => Color::Rgb(186, 80, 190),
+                other => other,
+            },
             Scheme::Light => |colour| match colour {
                 Color::Yellow => Color::Rgb(140, 90, 0),
                 Color::DarkGray => Color::Rgb(105, 105, 105),
@@ -222,6 +234,29 @@ mod tests {
         assert_eq!(cube(128, 128, 128), 244);
         assert_eq!(sixteenth(250, 250, 250), Color::White);
         assert_eq!(shown(Color::Cyan, TermProfile::NoColor), Color::Reset);
+    }
+
+    #[test]
+    fn the_colours_of_the_text_are_legible_on_black_and_on_white() {
+        // Relative luminance and contrast as in WCAG 2.
+        let luminance = |rgb: [u8; 3]| {
+            let linear = |value: u8| {
+                let share = f32::from(value) / 255.0;
+                if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
+            };
+            0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2])
+        };
+        let styles =
+            [THEME.title, THEME.quiet, THEME.masked, THEME.chosen, THEME.bar, THEME.good, THEME.bad, THEME.note];
+        for style in styles {
+            let mut buf = Buffer::empty(ratatui::layout::Rect::new(0, 0, 1, 1));
+            buf[(0, 0)].set_style(style);
+            Scheme::default().paint(&mut buf);
+            let Color::Rgb(r, g, b) = buf[(0, 0)].fg else { panic!("{style:?}") };
+            let here = luminance([r, g, b]);
+            let (on_white, on_black) = (1.05 / (here + 0.05), (here + 0.05) / 0.05);
+            assert!(on_white >= 3.0 && on_black >= 4.0, "{style:?}: {on_white} on white, {on_black} on black");
+        }
     }
 
     #[test]

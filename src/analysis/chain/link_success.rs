@@ -58,15 +58,15 @@ impl LinkSuccess {
         self.expert.iter().all(|rate| rate.of > 0)
     }
 
-    /// The link that breaks the chain, once every link was played: the one that is done least often from where the agent itself begins it (where it never
-    /// gets there: from where the expert does).
+    /// The link that breaks the chain, once every link was played: the one that is done least often from where the agent itself
+    /// begins it. One that it never gets to breaks nothing.
     pub(crate) fn weakest(&self) -> Option<usize> {
         if !self.is_complete() {
             return None;
         }
         let share = |rate: &LinkRate| (rate.of > 0).then(|| f64::from(rate.done) / f64::from(rate.of));
-        let both = self.expert.iter().zip(&self.own).map(|(e, o)| (share(e), share(o)));
-        let worst = both.map(|(e, o)| o.or(e).unwrap_or(1.0)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let own = self.own.iter().map(|rate| share(rate).unwrap_or(1.0));
+        let worst = own.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         worst.filter(|(_, share)| *share < 1.0).map(|(link, _)| link)
     }
 }
@@ -169,6 +169,9 @@ mod tests {
         let rate = |done| LinkRate { done, of: 4 };
         let trials = LinkSuccess { expert: vec![rate(4), rate(4), rate(3)], own: vec![rate(4), rate(1), rate(3)] };
         assert_eq!(trials.weakest(), Some(1));
+        let early =
+            LinkSuccess { expert: vec![rate(4), rate(4), rate(0)], own: vec![rate(4), rate(1), LinkRate::default()] };
+        assert_eq!(early.weakest(), Some(1), "the third link is never reached, however badly it goes by itself");
         let mut some = trials.clone();
         (some.expert[0], some.own[0]) = (LinkRate::default(), LinkRate::default());
         assert_eq!((some.is_complete(), some.weakest()), (false, None), "the first link may break, too");

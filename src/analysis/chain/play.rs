@@ -5,9 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Chain;
 use crate::agent::{Decision, Policy};
-use crate::domain::World;
+use crate::domain::{Action, World};
 use crate::env::{Environment, HouseEnvironment};
+use crate::episode::failure::Failure;
 use crate::episode::rollout::{Observer, Rollout, Tick};
+use crate::episode::wish::explain;
+use crate::house::Outcome;
 
 /// How a link came out.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +20,10 @@ pub(crate) struct LinkOutcome {
     /// It was done; `None` where nobody grades it.
     pub(crate) done: Option<bool>,
     pub(crate) steps: u32,
+    /// What was done for it, and what came of that.
+    pub(crate) taken: Vec<(Action, Outcome)>,
+    /// Why it was not done, and what to do about it.
+    pub(crate) failure: Option<(Failure, String)>,
     /// The state in which it began.
     pub(crate) entry: World,
     /// The state in which it ended.
@@ -79,16 +86,26 @@ impl Chain {
         for (link, &limit) in limits.iter().enumerate() {
             let entry = rollout.env.house.world().clone();
             let begun = rollout.steps();
+            let grader = rollout.env.grader.clone();
             rollout.instruction = told(link);
             let breaks = |before: &LinkOutcome| !before.reached || before.done == Some(false);
             let failed = run.outcomes.last().is_some_and(breaks);
             let until = if whole { all } else { begun + limit };
-            let mut follower =
-                LinkFollower { chain: self, link, until, stop, visit, run: &mut run, done: false, last: None };
+            let mut follower = LinkFollower {
+                chain: self,
+                link,
+                until,
+                stop,
+                visit,
+                run: &mut run,
+                done: false,
+                last: None,
+                taken: Vec::new(),
+            };
             if !failed && !follower.is_over(&rollout) {
                 rollout.run(policy, &mut follower)?;
             }
-            let (completed, last) = (follower.done, follower.last);
+            let (completed, last, taken) = (follower.done, follower.last, follower.taken);
             let handover = match (self.links.get(link + 1), last) {
                 (Some(next_instruction), Some((next, joined))) => {
                     let values = asked(policy, &mut rollout, next_instruction, |policy, rollout| {
@@ -100,14 +117,15 @@ impl Chain {
             };
             let (steps, exit) = (rollout.steps() - begun, rollout.env.house.world().clone());
             let done = self.graded.is_some().then_some(completed);
-            run.outcomes.push(LinkOutcome {
-                reached: !failed,
-                done: done.filter(|_| !failed),
-                steps,
-                entry,
-                exit,
-                handover,
-            });
+            let done = done.filter(|_| !failed);
+            let failure = match (&grader, done, stop.load(Ordering::Relaxed)) {
+                (Some(grader), Some(false), false) if !taken.is_empty() => {
+                    let actions: Vec<Action> = taken.iter().map(|(action, _)| *action).collect();
+                    explain(grader, &self.scene, &entry, &actions)?
+                }
+                _ => None,
+            };
+            run.outcomes.push(LinkOutcome { reached: !failed, done, taken, failure, steps, entry, exit, handover });
         }
         Ok(run)
     }
@@ -125,6 +143,7 @@ struct LinkFollower<'a> {
     done: bool,
     /// Of the last step: min Q of what was done, under the next link's instruction and under both joined.
     last: Option<(f32, f32)>,
+    taken: Vec<(Action, Outcome)>,
 }
 
 impl LinkFollower<'_> {
@@ -186,6 +205,7 @@ impl Observer<HouseEnvironment> for LinkFollower<'_> {
 
     fn after(&mut self, rollout: &mut Rollout, tick: &Tick) -> anyhow::Result<ControlFlow<()>> {
         self.done = tick.completed_one;
+        self.taken.push((tick.decision.action, tick.outcome));
         Ok(if self.is_over(rollout) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 }
@@ -238,6 +258,8 @@ mod tests {
         for whole in [false, true] {
             let play = chain.play(&mut RandomPolicy::new(), whole, &AtomicBool::new(false), &mut |_| ()).unwrap();
             let broken = play.outcomes.iter().position(|outcome| outcome.done == Some(false)).unwrap();
+            let failed = &play.outcomes[broken];
+            assert!(failed.failure.is_some() && failed.taken.len() == failed.steps as usize, "it is said why");
             let rest = &play.outcomes[broken + 1..];
             assert!(rest.iter().all(|outcome| !outcome.reached && outcome.done.is_none() && outcome.steps == 0));
             assert!(!rest.is_empty());

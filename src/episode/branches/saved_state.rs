@@ -16,6 +16,8 @@ pub(crate) struct SavedState {
     pub(crate) world: Arc<World>,
     /// How far the task is.
     pub(crate) grader: Option<Grader>,
+    /// How far the task is while something else was told; only where a person explores.
+    pub(crate) task_aside: Option<Grader>,
     /// After how many steps the episode ends.
     pub(crate) horizon: Option<u32>,
     /// What the agent is told.
@@ -36,6 +38,7 @@ impl SavedState {
         SavedState {
             world: Arc::new(rollout.env.house.world().clone()),
             grader: rollout.env.grader.clone(),
+            task_aside: None,
             horizon: rollout.horizon,
             instruction: rollout.instruction.clone(),
             wishes: Wishes::new(),

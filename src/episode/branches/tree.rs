@@ -272,6 +272,7 @@ mod tests {
             last: None,
             world: Arc::new(world),
             grader: None,
+            task_aside: None,
             horizon: None,
             instruction: "go".into(),
             wishes: Wishes::new(),
@@ -357,6 +358,23 @@ mod tests {
         tree.seek(0);
         grow(&mut tree, ActionType::LookUp, 20);
         assert_eq!(tree.branches()[2].name, "b1");
+    }
+
+    #[test]
+    fn a_long_branch_is_full_in_the_end_and_only_its_newest_states_keep_what_the_policy_carried() {
+        let carrying = |x: i16| {
+            let rng = rand_chacha::rand_core::SeedableRng::seed_from_u64(1);
+            SavedState { carried: PolicyState::Random(Box::new(rng)), ..saved_state(x) }
+        };
+        let mut tree = Tree::new(carrying(0));
+        let mut steps = 0;
+        while !tree.is_full() {
+            tree.grow(taken(ActionType::MoveAhead, "go"), || carrying(1), || "why".into());
+            steps += 1;
+        }
+        assert!(steps < MOST);
+        let kept = tree.twigs.iter().filter(|twig| !matches!(twig.moment.carried, PolicyState::Nothing)).count();
+        assert_eq!(kept, CARRIED);
     }
 
     #[test]

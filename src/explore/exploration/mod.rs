@@ -26,6 +26,7 @@ use crate::episode::branches::{SavedState, Tree};
 use crate::episode::record::Author;
 use crate::episode::rollout::Rollout;
 use crate::episode::wish::{Expect, WishVerdict, Wishes};
+use crate::house::grading::Grader;
 use state::{ActingPolicy, Autosave, CurrentEpisode, Frames};
 
 /// The episode under exploration.
@@ -47,6 +48,8 @@ pub struct Exploration {
     /// How much of what was tried and told is in a run folder.
     saved: Unsaved,
     autosave: Autosave,
+    /// Grades the task on while something else was told: a deed counts under whatever words it was done.
+    task_aside: Option<Grader>,
 }
 
 impl Exploration {
@@ -84,6 +87,7 @@ impl Exploration {
             told: 0,
             saved: Unsaved::default(),
             autosave: Autosave::default(),
+            task_aside: None,
         };
         exploration.begin_wishes();
         if let Some(text) = instruction {
@@ -121,8 +125,8 @@ impl Exploration {
 
     fn saved_state(&self) -> SavedState {
         let carried = self.acting.policy.as_ref().map_or(PolicyState::Nothing, |policy| policy.state(0));
-        let wishes = self.wishes.clone();
-        SavedState { wishes, ..SavedState::of(&self.rollout, &self.acting.author, carried) }
+        let (wishes, task_aside) = (self.wishes.clone(), self.task_aside.clone());
+        SavedState { wishes, task_aside, ..SavedState::of(&self.rollout, &self.acting.author, carried) }
     }
 
     /// Whether the wish in force is over, and how.
@@ -161,7 +165,7 @@ mod tests {
     fn another_instruction_ends_the_task_and_its_own_words_bring_it_back_at_a_reset() {
         let mut exploration = testing::exploration();
         let words = exploration.instruction().to_string();
-        assert_eq!(exploration.instruct("open the fridge").unwrap(), "the task no longer applies");
+        assert_eq!(exploration.instruct("open the fridge").unwrap(), "the task is graded on beside it");
         assert!(exploration.progress().is_none());
         exploration.reset();
         assert_eq!(exploration.instruction(), "Open the fridge.", "a reset keeps what was typed");
@@ -169,6 +173,36 @@ mod tests {
         assert!(exploration.instruct(&words.to_uppercase()).unwrap().contains("reset"));
         exploration.reset();
         assert_eq!(exploration.progress().unwrap().subtasks.len(), 2);
+    }
+
+    #[test]
+    fn the_task_is_graded_on_whatever_the_agent_is_told_and_in_every_state_anew() {
+        let mut exploration = testing::exploration();
+        exploration.choose(PolicyKind::Expert).unwrap();
+        assert_eq!(exploration.task_beside(), None, "it is the wish in force");
+        exploration.instruct("pick up the mug").unwrap();
+        assert_eq!(exploration.task_beside(), Some((0, 2)));
+        let mut credited = None;
+        while exploration.end().is_none() {
+            credited = exploration.step().unwrap().completed;
+        }
+        assert_eq!(exploration.task_beside(), Some((1, 2)), "what was done under other words counts");
+        assert_eq!(credited.as_deref(), Some("pick up the mug"));
+        let done_at = exploration.tree().at();
+        exploration.instruct("dance").unwrap();
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        assert_eq!(exploration.task_beside(), Some((1, 2)));
+        exploration.seek(1);
+        assert_eq!(exploration.task_beside(), Some((0, 2)));
+        exploration.seek(done_at);
+        assert_eq!(exploration.task_beside(), Some((1, 2)));
+        exploration.reset();
+        assert_eq!(
+            exploration.progress().map(|progress| progress.completed_at.len()),
+            None,
+            "dance is nobody's to grade"
+        );
+        assert_eq!(exploration.task_beside(), Some((0, 2)));
     }
 
     #[test]

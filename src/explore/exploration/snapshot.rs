@@ -44,6 +44,8 @@ pub struct SessionSnapshot {
     pub(crate) wishes: Wishes,
     /// How many subtasks of the wish in force are done, and of how many; nothing where nobody grades it.
     pub(crate) graded: Option<(usize, usize)>,
+    /// How much of the task is done while something else was told, and of how much.
+    pub(crate) task_beside: Option<(usize, usize)>,
     /// What the wish in force came to, if it is over.
     pub(crate) end: Option<WishVerdict>,
     /// Where the agent has been.
@@ -104,6 +106,7 @@ impl Exploration {
             progress,
             wishes: self.wishes.clone(),
             graded: self.graded(),
+            task_beside: self.task_beside(),
             end: self.end(),
             path,
             policy: self.acting.kind,

@@ -97,12 +97,14 @@ impl Exploration {
         let by_hand = taken.author.is_hand();
         let distribution = taken.decision.distribution.clone().filter(|_| !by_hand);
         let why = self.why(&taken, &words);
+        let beside = self.grade_beside(taken.decision.action, outcome);
         self.count_step(taken.decision.action);
         let moment = self.saved_state();
         let growth = self.tree.grow(taken, || moment, || why);
         if growth == Growth::Known {
             self.tree.saved_state().restore(&mut self.rollout, step);
             self.wishes.clone_from(&self.tree.saved_state().wishes);
+            self.task_aside.clone_from(&self.tree.saved_state().task_aside);
         }
         let forked = match growth {
             Growth::Forked(branch) => self.tree.branches().get(branch).map(|b| format!("{}: {}", b.name, b.why)),
@@ -113,7 +115,7 @@ impl Exploration {
             action: words,
             outcome,
             by_hand,
-            completed: current.filter(|_| completed_one),
+            completed: current.filter(|_| completed_one).or(beside),
             forked,
             distribution,
             progress: self.progress(),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Exploration;
 use crate::agent::{Decision, PolicyState};
+use crate::domain::Action;
 use crate::episode::branches;
 use crate::episode::branches::{FRAMES, SavedState};
 use crate::episode::record::{Author, Episode};
@@ -41,6 +42,37 @@ impl Exploration {
             let names: Vec<&str> = branches.iter().map(|branch| branch.name.as_str()).collect();
             anyhow::anyhow!("there is no branch {wanted:?}; there are: {}", names.join(", "))
         })
+    }
+
+    /// Takes the steps of links, told one after the other, from a branch and step; then goes back to where the last one began,
+    /// with its words in force.
+    ///
+    /// # Errors
+    /// When a step cannot be taken again.
+    pub(crate) fn open_link(
+        &mut self,
+        (branch, step): (usize, u32),
+        links: &[(String, Vec<Action>)],
+    ) -> anyhow::Result<()> {
+        self.switch(branch)?;
+        self.seek(step);
+        let author = self.acting.author.clone();
+        let mut entry = step;
+        for (words, actions) in links {
+            entry = self.tree.at();
+            self.instruct(words)?;
+            for &action in actions {
+                anyhow::ensure!(!self.tree.is_full(), "no more steps are remembered in this episode");
+                // The policy sees every state, as it did.
+                let _ = self.decide();
+                self.carry_out(Decision::of(action), author.clone())?;
+            }
+        }
+        self.seek(entry);
+        if let Some((words, _)) = links.last() {
+            self.instruct(words)?;
+        }
+        Ok(())
     }
 
     /// Gives a branch another name.
@@ -81,6 +113,7 @@ impl Exploration {
         let moment = self.tree.saved_state().clone();
         moment.restore(&mut self.rollout, self.tree.at());
         self.wishes.clone_from(&moment.wishes);
+        self.task_aside.clone_from(&moment.task_aside);
         self.frames.present = None;
         self.acting.decision = None;
         self.acting.redirected = false;
@@ -127,6 +160,7 @@ impl Exploration {
         self.rollout.env.grader = fresh.env.grader;
         self.rollout.horizon = fresh.horizon;
         self.wishes = vec![Arc::new(self.first_wish())];
+        self.task_aside = None;
         // The text was checked when it came in.
         let _ = self.instruct(&instruction);
         self.make_start();

@@ -8,7 +8,8 @@ use crate::domain::Action;
 use crate::episode::record::{Author, Episode};
 use crate::episode::rollout::End;
 use crate::episode::wish::{Expect, NOTHING_ASKED, Wish, WishGrading, WishVerdict, explain, read, repick};
-use crate::house::grading::{Grader, Grading};
+use crate::house::Outcome;
+use crate::house::grading::{Grader, Grading, describe};
 use crate::language::instruction;
 
 /// Why nobody grades what is told where nothing is expected.
@@ -18,6 +19,7 @@ impl Exploration {
     /// The episode's first wish becomes the only one.
     pub(super) fn begin_wishes(&mut self) {
         self.wishes = vec![Arc::new(self.first_wish())];
+        self.task_aside = None;
         // What a task says without subtasks is read like anything that is typed.
         let is_told = self.episode.task.as_ref().is_some_and(|task| task.subtasks.is_empty());
         if is_told && self.expect == Expect::Read {
@@ -62,7 +64,7 @@ impl Exploration {
         self.tell(text);
         self.told += 1;
         Ok(match (is_task, asked) {
-            (true, _) => "the task no longer applies",
+            (true, _) => "the task is graded on beside it",
             (false, true) => "the task's words again: reset to be graded by the task",
             (false, false) => "applies from the next step",
         })
@@ -173,6 +175,9 @@ impl Exploration {
     fn begin(&mut self, mut wish: Wish) {
         let now = self.tree.at();
         wish.horizon = self.task_horizon(&wish);
+        if self.task_aside.is_none() && self.wishes.last().is_some_and(|last| last.grading == WishGrading::Task) {
+            self.task_aside.clone_from(&self.rollout.env.grader);
+        }
         let house = &self.rollout.env.house;
         self.rollout.instruction.clone_from(&wish.instruction);
         self.rollout.env.grader = wish.grader(house.scene(), house.world());
@@ -205,6 +210,18 @@ impl Exploration {
         if self.end() == Some(WishVerdict::OutOfTime) {
             self.explain(Some(action));
         }
+    }
+
+    /// Grades a step that was just taken for the task, where that is not what was told; says which subtask it completed.
+    pub(super) fn grade_beside(&mut self, action: Action, outcome: Outcome) -> Option<String> {
+        let (grader, house) = (self.task_aside.as_mut()?, &self.rollout.env.house);
+        let subtask = grader.subtask().map(|subtask| describe(grader.roles(), subtask));
+        subtask.filter(|_| grader.observe(house.scene(), house.world(), action, outcome))
+    }
+
+    /// How much of the task is done while something else was told, and of how much.
+    pub(crate) fn task_beside(&self) -> Option<(usize, usize)> {
+        self.task_aside.as_ref().map(|grader| (grader.completed(), grader.total()))
     }
 
     fn judge_by_grader(&mut self) {

@@ -186,6 +186,12 @@ impl<W: Write> Plain<W> {
                 let all: Vec<String> = conditions.iter().map(ToString::to_string).collect();
                 writeln!(out, "runs stop at: {}", if all.is_empty() { "nothing".into() } else { all.join("; ") })?;
             }
+            SessionEvent::Actions(lines) => {
+                for (at, line) in lines.iter().enumerate() {
+                    let before = at.checked_sub(1).and_then(|before| lines.get(before));
+                    writeln!(out, "{}", line.line(at + 1, before).trim_end())?;
+                }
+            }
             SessionEvent::Diverged(parted) => divergence(&parted, out)?,
             SessionEvent::Compared(contrast) => {
                 compare(&contrast, out)?;
@@ -252,8 +258,11 @@ mod tests {
     fn a_run_stops_where_it_is_told_to() {
         let text = say("until step 4\n");
         assert!(text.contains("step 4: ") && text.ends_with("stopped: step 4\n"), "{text}");
-        let text = say("break step 9\nbreak step 3\nrun\nbreak\n");
-        assert!(text.contains("runs stop at: step 9; step 3") && text.contains("stopped: step 3"), "{text}");
+        let text = say("break step 9\nbreak step 3\nrun\nbreak\nbreak clear\n");
+        assert!(
+            text.matches("runs stop at: step 9; step 3\n").count() == 2 && text.contains("stopped: step 3"),
+            "{text}"
+        );
         assert!(text.ends_with("runs stop at: nothing\n"), "{text}");
         assert!(say("until dusk\n").contains("there are: subtask"));
     }
@@ -264,6 +273,10 @@ mod tests {
         assert!(text.contains("error: there is nothing to swap"), "{text}");
         assert!(text.contains("instruction: Open the fridge. (was: "), "{text}");
         assert!(text.contains("B: Put the mug in the sink."), "what was in force is the other one now:\n{text}");
+        let text = say("step 2\npage actions\nseek 9999\nterms\n");
+        assert!(text.contains("\n   1 ") && text.contains("\n   2 ") && text.contains("  by random  told: "), "{text}");
+        assert!(text.contains("there is no step 9999: the branch ends at 2"), "{text}");
+        assert!(text.contains("\nadvantage      Q less V"), "{text}");
         let text = say("page mind\nsort\npage mind\npage world\npage chain\npage branches\npage panels\n");
         for wanted in ["sorted by probability", "sorted by Q", "fridge", "there is no chain yet", "* 1: main", "hand:"]
         {

@@ -6,6 +6,7 @@ use super::chains::{chains, values};
 use super::render::{branches, candidates, choices, look, next, opening, things};
 use super::{Answer, Plain};
 use crate::explore::session::{RunMode, SessionCommand};
+use crate::explore::terms::TERMS;
 use crate::explore::verb::{ExplorerPage, Verb, table};
 
 /// Runs that are not told how far end here.
@@ -71,6 +72,11 @@ impl<W: Write> Plain<W> {
                     writeln!(self.out, "{:<26} {}", format!("{} {}", entry.name, entry.arguments), entry.help)?;
                 }
             }
+            Verb::Terms => {
+                for (term, meaning) in TERMS {
+                    writeln!(self.out, "{term:<14} {meaning}")?;
+                }
+            }
             Verb::Quit => {}
             Verb::Faster
             | Verb::Slower
@@ -88,6 +94,8 @@ impl<W: Write> Plain<W> {
             | Verb::Select(_)
             | Verb::Take
             | Verb::ReplayLink
+            | Verb::OpenLink
+            | Verb::TurnHelp
             | Verb::NextHeading
             | Verb::Palette(_)
             | Verb::Apply
@@ -143,10 +151,11 @@ impl<W: Write> Plain<W> {
     /// What a page of the screen shows.
     fn page(&mut self, page: ExplorerPage) -> anyhow::Result<()> {
         match page {
-            ExplorerPage::Main => {
+            ExplorerPage::Main | ExplorerPage::Frame => {
                 self.ask(SessionCommand::Where)?;
                 look(&self.state()?, &mut self.out)
             }
+            ExplorerPage::Actions => self.ask(SessionCommand::Actions).map(drop),
             ExplorerPage::Branches => branches(&self.state()?.time, &mut self.out),
             ExplorerPage::Mind => self.write_choices(),
             ExplorerPage::World => things(&self.state()?, &mut self.out),

@@ -81,7 +81,9 @@ impl Session {
         let is_done = self.run.heard != Some(here) && self.exploration.comes_to_its_end().unwrap_or(false);
         if is_done {
             self.run.heard = Some(here);
+            let ran = self.run.mode == Some(RunMode::Policy);
             self.set_mode(None);
+            self.run.resumes = ran;
             let likely = self.exploration.decide().ok().and_then(|(decision, _)| decision.done);
             if let (Some(wish), Some(likely)) = (self.exploration.wish().cloned(), likely) {
                 self.emit(SessionEvent::AgentDone { wish, likely, graded: self.exploration.graded() });
@@ -102,7 +104,9 @@ impl Session {
         if let Some(wish) = self.exploration.wish() {
             self.emit(SessionEvent::Ended(wish.clone()));
         }
+        let resumes = self.run.resumes || self.run.mode == Some(RunMode::Policy);
         self.set_mode(None);
+        self.run.resumes = resumes;
     }
 
     pub(super) fn step(&mut self) {
@@ -130,6 +134,7 @@ impl Session {
     pub(super) fn set_mode(&mut self, mode: Option<RunMode>) {
         let changed = mode != self.run.mode;
         self.run.mode = mode;
+        self.run.resumes = false;
         if mode.is_none() {
             self.run.until = None;
         }
@@ -234,6 +239,40 @@ mod tests {
     }
 
     #[test]
+    fn after_a_run_has_come_to_the_end_of_its_wish_the_next_wish_runs_on() {
+        let (mut session, _) = session(999, "pick up the mug");
+        session.apply(SessionCommand::Run { mode: RunMode::Policy, until: None });
+        while session.interval().is_some() {
+            session.advance();
+        }
+        assert!(session.exploration.end().is_some());
+        session.apply(SessionCommand::Instruct("dance".into()));
+        assert_eq!(session.run.mode, Some(RunMode::Policy));
+        session.apply(SessionCommand::Pause);
+        session.apply(SessionCommand::Instruct("sing".into()));
+        assert_eq!(session.run.mode, None, "whoever paused it wants it so");
+    }
+
+    #[test]
+    fn a_link_opens_as_a_branch_where_it_began_and_space_follows_what_was_done() {
+        let (mut session, events) = session(999, "dance");
+        run(&mut session, 3);
+        session.apply(SessionCommand::OpenLink(0));
+        assert!(events.try_iter().any(|event| matches!(event, SessionEvent::Refused(why) if why.contains("no chain"))));
+        session.exploration.choose(crate::agent::registry::PolicyKind::Random).unwrap();
+        session.apply(SessionCommand::Chain("turn around; sing".into()));
+        while session.is_working() {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        session.apply(SessionCommand::OpenLink(1));
+        let tree = session.exploration.tree();
+        assert_eq!((tree.at(), tree.last()), (3 + 20, 3 + 40), "links that nobody grades have 20 steps");
+        assert_eq!(session.exploration.instruction(), "Sing.");
+        session.apply(SessionCommand::Run { mode: RunMode::Replay, until: None });
+        assert_eq!(session.run.mode, Some(RunMode::Replay));
+    }
+
+    #[test]
     fn going_on_in_the_past_follows_what_was_done_until_something_else_is_told_or_chosen_there() {
         let goes_on = |change: Option<SessionCommand>| {
             let mut exploration = testing::exploration();
@@ -251,7 +290,7 @@ mod tests {
             let tree = session.exploration.tree();
             (tree.branches().len(), session.exploration.instruction().to_string(), tree.at())
         };
-        let task = "Put the mug in the sink.".to_string();
+        let task = "put the mug in the sink".to_string();
         assert_eq!(goes_on(None), (1, task.clone(), 4));
         assert_eq!(
             goes_on(Some(SessionCommand::Instruct("pick up the mug".into()))),

@@ -1,10 +1,10 @@
 //! Each command, carried out.
 
 use super::background::Work;
-use super::{Session, SessionCommand, SessionEvent};
+use super::{RunMode, Session, SessionCommand, SessionEvent};
 use crate::agent::registry::PolicyKind;
 use crate::explore::breakpoints::Condition;
-use crate::explore::timeline::{BranchPosition, Timeline};
+use crate::explore::timeline::{ActionLine, BranchPosition, Timeline};
 
 impl Session {
     /// Carries out a command. What comes of it is told as events: most before this returns, runs as [`Session::advance`] is
@@ -70,7 +70,14 @@ impl Session {
             SessionCommand::Sample(seed) => self.reseed(seed, true),
             SessionCommand::Greedy => self.reseed(self.exploration.episode_seed(), false),
             SessionCommand::StepRate(rate) => self.run.rate = rate,
-            SessionCommand::Seek(step) => self.seek(step),
+            SessionCommand::Seek(step) => {
+                let last = self.exploration.tree().last();
+                // `last` asks for the end by the largest number.
+                if step > last && step != u32::MAX {
+                    self.emit(SessionEvent::Noted(format!("there is no step {step}: the branch ends at {last}")));
+                }
+                self.seek(step);
+            }
             SessionCommand::Along { by, steps } => {
                 let (at, last) = (self.exploration.tree().at(), self.exploration.tree().last());
                 match (by > 0 && at == last, steps) {
@@ -108,6 +115,11 @@ impl Session {
                 Err(error) => self.refuse(&error),
             },
             SessionCommand::Break(condition) => self.toggle_breakpoint(condition),
+            SessionCommand::Breakpoints => self.emit(SessionEvent::Breakpoints(self.run.breakpoints.clone())),
+            SessionCommand::Actions => {
+                self.emit(SessionEvent::Actions(self.exploration.tree().steps().map(ActionLine::of).collect()));
+            }
+            SessionCommand::OpenLink(link) => self.open_link(link),
             SessionCommand::Compare(other) => self.compare(&other),
             SessionCommand::Swap => match self.compared.take() {
                 Some(other) => {
@@ -210,7 +222,11 @@ impl Session {
             Ok(note) => {
                 let new = self.exploration.instruction().to_string();
                 self.emit(SessionEvent::Instructed { old, new, note });
+                let resumes = self.run.resumes;
                 self.told();
+                if resumes && self.exploration.end().is_none() {
+                    self.start(RunMode::Policy, None);
+                }
                 true
             }
             Err(error) => {
@@ -248,6 +264,7 @@ impl Session {
                 self.jobs.leave_house();
                 self.compared = None;
                 self.run.heard = None;
+                self.run.resumes = false;
                 self.emit(SessionEvent::Working(None));
                 self.changed();
             }
@@ -287,6 +304,18 @@ impl Session {
 
     fn timeline(&self) -> Timeline {
         Timeline::of(self.exploration.tree())
+    }
+
+    /// A link of the last chain becomes a branch, as it was followed, with the state in which it began in hand.
+    fn open_link(&mut self, link: usize) {
+        let opened = self
+            .jobs
+            .link(&self.exploration.who(), link)
+            .and_then(|(place, steps)| self.exploration.open_link(place, &steps));
+        match opened {
+            Ok(()) => self.moved(),
+            Err(error) => self.refuse(&error),
+        }
     }
 
     fn toggle_breakpoint(&mut self, condition: Option<Condition>) {

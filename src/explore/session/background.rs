@@ -10,16 +10,22 @@ use crate::agent::Policy;
 use crate::agent::registry::PolicyIdentity;
 use crate::analysis::chain::Chain;
 use crate::analysis::value_map::ValueMap;
+use crate::domain::Action;
 use crate::explore::chain_report::ChainReport;
 
 /// For whom a value map was computed: who was asked, what it was told, and the house without the agent.
 pub(super) type MapKey = (PolicyIdentity, String, String);
+
+/// A link's words, and what was done for it.
+pub(super) type LinkSteps = (String, Vec<Action>);
 
 /// What is computed beside the episode, and what was found.
 pub(super) struct Jobs {
     pub(super) background: Background,
     /// The chain that was followed last.
     pub(super) chain: Option<Chain>,
+    /// Where it began: the branch and the step.
+    pub(super) begun_at: (usize, u32),
     pub(super) results: Results,
 }
 
@@ -57,7 +63,27 @@ impl<T: Default> Default for Shared<T> {
 
 impl Jobs {
     pub(super) fn new(events: EventSink) -> Jobs {
-        Jobs { background: Background::new(events), chain: None, results: Results::default() }
+        Jobs { background: Background::new(events), chain: None, begun_at: (0, 0), results: Results::default() }
+    }
+
+    /// Where the chain that was followed last began, and what that policy did for each link up to one, from 0.
+    ///
+    /// # Errors
+    /// When no chain was followed so far.
+    pub(super) fn link(&self, who: &PolicyIdentity, link: usize) -> anyhow::Result<((usize, u32), Vec<LinkSteps>)> {
+        let chains = self.results.chains.lock();
+        let report = chains.get(who).ok_or_else(|| anyhow::anyhow!("{} followed no chain yet", who.name))?;
+        let outcomes = report.by_link.as_ref().map_or(&[][..], |play| play.outcomes.as_slice());
+        anyhow::ensure!(
+            outcomes.get(link).is_some_and(|outcome| outcome.reached),
+            "link {} was not reached: a link before it failed",
+            link + 1
+        );
+        let steps = report.links.iter().zip(outcomes).take(link + 1).map(|(words, outcome)| {
+            let actions: Vec<Action> = outcome.taken.iter().map(|(action, _)| *action).collect();
+            (words.clone(), actions)
+        });
+        Ok((self.begun_at, steps.collect()))
     }
 
     /// Forgets the chain, and stops what is under way.

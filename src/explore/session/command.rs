@@ -75,6 +75,12 @@ pub enum SessionCommand {
     Diverge(String),
     /// Runs stop where that holds, or no longer if they did; without a condition, nowhere.
     Break(Option<Condition>),
+    /// Where runs stop.
+    Breakpoints,
+    /// The steps of the branch in hand, in words.
+    Actions,
+    /// A link of the last chain as a branch, at the state in which it began; from 0.
+    OpenLink(usize),
     /// The instruction in force and another, in this state.
     Compare(String),
     /// Adopt the other instruction of the last comparison, and compare it with the one before.

@@ -11,7 +11,7 @@ use crate::episode::wish::Wish;
 use crate::explore::breakpoints::Condition;
 use crate::explore::chain_report::ChainReport;
 use crate::explore::exploration::{SessionSnapshot, StepTaken};
-use crate::explore::timeline::{BranchPosition, Divergence};
+use crate::explore::timeline::{ActionLine, BranchPosition, Divergence};
 
 /// Takes in what a session tells, from its own thread and from those that compute in the background.
 pub(crate) type EventSink = Arc<dyn Fn(SessionEvent) + Send + Sync>;
@@ -65,6 +65,8 @@ pub enum SessionEvent {
     Stopped(String),
     /// Where runs stop.
     Breakpoints(Vec<Condition>),
+    /// The steps of the branch in hand.
+    Actions(Vec<ActionLine>),
     /// How two branches part.
     Diverged(Divergence),
     /// What two instructions come to.

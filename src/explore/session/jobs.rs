@@ -77,6 +77,7 @@ impl Session {
                     self.jobs.results.chains = Default::default();
                 }
                 self.jobs.chain = Some(chain);
+                self.jobs.begun_at = (self.exploration.tree().branch(), self.exploration.tree().at());
                 self.follow(None, None);
             }
             Err(error) => self.refuse(&error),

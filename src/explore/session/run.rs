@@ -15,6 +15,8 @@ pub(super) struct Run {
     pub(super) until: Option<Condition>,
     /// The branch and step at which the agent was last heard to say that it is done.
     pub(super) heard: Option<(usize, u32)>,
+    /// A run came to the end of its wish here: the next wish runs on.
+    pub(super) resumes: bool,
 }
 
 impl Run {

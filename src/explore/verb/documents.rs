@@ -76,6 +76,8 @@ fn scope(scope: KeyScope) -> Option<&'static str> {
         KeyScope::ExplorerPage(ExplorerPage::World) => Some("world"),
         KeyScope::ExplorerPage(ExplorerPage::Compare) => Some("compare"),
         KeyScope::ExplorerPage(ExplorerPage::Chain) => Some("chain"),
+        KeyScope::ExplorerPage(ExplorerPage::Frame) => Some("frame"),
+        KeyScope::ExplorerPage(ExplorerPage::Actions) => Some("actions"),
         KeyScope::Lists => Some("any page"),
         KeyScope::Watch => Some("a policy acts"),
         KeyScope::Manual => Some("you act"),

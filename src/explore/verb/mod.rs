@@ -81,6 +81,12 @@ pub(crate) enum Verb {
     Palette(String),
     /// The keys of this screen.
     Help,
+    /// What the terms on the screen mean.
+    Terms,
+    /// In the help: the next part of it.
+    TurnHelp,
+    /// The selected link as a branch.
+    OpenLink,
     /// Stop, and go on when the shell says so.
     Suspend,
     /// End the session.
@@ -107,6 +113,21 @@ pub(crate) enum Verb {
     Wishes,
 }
 
+#[cfg(test)]
+impl ExplorerPage {
+    /// Every page.
+    pub(crate) const ALL: [ExplorerPage; 8] = [
+        ExplorerPage::Main,
+        ExplorerPage::Branches,
+        ExplorerPage::Mind,
+        ExplorerPage::World,
+        ExplorerPage::Compare,
+        ExplorerPage::Chain,
+        ExplorerPage::Frame,
+        ExplorerPage::Actions,
+    ];
+}
+
 /// A page in place of the panels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExplorerPage {
@@ -122,4 +143,8 @@ pub(crate) enum ExplorerPage {
     Compare,
     /// Instructions that are followed one after the other.
     Chain,
+    /// The frame alone, as large as can be.
+    Frame,
+    /// Every action of the branch in hand.
+    Actions,
 }

@@ -12,8 +12,29 @@ pub(crate) fn parse(line: &str) -> Result<Verb, String> {
     let line = line.trim();
     let (verb, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(verb, rest)| (verb, rest.trim()));
     let entry = typed().find(|entry| entry.name == verb || entry.aliases.contains(&verb));
-    let entry = entry.ok_or_else(|| format!("unknown verb {verb:?}; `help` lists the verbs"))?;
+    let entry = entry.ok_or_else(|| match nearest(verb) {
+        Some(meant) => format!("unknown verb {verb:?}; is {meant} meant? `help` lists the verbs"),
+        None => format!("unknown verb {verb:?}; `help` lists the verbs"),
+    })?;
     (entry.read)(&VerbLine { verb, rest })
+}
+
+/// The verb that is one letter away from what was typed: one more, one less, another, or two exchanged.
+fn nearest(typed_word: &str) -> Option<&'static str> {
+    typed().map(|entry| entry.name).find(|name| is_one_letter_away(typed_word, name))
+}
+
+fn is_one_letter_away(a: &str, b: &str) -> bool {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let same = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let (a, b) = (&a[same..], &b[same..]);
+    match (a, b) {
+        ([_, rest @ ..], _) if rest == b => true,
+        (_, [_, rest @ ..]) if a == rest => true,
+        ([_, a @ ..], [_, b @ ..]) if a == b => true,
+        ([a, b, rest @ ..], [c, d, other @ ..]) => (a, b) == (d, c) && rest == other,
+        _ => false,
+    }
 }
 
 #[cfg(test)]
@@ -33,6 +54,7 @@ mod tests {
             "N [TIMES]" => "2 4",
             "best|north|..." => "south",
             "panels|mind|..." => "world",
+            "LINK" => "1",
             "[CONDITION]" | "CONDITION" => "failed",
             _ => "next",
         }
@@ -48,12 +70,17 @@ mod tests {
         assert_eq!(parse("do 3"), Ok(Verb::Interact(3)));
         assert_eq!(parse("instruct  put the mug away"), ask(SessionCommand::Instruct("put the mug away".into())));
         assert_eq!(parse("break entropy 1.5"), ask(SessionCommand::Break(Some(Condition::Entropy(1.5)))));
-        assert_eq!(parse("break"), ask(SessionCommand::Break(None)));
+        assert_eq!(parse("break"), ask(SessionCommand::Breakpoints));
+        assert_eq!(parse("break clear"), ask(SessionCommand::Break(None)));
         assert_eq!(parse("save"), ask(SessionCommand::Save(None)));
         assert_eq!(parse("link 2 4"), ask(SessionCommand::WhichLink(Draws { times: 4, only: Some(1) })));
         assert!(parse("do pickup").unwrap_err().contains("candidates"));
         assert!(parse("step many").unwrap_err().contains("many"));
         assert!(parse("dance").unwrap_err().contains("dance"));
+        for (typed, meant) in [("brek", "break"), ("sekk", "seek"), ("branhc", "branch"), ("savee", "save")] {
+            assert!(parse(typed).unwrap_err().contains(&format!("is {meant} meant?")), "{typed}");
+        }
+        assert!(!parse("zzz").unwrap_err().contains("meant"));
         assert!(parse("name").unwrap_err().contains("what?"));
         assert!(parse("select 1").is_err(), "keys alone do that");
     }

@@ -69,13 +69,18 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     verb("branches", "", "list the branches", |_| Ok(Verb::Branches)),
     key_verb("take", "to the branch that is selected", |_| Ok(Verb::Take), &[
         key(KeyScope::ExplorerPage(ExplorerPage::Branches), "enter", &["enter"], "take what is selected", ""),
+        key(KeyScope::ExplorerPage(ExplorerPage::Actions), "enter", &["enter"], "to the selected step", ""),
     ]),
     verb("name", "TEXT", "name the branch", |line| ask(Command::Rename(line.text()?)))
         .on(&[opens(ExplorerPage::Branches, &["R"], "name the branch")]),
     verb("diverge", "NAME|N", "this branch and another, side by side", |line| ask(Command::Diverge(line.text()?))),
     verb("break", "[CONDITION]",
-        "stop runs at: subtask, failed, drop X, gap X, entropy X, sees OBJECT, step N; without any, nowhere",
-        |line| ask(Command::Break(if line.rest.is_empty() { None } else { Some(line.condition()?) }))),
+        "stop runs at: subtask, failed, drop X, gap X, entropy X, sees OBJECT, step N; clear: nowhere; alone: lists them",
+        |line| ask(match line.rest {
+            "" => Command::Breakpoints,
+            "clear" => Command::Break(None),
+            _ => Command::Break(Some(line.condition()?)),
+        })),
     verb("until", "CONDITION", "run until that holds", |line| Ok(Verb::Until(line.condition()?))),
     verb("policy", "NAME", "who acts: agent, expert, random", |line| ask(Command::Choose(line.policy()?)))
         .on(&[
@@ -106,6 +111,14 @@ pub(crate) const VERBS: &[VerbEntry] = &[
         .on(&[key(KeyScope::ExplorerPage(ExplorerPage::Chain), "w", &["w"], "which link breaks", "")]),
     verb("link", "N [TIMES]", "the same for one link: from its recorded entry and the expert's",
         |line| ask(Command::WhichLink(line.draws_of_one()?))),
+    verb("open", "LINK", "a link of the chain as a branch, at the state in which it began",
+        |line| match line.number()? {
+            0 => Err("open: links are numbered from 1".into()),
+            link => ask(Command::OpenLink(link as usize - 1)),
+        }),
+    key_verb("open this link", "the selected link as a branch, at the state in which it began", |_| Ok(Verb::OpenLink), &[
+        key(KeyScope::ExplorerPage(ExplorerPage::Chain), "O", &["O"], "open the link as a branch", ""),
+    ]),
     key_verb("this link", "which link breaks, for the one that is selected", |_| Ok(Verb::ReplayLink), &[
         key(KeyScope::ExplorerPage(ExplorerPage::Chain), "x", &["x"], "replay the selected link", ""),
     ]),
@@ -148,13 +161,15 @@ pub(crate) const VERBS: &[VerbEntry] = &[
             key(Common, "m", &["m"], "take over, or give back", ""),
             key(Manual, "esc", &["esc"], "take over, or give back", ""),
         ]),
-    verb("page", "panels|mind|...", "panels, branches, mind, world, compare, or chain", page)
+    verb("page", "panels|mind|...", "panels, branches, mind, world, compare, chain, frame, or actions", page)
         .on(&[
             key(Common, "t", &["t"], "branches, side by side", "branches"),
             key(Common, "M", &["M"], "what the policy weighs", "mind"),
             key(Common, "W", &["W"], "floor plan, every thing", "world"),
             key(Common, "B", &["B"], "two instructions, A and B", "compare"),
             key(Common, "C", &["C"], "a chain of instructions", "chain"),
+            key(Common, "L", &["L"], "list of every action", "actions"),
+            key(Common, "f", &["f"], "the frame alone, at full size", "frame"),
             key(Lists, "esc", &["esc"], "all panels again", "panels"),
         ]),
     key_verb("select", "another line of the list", |line| Ok(Verb::Select(line.rest.parse().unwrap_or(1))), &[
@@ -178,6 +193,11 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     ]),
     verb("help", "", "these verbs", |_| Ok(Verb::Help)).or(&["?"])
         .on(&[key(Common, "?", &["?", "f1"], "these keys", "")]),
+    verb("terms", "", "what the terms on the screen mean", |_| Ok(Verb::Terms))
+        .on(&[key(Common, "G", &["G"], "what the terms mean", "")]),
+    key_verb("turn help", "the next part of the help", |_| Ok(Verb::TurnHelp), &[
+        key(Help, "tab", &["tab", "j", "down", "pagedown"], "more", ""),
+    ]),
     verb("quit", "", "end", |_| Ok(Verb::Quit)).or(&["q", "exit"])
         .on(&[key(Common, "q", &["q"], "quit", "")]),
     key_verb("apply", "tell the agent what was typed, or do it; put the wish that is selected on the line", |_| Ok(Verb::Apply), &[
@@ -209,13 +229,15 @@ fn ask(command: Command) -> Result<Verb, String> {
     Ok(Verb::Ask(command))
 }
 
-const PAGES: [(&str, ExplorerPage); 6] = [
+const PAGES: [(&str, ExplorerPage); 8] = [
     ("panels", ExplorerPage::Main),
     ("branches", ExplorerPage::Branches),
     ("mind", ExplorerPage::Mind),
     ("world", ExplorerPage::World),
     ("compare", ExplorerPage::Compare),
     ("chain", ExplorerPage::Chain),
+    ("frame", ExplorerPage::Frame),
+    ("actions", ExplorerPage::Actions),
 ];
 
 fn page(line: &VerbLine<'_>) -> Result<Verb, String> {

@@ -24,8 +24,21 @@ pub(crate) struct InputState {
     pub(crate) asked: Option<Verb>,
     /// What the key before asked about.
     pub(crate) confirms: Option<Verb>,
+    /// Which part of the help is shown.
+    pub(crate) help: HelpState,
+    /// What is wrong with the verb that was typed, until another key.
+    pub(crate) complaint: Option<String>,
     /// Nobody has explored here before: the last row says how to begin.
     pub(crate) newcomer: bool,
+}
+
+/// Which part of the help is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct HelpState {
+    /// Terms, in place of keys.
+    pub(crate) shows_terms: bool,
+    /// Where that does not fit on one screen: which part, from 0.
+    pub(crate) part: usize,
 }
 
 impl InputState {
@@ -42,6 +55,8 @@ impl InputState {
             selected_wish: 0,
             asked: None,
             confirms: None,
+            help: HelpState::default(),
+            complaint: None,
             newcomer: false,
         }
     }

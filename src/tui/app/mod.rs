@@ -6,9 +6,10 @@ mod pages;
 mod session_state;
 
 pub use display::{FrameState, Graphics, TerminalState, Traffic};
-pub(crate) use input::InputState;
+pub(crate) use input::{HelpState, InputState};
 pub(crate) use pages::{
-    BranchesPageState, ChainPageState, ComparePageState, MainPageState, MindPageState, ValueMapState, WorldPageState,
+    ActionsPageState, BranchesPageState, ChainPageState, ComparePageState, MainPageState, MindPageState, ValueMapState,
+    WorldPageState,
 };
 pub(crate) use session_state::SessionState;
 
@@ -53,6 +54,8 @@ pub struct App {
     pub(crate) compare: ComparePageState,
     /// The page of a chain.
     pub(crate) chain: ChainPageState,
+    /// The page of every action.
+    pub(crate) actions: ActionsPageState,
     /// The values on the map.
     pub(crate) value_map: ValueMapState,
     /// The frame as it was encoded last.
@@ -80,6 +83,7 @@ impl App {
             world: WorldPageState::default(),
             compare: ComparePageState::default(),
             chain: ChainPageState::default(),
+            actions: ActionsPageState::default(),
             value_map: ValueMapState::default(),
             frame: FrameState::default(),
             traffic: Traffic::default(),
@@ -99,44 +103,62 @@ impl App {
     /// The line of the present page's list that is selected.
     pub(crate) fn selected(&self) -> usize {
         match self.page {
-            ExplorerPage::Main => 0,
+            ExplorerPage::Main | ExplorerPage::Frame => 0,
             ExplorerPage::Branches => self.branches.selected,
             ExplorerPage::Mind => self.mind.selected,
             ExplorerPage::World => self.world.selected,
             ExplorerPage::Compare => self.compare.selected,
             ExplorerPage::Chain => self.chain.selected,
+            ExplorerPage::Actions => self.actions.selected,
         }
     }
 
     /// Selects a line of the present page's list.
     pub(crate) fn select(&mut self, line: usize) {
         match self.page {
-            ExplorerPage::Main => {}
+            ExplorerPage::Main | ExplorerPage::Frame => {}
             ExplorerPage::Branches => self.branches.selected = line,
             ExplorerPage::Mind => self.mind.selected = line,
             ExplorerPage::World => self.world.selected = line,
             ExplorerPage::Compare => self.compare.selected = line,
             ExplorerPage::Chain => self.chain.selected = line,
+            ExplorerPage::Actions => self.actions.selected = line,
         }
     }
 
     /// Where everything is.
     pub(crate) fn layout(&self) -> Option<ScreenLayout> {
-        ScreenLayout::of(Rect::from((ratatui::layout::Position::ORIGIN, self.terminal.size)))
+        let screen = Rect::from((ratatui::layout::Position::ORIGIN, self.terminal.size));
+        match self.page {
+            ExplorerPage::Frame => ScreenLayout::frame_alone(screen),
+            _ => ScreenLayout::of(screen),
+        }
+    }
+
+    /// Whether the frame is all that is shown, asked for or for want of room.
+    pub(crate) fn is_frame_alone(&self) -> bool {
+        self.layout().is_some_and(|layout| layout.is_frame_alone)
     }
 
     /// The character cells that the picture fills, where the page has one.
     pub(crate) fn picture_area(&self) -> Option<Rect> {
         let layout = self.layout()?;
         match self.page {
-            ExplorerPage::Main => {
+            _ if layout.is_frame_alone => {
+                Some(layout.picture(self.terminal.graphics.protocol, self.terminal.graphics.cell_pixels))
+            }
+            ExplorerPage::Main | ExplorerPage::Frame => {
                 Some(layout.picture(self.terminal.graphics.protocol, self.terminal.graphics.cell_pixels))
             }
             ExplorerPage::Branches => {
                 self.branches.divergence.as_ref()?.frames.as_ref()?;
                 Some(layout.branches(self.rows(), self.wishes(), self.terminal.graphics.cell_pixels).frames)
             }
-            ExplorerPage::Mind | ExplorerPage::World | ExplorerPage::Compare | ExplorerPage::Chain => None,
+            ExplorerPage::Mind
+            | ExplorerPage::World
+            | ExplorerPage::Compare
+            | ExplorerPage::Chain
+            | ExplorerPage::Actions => None,
         }
     }
 
@@ -167,7 +189,8 @@ impl App {
             ExplorerPage::Mind => 5 + now.candidates.len(),
             ExplorerPage::Compare => self.compare.contrast.as_ref().map_or(0, |contrast| contrast.rows.len()),
             ExplorerPage::Chain => self.chain.own.as_ref().map_or(0, |chain| chain.links.len()),
-            ExplorerPage::Main => 0,
+            ExplorerPage::Actions => self.actions.lines.len(),
+            ExplorerPage::Main | ExplorerPage::Frame => 0,
         }
     }
 
@@ -176,11 +199,11 @@ impl App {
         let now = self.session.now.as_ref()?;
         let cells = self.picture_area()?.as_size();
         let pair = self.branches.divergence.as_ref().and_then(|divergence| divergence.frames.as_ref());
-        let (frame, overlay) = match pair.filter(|_| self.page == ExplorerPage::Branches) {
+        let (frame, overlay) = match pair.filter(|_| self.page == ExplorerPage::Branches && !self.is_frame_alone()) {
             Some((pair, _)) => (pair.clone(), Overlay::Colour),
             None => (now.frame.clone(), self.main.overlay),
         };
-        let plain = self.page == ExplorerPage::Main && overlay != Overlay::Frames;
+        let plain = (self.page == ExplorerPage::Main || self.is_frame_alone()) && overlay != Overlay::Frames;
         let labels =
             if plain && self.main.numbers && self.session.run_mode.is_none() { self.labelled(now) } else { Vec::new() };
         (cells.width > 0 && cells.height > 0).then(|| Job {

@@ -7,7 +7,7 @@ use crate::analysis::value_map::ValueMap;
 use crate::domain::Heading;
 use crate::explore::chain_report::ChainReport;
 use crate::explore::choices::Sort;
-use crate::explore::timeline::Divergence;
+use crate::explore::timeline::{ActionLine, Divergence};
 use crate::tui::graphics::overlay::Overlay;
 
 /// The main page: all panels.
@@ -52,6 +52,15 @@ pub(crate) struct ComparePageState {
     pub(crate) contrast: Option<Contrast>,
     /// In which state that was: the branch and the step.
     pub(crate) state: Option<(usize, u32)>,
+}
+
+/// The page of every action.
+#[derive(Default)]
+pub(crate) struct ActionsPageState {
+    /// The step that is selected, from 0.
+    pub(crate) selected: usize,
+    /// The steps of the branch in hand.
+    pub(crate) lines: Vec<ActionLine>,
 }
 
 #[derive(Default)]

@@ -5,7 +5,6 @@ use crate::explore::verb;
 use crate::explore::verb::Verb;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
-use crate::tui::log::Tone;
 
 /// A picture that floats over the cells has to be drawn anew when something covers or uncovers it.
 pub(super) fn uncover(app: &App) -> Vec<Effect> {
@@ -27,7 +26,8 @@ pub(super) fn read_palette(app: &mut App) -> Option<Verb> {
             }
             app.input.palette.open(&format!("{} ", entry.name));
         }
-        _ => app.note(Tone::Bad, complaint),
+        // The list of verbs hides the log: it is said under the line itself.
+        _ => app.input.complaint = Some(complaint),
     }
     None
 }

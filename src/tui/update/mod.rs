@@ -13,12 +13,13 @@ pub(crate) use on_action::on_action;
 use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
 use ratatui::layout::Size;
 
-use crate::explore::session::SessionEvent;
+use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::Verb;
 use crate::tui::app::App;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
+use crate::tui::log::Tone;
 use on_event::on_event;
 
 /// Something that happened.
@@ -56,6 +57,10 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
         Msg::Mouse(event) => pointer::on_pointer(app, event),
         Msg::Key(key) => match key_after_notice(app, key).or_else(|| keys::verb(app.input.mode, app.page, key)) {
+            // What cannot be seen is not begun.
+            Some(verb) if app.layout().is_none() && !matches!(verb, Verb::Quit | Verb::Suspend | Verb::Cancel) => {
+                vec![]
+            }
             Some(verb) => on_action(app, verb),
             None => {
                 match app.input.mode {
@@ -86,7 +91,12 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
             app.terminal.size = size;
             app.frame.picture = None;
             app.main.interactions = 0;
-            vec![Effect::Encode, Effect::Repaint]
+            let mut effects = vec![Effect::Encode, Effect::Repaint];
+            if app.layout().is_none() && app.session.run_mode.is_some() {
+                app.note(Tone::Note, "paused: the screen was too small to see anything");
+                effects.push(Effect::Send(SessionCommand::Pause));
+            }
+            effects
         }
         Msg::Session(event) => on_event(app, event),
         Msg::Picture(picture) => {
@@ -114,6 +124,7 @@ fn key_after_notice(app: &mut App, key: KeyEvent) -> Option<Verb> {
     app.input.newcomer = false;
     app.notice = None;
     app.input.confirms = app.input.asked.take();
+    app.input.complaint = None;
     key_by_settings(app, key)
 }
 
@@ -126,14 +137,16 @@ fn key_by_settings(app: &App, key: KeyEvent) -> Option<Verb> {
 mod tests {
     use crossterm::event::{KeyCode, KeyModifiers};
 
+    use super::pages::turn_to;
     use super::*;
     use crate::domain::{Action, ActionType};
     use crate::explore::exploration::StepTaken;
-    use crate::explore::session::{RunMode, SessionCommand};
+    use crate::explore::session::RunMode;
+    use crate::explore::timeline::ActionLine;
+    use crate::explore::verb::ExplorerPage;
     use crate::house::Outcome;
     use crate::house::outcome::Reason;
     use crate::tui::graphics::Protocol;
-    use crate::tui::log::Tone;
     use crate::tui::testing;
     use crate::tui::theme::Ability;
 
@@ -174,6 +187,62 @@ mod tests {
             [Effect::Send(SessionCommand::Instruct("quit nothing, 1 mug".into()))]
         );
         assert_eq!(app.input.mode, Mode::Watch);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_verb_is_said_under_its_line_until_the_next_key() {
+        let mut app = testing::app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+        press(&mut app, KeyCode::Char(':'));
+        type_text(&mut app, "seek soon");
+        assert_eq!(press(&mut app, KeyCode::Enter), []);
+        let text = testing::screen(&mut app);
+        assert!(text.contains("seek: \"soon\" is not a number"), "{text}");
+        press(&mut app, KeyCode::Backspace);
+        assert!(!testing::screen(&mut app).contains("is not a number"));
+        app.input.palette.open("break");
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(SessionCommand::Breakpoints)]);
+    }
+
+    #[test]
+    fn actions_are_listed_and_one_can_be_gone_to() {
+        let mut app = app();
+        assert!(press(&mut app, KeyCode::Char('L')).contains(&Effect::Send(SessionCommand::Actions)));
+        let line = |words: &str, done| ActionLine {
+            words: words.into(),
+            told: "Dance.".into(),
+            by: "first".into(),
+            done,
+            completed: false,
+        };
+        let lines = vec![line("MoveAhead", true), line("Pickup Mug · too far", false)];
+        update(&mut app, Msg::Session(SessionEvent::Actions(lines)));
+        let text = testing::screen(&mut app);
+        assert!(text.contains("1 MoveAhead") && text.contains("2 Pickup Mug · too far"), "{text}");
+        assert!(text.contains("by first  told: Dance."), "{text}");
+        press(&mut app, KeyCode::Char('j'));
+        assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(SessionCommand::Seek(2))]);
+    }
+
+    #[test]
+    fn every_term_is_one_key_away_and_own_keys_are_among_the_keys() {
+        for (width, height) in [(60, 20), (80, 24), (200, 60)] {
+            let mut app = testing::app(width, height, Protocol::HalfBlocks, Ability::FULL);
+            app.config =
+                crate::tui::config::ExplorerConfig::parse("format_version = 1\n[keys]\nctrl-r = \"policy random\"\n")
+                    .unwrap();
+            press(&mut app, KeyCode::Char('G'));
+            let mut seen = String::new();
+            for _ in 0..12 {
+                seen.push_str(&testing::screen(&mut app));
+                press(&mut app, KeyCode::Tab);
+            }
+            for term in ["V", "entropy", "min Q", "advantage", "masked", "eq. 4", "eq. 5", "policy random (your own)"] {
+                assert!(seen.contains(term), "{width}x{height}: no {term}:\n{seen}");
+            }
+            assert!(seen.contains("to the start, to the end"), "and all keys, however small the screen");
+            press(&mut app, KeyCode::Esc);
+            assert_eq!(app.input.mode, Mode::Watch);
+        }
     }
 
     #[test]
@@ -266,13 +335,33 @@ mod tests {
 
     #[test]
     fn a_screen_of_any_size_draws() {
-        for (width, height) in [(1, 1), (10, 3), (79, 24), (80, 24), (97, 31), (200, 60), (300, 40), (80, 90)] {
-            for protocol in Protocol::ALL {
+        let sizes = [(1, 1), (10, 3), (24, 9), (40, 23), (60, 20), (79, 24), (80, 23), (80, 24), (97, 31), (200, 20)];
+        for (width, height) in sizes.into_iter().chain([(200, 60), (300, 40), (80, 90)]) {
+            let all = Protocol::ALL.map(|protocol| (protocol, ExplorerPage::Main));
+            for (protocol, page) in all.into_iter().chain(ExplorerPage::ALL.map(|page| (Protocol::HalfBlocks, page))) {
                 let mut app = testing::app(width, height, protocol, Ability::FULL);
-                on_action(&mut app, Verb::Help);
+                turn_to(&mut app, page);
                 testing::screen(&mut app);
+                for verb in [Verb::Help, Verb::Terms, Verb::Edit, Verb::Palette(String::new()), Verb::ToggleManual] {
+                    on_action(&mut app, verb);
+                    testing::screen(&mut app);
+                    on_action(&mut app, Verb::Cancel);
+                }
             }
         }
+    }
+
+    #[test]
+    fn nothing_goes_on_or_begins_on_a_screen_that_shows_nothing() {
+        let mut app = app();
+        update(&mut app, Msg::Session(SessionEvent::Running(Some(RunMode::Policy))));
+        let small = Msg::Resize(Size { width: 20, height: 5 });
+        assert!(update(&mut app, small).contains(&Effect::Send(SessionCommand::Pause)));
+        update(&mut app, Msg::Session(SessionEvent::Running(None)));
+        for code in [KeyCode::Char(' '), KeyCode::Char('n'), KeyCode::Char('1')] {
+            assert_eq!(press(&mut app, code), []);
+        }
+        assert_eq!(press(&mut app, KeyCode::Char('q')), [Effect::Quit(ExitReason::Asked)]);
     }
 
     #[test]

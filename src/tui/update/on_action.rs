@@ -8,10 +8,11 @@ use crate::domain::Heading;
 use crate::explore::session::{RunMode, SessionCommand, StepRate};
 use crate::explore::verb;
 use crate::explore::verb::{DRAWS, ExplorerPage, Verb};
-use crate::tui::app::App;
+use crate::tui::app::{App, HelpState};
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
+use crate::tui::view::help::turn_help;
 
 /// Does what a person asked for.
 pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
@@ -37,7 +38,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             vec![Effect::Encode]
         }
         Verb::ToggleManual => {
-            let mut effects = turn_to(app, ExplorerPage::Main);
+            let mut effects = if app.page == ExplorerPage::Frame { vec![] } else { turn_to(app, ExplorerPage::Main) };
             app.input.mode = if app.input.mode == Mode::Manual { Mode::Watch } else { Mode::Manual };
             effects.extend(app.session.run_mode.map(|_| Effect::Send(SessionCommand::Pause)));
             effects
@@ -52,6 +53,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             vec![]
         }
         Verb::Select(by) => select(app, by),
+        Verb::Take if app.page == ExplorerPage::Actions => send(SessionCommand::Seek(app.actions.selected as u32 + 1)),
         Verb::Take => send(SessionCommand::Switch((app.branches.selected + 1).to_string())),
         Verb::Sort => {
             app.mind.sort = app.mind.sort.next();
@@ -80,10 +82,16 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
             app.input.palette.open(&text);
             uncover(app)
         }
-        Verb::Help => {
+        Verb::Help | Verb::Terms => {
             app.input.open(Mode::Help);
+            app.input.help = HelpState { shows_terms: verb == Verb::Terms, part: 0 };
             uncover(app)
         }
+        Verb::TurnHelp => {
+            turn_help(app);
+            vec![]
+        }
+        Verb::OpenLink => ask(app, SessionCommand::OpenLink(app.chain.selected)),
         Verb::Cancel => {
             app.input.close();
             uncover(app)
@@ -122,6 +130,7 @@ fn asks_first(app: &App, verb: &Verb) -> bool {
 fn ask(app: &mut App, command: SessionCommand) -> Vec<Effect> {
     let mut effects = match &command {
         SessionCommand::Diverge(_) => turn_to(app, ExplorerPage::Branches),
+        SessionCommand::OpenLink(_) => turn_to(app, ExplorerPage::Main),
         SessionCommand::Compare(_) => turn_to(app, ExplorerPage::Compare),
         SessionCommand::Chain(_) | SessionCommand::WhichLink(_) | SessionCommand::Against(_) => {
             turn_to(app, ExplorerPage::Chain)

@@ -7,6 +7,7 @@ use super::lines::uncover;
 use super::pages::turn_to;
 use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::exploration::SessionSnapshot;
+use crate::explore::inspect::changes;
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::ExplorerPage;
 use crate::tui::app::App;
@@ -41,7 +42,7 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
                 app.log.write(LogEntry { step, text: note, outcome: String::new(), tone: Tone::Note });
             }
             let mut effects = vec![Effect::Encode];
-            effects.extend(asked_again(app));
+            effects.extend(asked_again(app, before.as_deref()));
             effects
         }
         SessionEvent::Stepped(step) => {
@@ -120,9 +121,16 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
         }
         SessionEvent::Breakpoints(conditions) => {
             let all: Vec<String> = conditions.iter().map(ToString::to_string).collect();
-            let text =
-                if all.is_empty() { "runs stop nowhere".into() } else { format!("runs stop at: {}", all.join("; ")) };
+            let text = if all.is_empty() {
+                "runs stop nowhere (:break CONDITION)".into()
+            } else {
+                format!("runs stop at: {}", all.join("; "))
+            };
             app.note(Tone::Note, text);
+            vec![]
+        }
+        SessionEvent::Actions(lines) => {
+            app.actions.lines = lines;
             vec![]
         }
         SessionEvent::Diverged(divergence) => {
@@ -204,7 +212,7 @@ fn reading(wish: &Wish) -> Vec<(Tone, String)> {
 const NEW: u32 = 20;
 
 /// What has to be asked again in a new state: how the branches beside each other part, and values for other words.
-fn asked_again(app: &App) -> Vec<Effect> {
+fn asked_again(app: &App, before: Option<&SessionSnapshot>) -> Vec<Effect> {
     let mut effects = Vec::new();
     let Some(now) = &app.session.now else { return effects };
     let other = app
@@ -214,8 +222,16 @@ fn asked_again(app: &App) -> Vec<Effect> {
         .map(|divergence| &divergence.names[1])
         .filter(|_| app.page == ExplorerPage::Branches);
     effects.extend(other.map(|other| Effect::Send(SessionCommand::Diverge(other.clone()))));
+    if app.page == ExplorerPage::Actions {
+        effects.push(Effect::Send(SessionCommand::Actions));
+    }
     let told = app.value_map.map.as_ref().is_some_and(|(values, _)| values.instruction != now.instruction);
-    if app.value_map.is_painted && told {
+    // Values are of a house: where something in it changed, they are others.
+    let moved = app.value_map.is_painted
+        && before.is_some_and(|before| {
+            before.episode == now.episode && !changes(&now.scene, &before.world, &now.world).is_empty()
+        });
+    if app.value_map.is_painted && (told || moved) {
         effects.push(Effect::Send(SessionCommand::ValueMap));
     }
     effects

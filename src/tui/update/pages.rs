@@ -13,7 +13,7 @@ pub(crate) fn turn_to(app: &mut App, page: ExplorerPage) -> Vec<Effect> {
     }
     app.page = page;
     app.select(0);
-    if matches!(app.input.mode, Mode::Manual) && page != ExplorerPage::Main {
+    if matches!(app.input.mode, Mode::Manual) && !matches!(page, ExplorerPage::Main | ExplorerPage::Frame) {
         app.input.mode = Mode::Watch;
     }
     app.frame.picture = None;
@@ -23,6 +23,12 @@ pub(crate) fn turn_to(app: &mut App, page: ExplorerPage) -> Vec<Effect> {
 pub(super) fn show(app: &mut App, page: ExplorerPage) -> Vec<Effect> {
     let page = if app.page == page { ExplorerPage::Main } else { page };
     let mut effects = turn_to(app, page);
+    if app.page == ExplorerPage::Actions {
+        let at = app.session.now.as_ref().map_or(0, |now| now.time.at as usize);
+        app.actions.selected = at.saturating_sub(1);
+        app.actions.lines.clear();
+        effects.push(Effect::Send(SessionCommand::Actions));
+    }
     if app.page == ExplorerPage::Branches {
         let branch = app.session.now.as_ref().map_or(0, |now| now.time.branch);
         app.branches.selected = branch;

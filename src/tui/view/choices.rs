@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::panel::{bar, fit, panel, put, share, wrap};
+use super::panel::{bar, fit, panel, put, share, unsigned_zero, wrap};
 use crate::domain::Class;
 use crate::explore::choices::{Choice, choices};
 use crate::explore::exploration::SessionSnapshot;
@@ -56,7 +56,7 @@ impl ChoicesView<'_> {
             .as_ref()
             .map_or(String::new(), |distribution| format!(" · entropy {:.2}", distribution.entropy));
         let value = match &app.session.values {
-            Some(values) => format!("V {:.2}", values.state),
+            Some(values) => format!("V {:.2}", unsigned_zero(values.state)),
             None => "this checkpoint has no critic".into(),
         };
         let right = format!("{} · {value}{entropy} · by {}", now.acts, app.mind.sort.name());
@@ -67,7 +67,7 @@ impl ChoicesView<'_> {
         put(buf, inner, 0, head, THEME.quiet);
         let rows = choices(now, decision, app.session.values.as_ref(), app.mind.sort);
         let room = usize::from(inner.height).saturating_sub(2);
-        let first = (app.mind.selected + 1).saturating_sub(room).min(rows.len().saturating_sub(room));
+        let first = app.mind.selected.min(rows.len().saturating_sub(room));
         for (row, choice) in (1..).zip(rows.iter().skip(first).take(room)) {
             line(choice, width).render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
         }
@@ -100,7 +100,7 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
         (false, true) => "+",
         (false, false) => " ",
     };
-    let number = |x: Option<f32>| x.map_or_else(|| "-".to_string(), |x| format!("{x:.2}"));
+    let number = |x: Option<f32>| x.map_or_else(|| "-".to_string(), |x| format!("{:.2}", unsigned_zero(x)));
     let object = fit(choice.class.map_or("", Class::spoken), 18);
     let p = choice.probability.unwrap_or(0.0);
     let good = match choice.advantage {
@@ -119,7 +119,10 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
         ),
         Span::styled(bar(p, width), if choice.chosen { THEME.chosen } else { THEME.bar }),
         Span::styled(format!(" {:>6}", number(choice.q)), style),
-        Span::styled(format!(" {:>9}", choice.advantage.map_or_else(|| "-".into(), |a| format!("{a:+.2}"))), good),
+        Span::styled(
+            format!(" {:>9}", choice.advantage.map_or_else(|| "-".into(), |a| format!("{:+.2}", unsigned_zero(a)))),
+            good,
+        ),
     ])
 }
 

@@ -6,7 +6,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 
-use super::panel::{bar, fit, panel, put, share, wrap};
+use super::panel::{bar, fit, panel, put, share, unsigned_zero, wrap};
 use crate::analysis::instruction_ab::{Contrast, Row};
 use crate::domain::Class;
 use crate::tui::app::App;
@@ -101,7 +101,7 @@ fn table(contrast: &Contrast, selected: usize, area: Rect, buf: &mut Buffer) {
         format!("{:<11} {:<16} {:>4} {:<width$} {:>4} {:<width$} {:>6}", "action", "object", "A", "", "B", "", "B - A");
     put(buf, inner, 0, head, THEME.quiet);
     let rows = usize::from(inner.height).saturating_sub(1);
-    let first = (selected + 1).saturating_sub(rows);
+    let first = selected.min(contrast.rows.len().saturating_sub(rows));
     for (row, choice) in (1..).zip(contrast.rows.iter().skip(first).take(rows)) {
         line(choice, contrast, width).render(Rect { y: inner.y + row, height: 1, ..inner }, buf);
     }
@@ -121,6 +121,6 @@ fn line(row: &Row, contrast: &Contrast, width: usize) -> Line<'static> {
         Span::styled(format!("{:<11} {object:<16} ", row.kind.name()), Style::new()),
         Span::styled(format!("{:>4} {} ", share(a), bar(a, width)), style(0)),
         Span::styled(format!("{:>4} {} ", share(b), bar(b, width)), style(1)),
-        Span::styled(format!("{:>+6.2}", b - a), difference),
+        Span::styled(format!("{:>+6.2}", unsigned_zero(b - a)), difference),
     ])
 }

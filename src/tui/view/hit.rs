@@ -20,7 +20,8 @@ pub(crate) fn target_at(app: &App, at: Position) -> Option<Target> {
         return timeline::step_at(app, layout.time, at.x).map(Target::Step);
     }
     match app.page {
-        ExplorerPage::Main => panels(app, &layout, at),
+        _ if layout.is_frame_alone => panels(app, &layout, at),
+        ExplorerPage::Main | ExplorerPage::Frame => panels(app, &layout, at),
         ExplorerPage::World => {
             let [plan, list] = world::parts(layout.page);
             if plan.contains(at) { map::under(app, plan, at) } else { row(app, list, at) }
@@ -28,6 +29,7 @@ pub(crate) fn target_at(app: &App, at: Position) -> Option<Target> {
         ExplorerPage::Branches => {
             row(app, layout.branches(app.rows(), app.wishes(), app.terminal.graphics.cell_pixels).list, at)
         }
+        ExplorerPage::Actions => row(app, layout.page, at),
         ExplorerPage::Mind | ExplorerPage::Compare | ExplorerPage::Chain => None,
     }
 }

@@ -7,7 +7,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::floor_plan::{FloorPlan, extent, furniture_colour};
-use super::panel::{fit, panel};
+use super::panel::{fit, panel, unsigned_zero};
 use super::target::Target;
 use crate::analysis::value_map::ValueMap;
 use crate::domain::{Cell, Heading, Instance, Point};
@@ -71,6 +71,7 @@ impl Widget for MapPanel<'_> {
 fn legend(values: &ValueMap, heading: Option<Heading>, other_step: Option<u32>, room: usize) -> String {
     let facing = heading.map_or("best heading", Heading::name);
     let (low, high) = values.range(heading).unwrap_or((0.0, 0.0));
+    let (low, high) = (unsigned_zero(low), unsigned_zero(high));
     let far = values.cells.len() < values.of;
     let far = if far { format!(", {}/{}", values.cells.len(), values.of) } else { String::new() };
     let step = other_step.map_or(String::new(), |step| format!(", as of step {step}"));
@@ -239,6 +240,10 @@ impl MapScale {
         let mut mark = |x: i32, z: i32, symbol: char, style: Style| {
             if let Some((column, row)) = self.position(x, z) {
                 let cell = &mut buf[(column, row)];
+                // Names of furniture stay legible; what is acted on, and the agent, matter more.
+                if symbol == '•' && cell.symbol().chars().any(char::is_alphabetic) {
+                    return;
+                }
                 let under = if cell.symbol() == "▀" || cell.symbol() == "▄" { cell.fg } else { cell.bg };
                 cell.set_char(symbol).set_bg(under).set_style(style);
             }

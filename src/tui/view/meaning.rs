@@ -19,6 +19,10 @@ pub(crate) struct MeaningRow<'a>(pub(crate) &'a App);
 
 impl Widget for MeaningRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
+        if let Some(complaint) = &self.0.input.complaint {
+            Line::styled(fit(complaint, usize::from(area.width)), THEME.bad).render(area, buf);
+            return;
+        }
         let Some(now) = &self.0.session.now else { return };
         let Some(wish) = now.wishes.last() else { return };
         let width = usize::from(area.width);

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::panel::{bar, fit, panel, put, share, wrap};
+use super::panel::{bar, fit, panel, put, share, unsigned_zero, wrap};
 use crate::agent::{ActionDistribution, Decision};
 use crate::domain::{ActionType, Class};
 use crate::explore::exploration::SessionSnapshot;
@@ -27,8 +27,11 @@ impl Widget for MindPanel<'_> {
         let right = match (&app.session.busy, distribution) {
             (Some(busy), _) => format!("{busy} ..."),
             (None, Some(distribution)) => {
-                let value =
-                    app.session.values.as_ref().map_or(String::new(), |values| format!(" · V {:.2}", values.state));
+                let value = app
+                    .session
+                    .values
+                    .as_ref()
+                    .map_or(String::new(), |values| format!(" · V {:.2}", unsigned_zero(values.state)));
                 let done = app.session.decision.as_ref().and_then(|(decision, _)| decision.end_in_words());
                 let done = done.map_or(String::new(), |done| format!(" · {done}"));
                 format!("{}{value} · entropy {:.2}{done}", app.session.policy.name(), distribution.entropy)

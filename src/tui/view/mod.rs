@@ -1,12 +1,13 @@
 //! The screen: one widget a panel, drawn from the state alone.
 
+mod actions;
 mod branches;
 mod chain;
 mod compare;
 mod frame;
 mod floor_plan;
 pub(crate) mod hit;
-mod help;
+pub(crate) mod help;
 mod instruction;
 mod log;
 mod map;
@@ -35,7 +36,7 @@ use ratatui::widgets::{Paragraph, Widget, Wrap};
 
 use super::app::App;
 use super::keys::Mode;
-use super::layout::SMALLEST;
+use super::layout::TINIEST;
 use crate::explore::verb::ExplorerPage;
 
 impl Widget for &App {
@@ -50,12 +51,14 @@ impl Widget for &App {
         };
         status::HeaderRow(self).render(layout.header, buf);
         match self.page {
+            _ if layout.is_frame_alone => frame::FramePanel(self).render(layout.sees, buf),
             ExplorerPage::Branches => branches::BranchesView(self).render(layout.page, buf),
             ExplorerPage::Mind => choices::ChoicesView(self).render(layout.page, buf),
             ExplorerPage::World => world::WorldView(self).render(layout.page, buf),
             ExplorerPage::Compare => compare::CompareView(self).render(layout.page, buf),
             ExplorerPage::Chain => chain::ChainView(self).render(layout.page, buf),
-            ExplorerPage::Main => {
+            ExplorerPage::Actions => actions::ActionsView(self).render(layout.page, buf),
+            ExplorerPage::Main | ExplorerPage::Frame => {
                 frame::FramePanel(self).render(layout.sees, buf);
                 reach::ReachPanel(self).render(layout.reach, buf);
                 mind::MindPanel(self).render(layout.distribution, buf);
@@ -81,9 +84,9 @@ impl Widget for &App {
 }
 
 fn too_small(area: Rect, buf: &mut Buffer) {
-    let (width, height) = SMALLEST;
+    let (width, height) = TINIEST;
     let text = format!(
-        "This terminal is too small: {} x {}. The explorer needs {width} x {height}. Make it larger, or press q to quit.",
+        "This terminal is too small: {} x {}. The explorer needs {width} x {height}, and waits. Make it larger, or press q to quit.",
         area.width, area.height
     );
     Paragraph::new(text).wrap(Wrap { trim: true }).render(area, buf);

@@ -76,6 +76,11 @@ pub(super) fn share(p: f32) -> String {
     if p >= 0.995 { "1.0".into() } else { format!("{p:.2}").trim_start_matches('0').to_string() }
 }
 
+/// A number without the sign of a zero: what rounds to 0.00 is not below it.
+pub(super) fn unsigned_zero(x: f32) -> f32 {
+    if x.abs() < 0.005 { 0.0 } else { x }
+}
+
 /// A line of text at a row of an area.
 pub(super) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String>, style: Style) {
     if row < area.height {

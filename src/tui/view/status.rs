@@ -117,14 +117,16 @@ impl Widget for StatusRow<'_> {
             Line::styled(fit(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
             return;
         }
-        if let Some(notice) =
-            app.notice.as_ref().filter(|_| app.input.mode == Mode::Watch && app.page != ExplorerPage::Main)
+        if let Some(notice) = app
+            .notice
+            .as_ref()
+            .filter(|_| app.input.mode == Mode::Watch && (app.page != ExplorerPage::Main || app.is_frame_alone()))
         {
             Line::styled(fit(&notice.text, usize::from(area.width)), tone(notice.tone)).render(area, buf);
             return;
         }
         let hints: &[(&str, &str)] = match (app.input.mode, app.page) {
-            (Mode::Watch, ExplorerPage::Main) => &[
+            (Mode::Watch, ExplorerPage::Main | ExplorerPage::Frame) => &[
                 ("space", "run"),
                 ("n", "step"),
                 ("h l", "back, forward"),
@@ -135,8 +137,11 @@ impl Widget for StatusRow<'_> {
             (Mode::Watch, ExplorerPage::Branches) => {
                 &[("j k", "select"), ("enter", "go there"), ("R", "name"), ("T", "save as task"), ("esc", "panels")]
             }
+            (Mode::Watch, ExplorerPage::Actions) => {
+                &[("j k", "select"), ("enter", "go there"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")]
+            }
             (Mode::Watch, ExplorerPage::Mind) => {
-                &[("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")]
+                &[("G", "terms"), ("s", "sort"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")]
             }
             (Mode::Watch, ExplorerPage::World) => {
                 &[("j k", "select"), ("V", "value map"), ("v", "heading"), ("esc", "panels"), ("?", "keys")]
@@ -147,8 +152,8 @@ impl Widget for StatusRow<'_> {
                 ("w", "which link breaks"),
                 ("x", "this one"),
                 ("A", "against"),
-                ("s", "stop"),
-                ("?", "keys"),
+                ("O", "open"),
+                ("G", "terms"),
             ],
             (Mode::Manual, _) => &[
                 ("arrows", "move"),
@@ -162,7 +167,7 @@ impl Widget for StatusRow<'_> {
                 &[("enter", "tell the agent"), ("esc", "leave"), ("up", "earlier instructions"), ("tab", "complete")]
             }
             (Mode::Palette, _) => &[("enter", "do it"), ("tab", "fill in"), ("up down", "select"), ("esc", "leave")],
-            (Mode::Help, _) => &[("esc", "close the help")],
+            (Mode::Help, _) => &[("tab", "more"), ("esc", "close the help")],
             (Mode::WishList, _) => &[("j k", "select"), ("enter", "put it on the line"), ("esc", "leave")],
         };
         let mut spans = Vec::new();

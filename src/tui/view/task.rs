@@ -4,6 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
 
 use super::panel::{panel, put, wrap};
 use crate::episode::wish::{WishGrading, WishVerdict};
@@ -26,7 +27,8 @@ impl Widget for TaskPanel<'_> {
         let title = if is_task { "Task" } else { "Wish" };
         let verdict = now.end.map(WishVerdict::short);
         let Some(progress) = &now.progress else {
-            let inner = panel(buf, area, title, verdict.unwrap_or("not graded"));
+            let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(" · task {done} of {of}"));
+            let inner = panel(buf, area, title, &format!("{}{beside}", verdict.unwrap_or("not graded")));
             let why = wish.and_then(|wish| wish.ungraded.as_deref()).unwrap_or_default();
             let text = match verdict {
                 Some(_) => "i tells it the next thing, from here on".to_string(),
@@ -44,6 +46,10 @@ impl Widget for TaskPanel<'_> {
             (None, Some(expert)) => format!("{done} of {of} · expert {expert}"),
             (None, None) => format!("{done} of {of} done"),
         };
+        let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(" · task {done} of {of}"));
+        let both = format!("{right}{beside}");
+        // Where there is no room for both, the wish in force comes first.
+        let right = if both.width() + title.len() + 2 <= width { both } else { right };
         let inner = panel(buf, area, title, &right);
         let mut lines: Vec<(String, Style)> = Vec::new();
         let advice = wish.and_then(|wish| wish.advice.as_deref()).map(with_keys);
@@ -67,8 +73,15 @@ impl Widget for TaskPanel<'_> {
         // Done subtasks scroll away first: the current one must be in sight.
         let current = lines.iter().position(|(line, _)| line.starts_with("[>]")).unwrap_or(lines.len());
         let skip = lines.len().saturating_sub(usize::from(inner.height)).min(current);
+        let hidden = (lines.len() - skip).saturating_sub(usize::from(inner.height));
         for (row, (line, style)) in (0..inner.height).zip(lines.into_iter().skip(skip)) {
             put(buf, inner, row, line, style);
+        }
+        if hidden > 0 && inner.height > 1 {
+            let mark = format!(" ▼ {hidden} more ");
+            let width = (mark.width() as u16).min(inner.width);
+            let corner = Rect { x: inner.right() - width, y: inner.bottom() - 1, width, height: 1 };
+            put(buf, corner, 0, mark, THEME.note);
         }
     }
 }

@@ -401,6 +401,8 @@ fn two_instructions_are_compared_and_swapped() {
 /// A chain of three links by a policy: the second link is done or not, the link values are V or not.
 fn chained(name: &str, second: bool, by_value: bool) -> ChainReport {
     let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| LinkOutcome {
+        taken: Vec::new(),
+        failure: None,
         reached,
         done: Some(done),
         steps,
@@ -519,8 +521,24 @@ fn every_page_draws_at_every_size_and_without_colour_in_ascii() {
 
 #[test]
 fn a_small_terminal_is_told_what_is_needed() {
-    let mut app = app(40, 10, Protocol::HalfBlocks, Ability::FULL);
-    check("too-small-40x10", &screen(&mut app));
+    let mut app = app(20, 8, Protocol::HalfBlocks, Ability::FULL);
+    check("too-small-20x8", &screen(&mut app));
+}
+
+#[test]
+fn the_frame_alone_has_all_the_room_by_its_key_or_on_a_small_screen() {
+    let width = |app: &App| app.picture_area().unwrap().width;
+    let mut large = app(80, 24, Protocol::HalfBlocks, Ability::FULL);
+    let among_panels = width(&large);
+    on_action(&mut large, Verb::Show(ExplorerPage::Frame));
+    assert!(width(&large) >= 3 * among_panels / 2, "{} of {among_panels}", width(&large));
+    let text = screen(&mut large);
+    assert!(text.contains("Instruction >") && !text.contains("Mind"), "{text}");
+    on_action(&mut large, Verb::Show(ExplorerPage::Frame));
+    assert!(screen(&mut large).contains("Mind"), "the same key leads back");
+    let mut small = app(40, 10, Protocol::HalfBlocks, Ability::FULL);
+    let text = screen(&mut small);
+    assert!(text.contains("Instruction >") && width(&small) >= 8 && !text.contains("Mind"), "{text}");
 }
 
 #[test]

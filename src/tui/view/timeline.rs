@@ -16,7 +16,7 @@ pub(crate) struct TimelineRow<'a>(pub(crate) &'a App);
 
 impl Widget for TimelineRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
-        let Some(now) = &self.0.session.now else { return };
+        let Some(now) = self.0.session.now.as_ref().filter(|_| area.height > 0) else { return };
         let time = &now.time;
         let (place, others) = around(time, area.width);
         let mut spans = vec![Span::styled(TITLE, THEME.title), Span::raw(place.clone())];

@@ -5,13 +5,16 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
-use crate::analysis::chain::Handover;
+use crate::analysis::chain::{Handover, LinkOutcome};
+use crate::domain::Action;
 use crate::explore::chain_report::ChainReport;
 use crate::explore::exploration::SessionSnapshot;
 use crate::explore::inspect::{changes, stands};
+use crate::house::Outcome;
 use crate::tui::app::App;
+use crate::tui::keys::with_keys;
 use crate::tui::theme::THEME;
-use crate::tui::view::panel::{panel, put, wrap};
+use crate::tui::view::panel::{panel, put, unsigned_zero, wrap};
 
 /// The panel, with a column a policy.
 pub(super) struct LinkPanel<'a> {
@@ -56,6 +59,12 @@ fn lines(side: &ChainReport, at: usize, head: Option<&str>, now: &SessionSnapsho
         line("", "not reached: a link before it failed", THEME.quiet);
         return;
     }
+    if let Some((failure, advice)) = &outcome.failure {
+        line("why", &format!("{}: {}", failure.words(), with_keys(advice)), THEME.bad);
+    }
+    if outcome.done != Some(true) && !outcome.taken.is_empty() {
+        line("last", &last_actions(outcome, now), Style::new());
+    }
     line("entry", &stands(&now.scene, &outcome.entry), Style::new());
     line("exit", &stands(&now.scene, &outcome.exit), Style::new());
     let changes = changes(&now.scene, &outcome.entry, &outcome.exit);
@@ -66,13 +75,29 @@ fn lines(side: &ChainReport, at: usize, head: Option<&str>, now: &SessionSnapsho
     }
 }
 
+/// Actions that are shown of the end of a link.
+const LAST: usize = 6;
+
+/// What was done last, and what of it was impossible.
+fn last_actions(outcome: &LinkOutcome, now: &SessionSnapshot) -> String {
+    let words = |(action, came): &(Action, Outcome)| {
+        let class = action.target.and_then(|target| outcome.exit.class_of(&now.scene, target));
+        let class = class.map_or(String::new(), |class| format!(" {}", class.name()));
+        let came = if came.is_done() { String::new() } else { format!(" ({came})") };
+        format!("{}{class}{came}", action.kind)
+    };
+    let first = outcome.taken.len().saturating_sub(LAST);
+    let before = if first > 0 { "... " } else { "" };
+    format!("{before}{}", outcome.taken[first..].iter().map(words).collect::<Vec<_>>().join(", "))
+}
+
 /// Columns before what is said.
 const LABEL: usize = 8;
 
 /// What chaining would learn from the end of a link, from 1.
 fn words(handover: Handover, link: usize) -> String {
     let Handover { worth, next, joined } = handover;
-    let target = handover.target();
+    let [target, worth, next, joined] = [handover.target(), worth, next, joined].map(unsigned_zero);
     let following = link + 1;
     format!(
         "{target:.2}, V for link {following} being {worth:.2}; eq. 4: min Q for {following} is {next:.2}; \

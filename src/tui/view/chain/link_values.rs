@@ -9,7 +9,7 @@ use ratatui::widgets::Widget;
 use crate::analysis::chain::ChainRun;
 use crate::explore::chain_report::ChainReport;
 use crate::tui::theme::THEME;
-use crate::tui::view::panel::fit;
+use crate::tui::view::panel::{fit, unsigned_zero};
 use crate::tui::view::panel::{panel, put};
 use crate::tui::view::value_colour::value_colour;
 
@@ -83,6 +83,7 @@ fn legend(sides: &[&ChainReport]) -> String {
     let Some(first) = plays().next() else { return String::new() };
     let words = |by_value: bool| {
         let (low, high) = range(plays(), by_value);
+        let (low, high) = (unsigned_zero(low), unsigned_zero(high));
         format!("{low:.2} to {high:.2}")
     };
     let scale = match plays().all(|play| play.by_value == first.by_value) {

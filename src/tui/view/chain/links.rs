@@ -10,7 +10,7 @@ use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSucc
 use crate::explore::chain_report::ChainReport;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
-use crate::tui::view::panel::fit;
+use crate::tui::view::panel::{fit, unsigned_zero};
 use crate::tui::view::panel::{panel, put};
 
 /// The table. The first side is the one whose links are replayed.
@@ -132,7 +132,12 @@ fn about(play: Option<&ChainRun>, shown: bool) -> &'static str {
 }
 
 fn values(handover: Handover) -> String {
-    format!("{:>VALUE$.2}{:>VALUE$.2}{:>VALUE$.2}", handover.target(), handover.next, handover.joined)
+    format!(
+        "{:>VALUE$.2}{:>VALUE$.2}{:>VALUE$.2}",
+        unsigned_zero(handover.target()),
+        unsigned_zero(handover.next),
+        unsigned_zero(handover.joined)
+    )
 }
 
 fn outcome(play: Option<&ChainRun>, at: usize) -> Span<'static> {
