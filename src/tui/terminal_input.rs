@@ -168,6 +168,8 @@ fn csi(rest: &[u8]) -> Reading {
             c => key(plain_key(c).0, plain_key(c).1 | modifiers),
         }),
         (_, b'Z') => Some(key(KeyCode::BackTab, KeyModifiers::SHIFT)),
+        // A place of the cursor looks like a function key, but for its row.
+        (_, b'R') if numbers.len() > 1 && numbers[0] != 1 => None,
         (_, letter) => code_of_letter(letter).map(|code| key(code, modifiers)),
     };
     found.map_or(Reading::Nothing, Reading::Whole)

@@ -182,6 +182,7 @@ mod tests {
         assert_eq!(exploration.task_beside(), None, "it is the wish in force");
         exploration.instruct("pick up the mug").unwrap();
         assert_eq!(exploration.task_beside(), Some((0, 2)));
+        exploration.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         let mut credited = None;
         while exploration.end().is_none() {
             credited = exploration.step().unwrap().completed;

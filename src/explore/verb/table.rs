@@ -169,7 +169,7 @@ pub(crate) const VERBS: &[VerbEntry] = &[
             key(Common, "B", &["B"], "two instructions, A and B", "compare"),
             key(Common, "C", &["C"], "a chain of instructions", "chain"),
             key(Common, "L", &["L"], "list of every action", "actions"),
-            key(Common, "f", &["f"], "the frame alone, at full size", "frame"),
+            key(Common, "f", &["f"], "the frame at full size", "frame"),
             key(Lists, "esc", &["esc"], "all panels again", "panels"),
         ]),
     key_verb("select", "another line of the list", |line| Ok(Verb::Select(line.rest.parse().unwrap_or(1))), &[

@@ -27,7 +27,7 @@ impl Widget for TaskPanel<'_> {
         let title = if is_task { "Task" } else { "Wish" };
         let verdict = now.end.map(WishVerdict::short);
         let Some(progress) = &now.progress else {
-            let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(" · task {done} of {of}"));
+            let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(", task {done}/{of}"));
             let inner = panel(buf, area, title, &format!("{}{beside}", verdict.unwrap_or("not graded")));
             let why = wish.and_then(|wish| wish.ungraded.as_deref()).unwrap_or_default();
             let text = match verdict {
@@ -46,7 +46,7 @@ impl Widget for TaskPanel<'_> {
             (None, Some(expert)) => format!("{done} of {of} · expert {expert}"),
             (None, None) => format!("{done} of {of} done"),
         };
-        let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(" · task {done} of {of}"));
+        let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(", task {done}/{of}"));
         let both = format!("{right}{beside}");
         // Where there is no room for both, the wish in force comes first.
         let right = if both.width() + title.len() + 2 <= width { both } else { right };
