@@ -8,7 +8,7 @@ use anyhow::Context;
 use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
-use ratatui::backend::CrosstermBackend;
+use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 
 use super::start_page::{StartAnswer, StartPage};
 use super::terminal;
@@ -59,8 +59,11 @@ pub(super) fn pick<W: Write>(
     mut start_worker: impl FnMut(&Start) -> io::Result<Sender<SessionCommand>>,
 ) -> anyhow::Result<Picked> {
     let mut under_way: Option<(Sender<SessionCommand>, Start)> = None;
+    let mut is_stopped = false;
     loop {
-        draw(&page, style, display)?;
+        if !is_stopped {
+            draw(&page, style, display)?;
+        }
         match messages.recv().context("all threads are gone")? {
             Msg::Key(key) => match page.on_key(key) {
                 StartAnswer::Stay => {}
@@ -82,7 +85,17 @@ pub(super) fn pick<W: Write>(
                     return Ok(Picked::Started { commands, first: vec![event], start });
                 }
             }
-            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) => {}
+            Msg::StopAsked => {
+                is_stopped = true;
+                terminal::stop()?;
+            }
+            Msg::Continued => {
+                terminal::take_again()?;
+                display.backend_mut().clear_region(ClearType::All)?;
+                display.swap_buffers();
+                is_stopped = false;
+            }
+            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Ready => {}
         }
     }
 }

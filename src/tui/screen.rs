@@ -243,10 +243,8 @@ impl<W: Write> ScreenLoop<W> {
     /// Gives the terminal back and stops, with all that was started together with it; whoever lets it go on says so by a signal.
     fn stop(&mut self) -> io::Result<()> {
         Write::flush(self.display.backend_mut())?;
-        terminal::give_back();
         self.is_stopped = true;
-        rustix::process::kill_current_process_group(rustix::process::Signal::STOP)?;
-        Ok(())
+        terminal::stop()
     }
 
     /// Takes the terminal again: whoever had it meanwhile left it as they like it.

@@ -64,6 +64,16 @@ fn seize() -> io::Result<()> {
     execute!(io::stdout(), EnterAlternateScreen, cursor::Hide, EnableBracketedPaste)
 }
 
+/// Gives the terminal back and stops the program, as Ctrl-Z asks; it returns when the program goes on.
+///
+/// # Errors
+/// When it cannot be stopped.
+pub(crate) fn stop() -> io::Result<()> {
+    give_back();
+    rustix::process::kill_current_process_group(rustix::process::Signal::STOP)?;
+    Ok(())
+}
+
 /// Takes the terminal again after somebody else had it, whether it was given back before or not.
 ///
 /// # Errors
