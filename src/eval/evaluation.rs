@@ -452,6 +452,9 @@ pub(crate) mod tests {
         }
     }
 
+    /// What is changed of a good record.
+    type Change<'a> = &'a dyn Fn(&mut Episode);
+
     #[test]
     fn a_run_goes_on_only_with_records_that_are_its_own() {
         let folder = tempfile::tempdir().unwrap();
@@ -459,7 +462,7 @@ pub(crate) mod tests {
         let whole = again().unwrap().lines;
         let file = folder.path().join("episodes.jsonl");
         let first: Episode = serde_json::from_str(whole.lines().next().unwrap()).unwrap();
-        let faults: [(&dyn Fn(&mut Episode), &str); 7] = [
+        let faults: [(Change<'_>, &str); 7] = [
             (&|it| it.task = "nobody".into(), "no task \"nobody\""),
             (&|it| it.seed = 4, "seed"),
             (&|it| it.steps = u32::MAX, "steps: 4294967295"),

@@ -89,6 +89,9 @@ mod tests {
     use crate::run_dir::manifest::tests::manifest;
     use crate::run_dir::shard::Shard;
 
+    /// What is changed of a good record.
+    type Change<'a> = &'a dyn Fn(&mut Episode);
+
     #[test]
     fn a_record_of_another_run_and_one_that_contradicts_itself_are_named() {
         let set = sample_set();
@@ -104,7 +107,7 @@ mod tests {
         assert_eq!(checked(&|_| ()), "");
         assert_eq!(checked(&|it| (it.completed, it.success) = (length, true)), "");
         assert_eq!(checked(&|it| it.error = Some("timed out".into())), "");
-        let faults: [(&dyn Fn(&mut Episode), &str); 11] = [
+        let faults: [(Change<'_>, &str); 11] = [
             (&|it| it.task = "nobody".into(), "no task \"nobody\""),
             (&|it| it.seed = 1, "seed:"),
             (&|it| it.start_subtask = 1, "start_subtask:"),
