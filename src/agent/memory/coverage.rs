@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn what_was_seen_from_afar_may_be_seen_from_nearer() {
-        let far = Pose::default();
+        let far = Pose { horizon: 30, ..Pose::default() };
         let mut occupancy = Occupancy::default();
         let ahead = (1..16).map(|z| crate::domain::Cell::new(0, z));
         ahead.for_each(|cell| occupancy.look_at(cell, eye::between(cell, far.cell)));

@@ -384,16 +384,16 @@ mod tests {
     #[test]
     fn one_turns_to_what_was_not_looked_at_and_tilts_down_to_what_lies_below_the_frame() {
         let (mind, _) = looked_around(goal(SkillKind::Pickup, "Vase", None));
-        let kinds = |mind: &Mind, known: bool| -> Vec<ActionType> {
-            looks(&mind.memory, &mind.progress, known).iter().map(|it| it.first.kind).collect()
+        let look = |mind: &Mind, kind| {
+            let all = looks(&mind.memory, &mind.progress, false);
+            all.into_iter().find(|it| it.first.kind == kind).map(|it| it.novelty[0].unseen)
         };
-        let fresh = Mind::default();
-        assert!(kinds(&fresh, false).contains(&ActionType::RotateLeft), "nothing is known yet");
-        assert!(!kinds(&mind, false).contains(&ActionType::RotateRight), "it has looked everywhere");
-        assert!(kinds(&mind, false).contains(&ActionType::LookDown));
-        let down =
-            looks(&mind.memory, &mind.progress, false).into_iter().find(|it| it.first.kind == ActionType::LookDown);
-        assert!(down.is_some_and(|it| it.novelty[0].unseen > 0.0), "what is near and low has not been seen");
+        let fresh = look(&Mind::default(), ActionType::RotateRight);
+        assert!(fresh.is_some_and(|unseen| unseen > 0.8), "nothing is known yet: {fresh:?}");
+        let known = look(&mind, ActionType::RotateRight);
+        assert!(known.is_none_or(|unseen| unseen < 0.3), "it has looked there: {known:?}");
+        let below = look(&mind, ActionType::LookDown);
+        assert!(below.is_some_and(|unseen| unseen > 0.0), "what is near and low has not been seen: {below:?}");
     }
 
     #[test]
