@@ -132,7 +132,7 @@ fn a_small_screen_shows_everything_a_smaller_one_the_frame_and_a_tiny_one_waits(
     session.miss("Mind");
     session.see("Instruction >");
     session.resize(20, 5);
-    session.see("too small");
+    session.see("This terminal is too");
     session.press(" n");
     session.resize(80, 23);
     session.see("paused");

@@ -5,7 +5,7 @@ use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use ratatui::layout::Size;
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
+use signal_hook::consts::{SIGABRT, SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
 
 use super::terminal;
 use super::update::Msg;
@@ -16,8 +16,8 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 /// Tells of signals. One that ends the program asks the screen to end; when it does not in time, the terminal is given back here
 /// and the program ends.
 pub(crate) fn watch(tell: SyncSender<Msg>) -> io::Result<()> {
-    let mut signals =
-        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGCONT, SIGWINCH])?;
+    let asked = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGABRT, SIGTSTP, SIGCONT, SIGWINCH];
+    let mut signals = signal_hook::iterator::Signals::new(asked)?;
     let insist = move |msg: &Msg| {
         let asked = Instant::now();
         while tell.try_send(msg.clone()).is_err() && asked.elapsed() < PATIENCE {

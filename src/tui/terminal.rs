@@ -5,15 +5,13 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
 use crossterm::terminal::{
     EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use crossterm::{cursor, execute};
-use rustix::termios::{OptionalActions, Termios};
-use signal_hook::consts::SIGABRT;
 
 /// Whether the terminal is ours; whoever gives it back first does so for all.
 static OWNED: AtomicBool = AtomicBool::new(false);
@@ -27,8 +25,6 @@ static STDERR: Mutex<Option<OwnedFd>> = Mutex::new(None);
 static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 /// Where error messages go meanwhile.
 static LOG: Mutex<Option<OwnedFd>> = Mutex::new(None);
-/// How the terminal treated keys before.
-static MODES: OnceLock<Termios> = OnceLock::new();
 
 /// Owns the terminal until it is dropped.
 pub(crate) struct Guard(());
@@ -39,13 +35,9 @@ impl Guard {
     /// # Errors
     /// When standard output is no terminal.
     pub(crate) fn take(log: Option<&File>) -> io::Result<Guard> {
-        if let Ok(modes) = rustix::termios::tcgetattr(io::stdin()) {
-            let _ = MODES.set(modes);
-        }
         if let Some(log) = log {
             *LOG.lock().unwrap_or_else(PoisonError::into_inner) = Some(log.as_fd().try_clone_to_owned()?);
         }
-        restore_on_abort()?;
         let guard = Guard(());
         seize()?;
         Ok(guard)
@@ -86,25 +78,6 @@ pub(crate) fn take_again() -> io::Result<()> {
         io::stdout().flush()?;
     }
     Ok(())
-}
-
-/// What leaves the screen as it was, whatever was asked of the terminal; for the end that leaves no time for more.
-const BARE_FAREWELL: &[u8] = b"\x1b[?1006l\x1b[?1000l\x1b[?2026l\x1b[?2004l\x1b[?1049l\x1b[?25h\r\n";
-
-/// A library that aborts ends the program before any other thread can do something: the signal itself gives the terminal back.
-#[allow(unsafe_code)]
-fn restore_on_abort() -> io::Result<()> {
-    let restore = || {
-        if OWNED.swap(false, Ordering::SeqCst) {
-            let _ = rustix::io::write(rustix::stdio::stdout(), BARE_FAREWELL);
-            if let Some(modes) = MODES.get() {
-                let _ = rustix::termios::tcsetattr(rustix::stdio::stdin(), OptionalActions::Now, modes);
-            }
-        }
-    };
-    // SAFETY: a signal may call what neither locks nor allocates; this swaps an atomic, reads a cell that was filled before, and
-    // makes two system calls.
-    unsafe { signal_hook::low_level::register(SIGABRT, restore) }.map(drop)
 }
 
 impl Drop for Guard {

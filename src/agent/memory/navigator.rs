@@ -30,6 +30,9 @@ const EASY: f32 = 0.9;
 /// What stands within this distance of a target, in metres, belongs to it and does not hide it.
 const AROUND: f32 = 0.6;
 
+/// Things of what class were dealt with from where, in vain.
+pub(crate) type Failed = BTreeSet<(Class, Pose)>;
+
 /// A way to a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Route {
@@ -168,7 +171,7 @@ impl Routes {
 
     /// The cheapest way to a pose from which something can be acted on that fills `cells`, each with its height in metres. What
     /// was tried in vain is in `failed`.
-    pub(crate) fn plan(&self, class: Class, cells: &[(Cell, f32)], failed: &BTreeSet<(Class, Pose)>) -> Option<Route> {
+    pub(crate) fn plan(&self, class: Class, cells: &[(Cell, f32)], failed: &Failed) -> Option<Route> {
         let mut nearest_first = cells.to_vec();
         nearest_first.sort_by(|a, b| {
             eye::between(a.0, self.start.cell).total_cmp(&eye::between(b.0, self.start.cell)).then(a.0.cmp(&b.0))

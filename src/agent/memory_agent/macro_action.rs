@@ -1,13 +1,11 @@
 //! What the agent could set out to do: an interaction with a thing that it remembers, with the way to where that is possible; a
 //! walk to the edge of what it has seen; a turn or a look. Each begins with one of the 12 actions.
 
-use std::collections::BTreeSet;
-
 use super::goal::Goal;
 use super::progress::Progress;
 use crate::agent::memory::Memory;
 use crate::agent::memory::coverage::Novelty;
-use crate::agent::memory::navigator::{Route, Routes};
+use crate::agent::memory::navigator::{Failed, Route, Routes};
 use crate::agent::memory::semantic_map::Thing;
 use crate::domain::{Action, ActionType, Cell, Class, Heading, Pose};
 use crate::house::view::{Candidate, nearest};
@@ -71,9 +69,6 @@ impl MacroAction {
         Some(MacroAction { purpose, thing, steps: route.steps, cost: route.cost, first, at: Some(at), novelty })
     }
 }
-
-/// Things of what class were dealt with from where, in vain.
-pub(crate) type Failed = BTreeSet<(Class, Pose)>;
 
 /// Everything that could be set out to now. `legal` are the interactions that are possible at this moment. Poses from which a
 /// remembered thing cannot be acted on are added to `failed`, and what cannot be acted on from anywhere loses its evidence.

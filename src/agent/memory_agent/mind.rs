@@ -4,9 +4,10 @@
 use super::eyes::Seen;
 use super::features::Choice;
 use super::goal::Goal;
-use super::macro_action::{Failed, MacroAction, available};
+use super::macro_action::{MacroAction, available};
 use super::progress::{Attempt, Progress};
 use crate::agent::loop_guard::digest;
+use crate::agent::memory::navigator::Failed;
 use crate::agent::memory::{Glance, Memory};
 use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::house::view::{Candidate, Frame};

@@ -1,7 +1,7 @@
 //! How far the agent believes to be: the subtask it is at, what it holds, and what it has done for it.
 
 use super::goal::Goal;
-use super::macro_action::Failed;
+use crate::agent::memory::navigator::Failed;
 use crate::domain::{ActionType, Cell, Class, SkillKind};
 
 /// An interaction that changed what is seen.
@@ -66,6 +66,16 @@ impl Progress {
     /// The present goal.
     pub(crate) fn goal(&self) -> Option<&Goal> {
         self.goals.get(self.at)
+    }
+
+    /// Whether the present goal can be reached by now: what is to be put must have been put down, and what is to be picked up
+    /// be in the hand.
+    pub(crate) fn can_be_reached(&self) -> bool {
+        self.goal().is_some_and(|goal| match goal.skill {
+            SkillKind::Pickup => self.held.is_some_and(|held| goal.is_object(held)),
+            SkillKind::Put => self.placed.iter().any(|(placed, _)| goal.is_object(*placed)),
+            _ => true,
+        })
     }
 
     /// Whether the present goal is the last one.
@@ -152,6 +162,25 @@ mod tests {
         assert_eq!((progress.at, progress.done.len(), progress.active.len(), progress.is_last()), (1, 0, 1, true));
         progress.record(Attempt { kind: ActionType::Close, target: Some((fridge, at)) }, true);
         assert!(progress.active.is_empty());
+    }
+
+    #[test]
+    fn another_thing_in_the_fridge_is_not_what_was_to_be_put_there() {
+        let [apple, bread, fridge] = ["Apple", "Bread", "Fridge"].map(|name| Class::named(name).unwrap());
+        let goal = |skill, receptacle| {
+            vec![Goal { skill, object: bread, others: Vec::new(), receptacle, place: None, slice: false }]
+        };
+        let mut progress = Progress { held: Some(apple), ..Progress::default() };
+        progress.set_goals(goal(SkillKind::Put, Some(fridge)));
+        let mut act = |kind, class| {
+            progress.record(Attempt { kind, target: Some((class, Cell::new(1, 2))) }, true);
+            progress.can_be_reached()
+        };
+        assert!(!act(ActionType::Put, fridge), "that was the apple");
+        assert!(!act(ActionType::Pickup, bread));
+        assert!(act(ActionType::Put, fridge));
+        progress.set_goals(goal(SkillKind::Pickup, None));
+        assert!(!progress.can_be_reached());
     }
 
     #[test]

@@ -124,14 +124,13 @@ impl Recollection {
         loop {
             let (actions, choice) = self.mind.choice(legal);
             let (log_probabilities, done) = tch::no_grad(|| chooser.forward(&alone(&choice, chooser.device())));
-            let done = done.sigmoid().double_value(&[0]) as f32;
             let progress = &mut self.mind.progress;
+            let done = if progress.can_be_reached() { done.sigmoid().double_value(&[0]) as f32 } else { 0.0 };
             if done >= REACHED && !progress.is_last() {
                 progress.advance();
                 continue;
             }
             let probabilities = Vec::<f32>::try_from(log_probabilities.exp().squeeze_dim(0).to_device(Device::Cpu))?;
-            let done = if progress.goals.is_empty() { 0.0 } else { done };
             return Ok((actions, done, probabilities));
         }
     }

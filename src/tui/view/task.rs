@@ -49,7 +49,7 @@ impl Widget for TaskPanel<'_> {
         let beside = now.task_beside.map_or(String::new(), |(done, of)| format!(", task {done}/{of}"));
         let both = format!("{right}{beside}");
         // Where there is no room for both, the wish in force comes first.
-        let right = if both.width() + title.len() + 2 <= width { both } else { right };
+        let right = if both.width() + title.len() + 4 <= width { both } else { right };
         let inner = panel(buf, area, title, &right);
         let mut lines: Vec<(String, Style)> = Vec::new();
         let advice = wish.and_then(|wish| wish.advice.as_deref()).map(with_keys);
