@@ -46,7 +46,7 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             assert_eq!(read(&path).unwrap(), text);
         }
-        for (bytes, told) in [(&b"\xFF\xFEa\0"[..], "UTF-16"), (b"\xFE\xFF\0a", "UTF-16"), (b"caf\xE9", "UTF-8")] {
+        for (bytes, told) in [(&b"\xFF\xFEa\0"[..], "UTF-16"), (b"\xFE\xFF\0a", "UTF-16"), (b"th\xE9", "UTF-8")] {
             std::fs::write(&path, bytes).unwrap();
             assert!(read(&path).unwrap_err().to_string().contains(told));
         }

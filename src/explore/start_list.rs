@@ -289,7 +289,7 @@ mod tests {
         entries.push(StartEntry::of(Start::FloorPlan("FloorPlan12".into()), "FloorPlan12", "in data"));
         let best = |typed: &str| lines(&matching(&entries, typed)).first().cloned().unwrap_or_default();
         assert_eq!(best("bdr"), "house bedroom seed 0");
-        assert_eq!(best("livng 12"), "house living room seed 12");
+        assert_eq!(best("lvroom 12"), "house living room seed 12");
         assert_eq!(best("eval #3"), "tasks eval_100 task 3");
         assert_eq!(best("eval_100"), "tasks eval_100 task 1");
         assert_eq!(best("FloorPlan12"), "floor plan FloorPlan12 ");
