@@ -194,7 +194,7 @@ fn what_is_not_saved_is_asked_about_before_it_is_left() {
     assert_eq!(update(&mut app, Msg::Key(interrupt)), quit);
     assert_eq!(update(&mut app, Msg::Signal(15)), [Effect::Quit(ExitReason::Signal(15))], "a signal is not asked");
     on_action(&mut app, Verb::Cancel);
-    update(&mut app, Msg::Resize(ratatui::layout::Size { width: 40, height: 10 }));
+    update(&mut app, Msg::Resize(ratatui::layout::Size { width: 20, height: 6 }));
     assert_eq!(key(&mut app, KeyCode::Char('q')), quit, "nobody could read the question");
 }
 
