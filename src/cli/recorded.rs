@@ -9,6 +9,7 @@ use crate::agent::registry::{Policies, PolicyKind};
 use crate::episode::record::Author;
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
+use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::reader::RecordedRun;
 
 /// One of a run's episodes, as the command line names it.
@@ -68,7 +69,7 @@ pub(super) fn recorded(
     let first = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
     let acts = first.cloned().unwrap_or_else(|| author.clone());
     let kind = kind_of(&acts);
-    let explored = recorded.manifest.policy == "explored";
+    let explored = recorded.manifest.policy == RunManifest::EXPLORED;
     let open = move || -> anyhow::Result<Exploration> {
         let scenes = recorded.scenes;
         let start = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use super::earlier::check_earlier;
 use super::options::Options;
 use super::plan::EvaluationPlan;
 use super::worker_pool;
@@ -19,9 +20,7 @@ use crate::house::grading::Grading;
 use crate::language::instruction;
 use crate::report::summary::RunSummary;
 use crate::report::summary_files;
-use crate::run_dir::belonging::Belonging;
-use crate::run_dir::episode_spec::{EpisodeSpec, own_specs, policy_seed};
-use crate::run_dir::layout::EPISODES;
+use crate::run_dir::episode_spec::{EpisodeSpec, own_specs};
 use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::writer::RunWriter;
 
@@ -111,45 +110,6 @@ impl Evaluation {
     /// Every episode of the run, or of its share, in order.
     pub(crate) fn all(&self) -> Vec<EpisodeSpec> {
         own_specs(&self.manifest, &self.plan.tasks)
-    }
-
-    /// Checks that each episode that a folder holds already is one of this run.
-    ///
-    /// # Errors
-    /// Names the first that is not, and why.
-    fn check_earlier(&self, folder: &RunWriter) -> anyhow::Result<()> {
-        let EvaluationPlan { tasks, scenes, options, .. } = &self.plan;
-        let belonging = Belonging::new(&self.manifest, tasks);
-        let places: BTreeMap<&str, usize> = (0..).zip(tasks.iter()).map(|(at, task)| (task.id.as_str(), at)).collect();
-        let mut starts: BTreeMap<usize, String> = BTreeMap::new();
-        for episode in &folder.earlier {
-            let mut misfit = belonging.check(episode).err();
-            if let (None, Some(&at)) = (&misfit, places.get(episode.task.as_str())) {
-                let (variant, chance) = (episode.variant, policy_seed(at, episode.seed));
-                let told = instruction_variant::instruction_for(tasks, at, variant, options.step_by_step, chance);
-                let start = match starts.get(&at) {
-                    Some(start) => start.clone(),
-                    None => starts.entry(at).or_insert(scenes.setting(&tasks[at])?.world.digest()).clone(),
-                };
-                // An episode that could not be begun has no start.
-                let begun = !episode.start_hash.is_empty();
-                misfit = match () {
-                    () if episode.instruction != told => Some("instruction: not what the run tells"),
-                    () if begun && episode.start_hash != start => Some("start_hash: not the task's start"),
-                    () => None,
-                }
-                .map(|field| format!("{}: {field}", episode.key()));
-            }
-            if let Some(misfit) = misfit {
-                let file = folder.path().join(EPISODES);
-                anyhow::bail!(
-                    "{}: {misfit}; the line is not of this run: delete it, and its episode is played anew, or choose \
-                     another folder with --out",
-                    file.display()
-                );
-            }
-        }
-        Ok(())
     }
 
     /// What tells an episode apart from the others.
@@ -245,7 +205,7 @@ pub fn evaluate(
     progress: &mut dyn FnMut(EvaluationProgress),
 ) -> anyhow::Result<RunSummary> {
     let all = evaluation.all();
-    evaluation.check_earlier(folder)?;
+    check_earlier(&evaluation.plan, &evaluation.manifest, folder)?;
     let mut episodes: BTreeMap<EpisodeKey, Episode> =
         std::mem::take(&mut folder.earlier).into_iter().map(|episode| (episode.key(), episode)).collect();
     let mut wanted = Vec::new();
@@ -360,7 +320,7 @@ pub(crate) mod tests {
         }
     }
 
-    fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Policy>> {
+    pub(crate) fn walker(fails: bool, panics: bool) -> anyhow::Result<Box<dyn Policy>> {
         Ok(Box::new(Walker::new(fails, panics)))
     }
 
@@ -451,39 +411,6 @@ pub(crate) mod tests {
             assert!(error.contains(part), "{part} in {error}");
         }
     }
-
-    /// What is changed of a good record.
-    type Change<'a> = &'a dyn Fn(&mut Episode);
-
-    #[test]
-    fn a_run_goes_on_only_with_records_that_are_its_own() {
-        let folder = tempfile::tempdir().unwrap();
-        let again = || run(folder.path(), options(), || walker(false, false), usize::MAX);
-        let whole = again().unwrap().lines;
-        let file = folder.path().join("episodes.jsonl");
-        let first: Episode = serde_json::from_str(whole.lines().next().unwrap()).unwrap();
-        let faults: [(Change<'_>, &str); 7] = [
-            (&|it| it.task = "nobody".into(), "no task \"nobody\""),
-            (&|it| it.seed = 4, "seed"),
-            (&|it| it.steps = u32::MAX, "steps: 4294967295"),
-            (&|it| it.completed = 99, "completed: 99"),
-            (&|it| it.success = !it.success, "success"),
-            (&|it| it.start_hash = "00".into(), "start_hash"),
-            (&|it| it.instruction = "Dance.".into(), "instruction"),
-        ];
-        for (change, told) in faults {
-            let mut changed = first.clone();
-            change(&mut changed);
-            let lines = whole.replacen(whole.lines().next().unwrap(), &serde_json::to_string(&changed).unwrap(), 1);
-            std::fs::write(&file, &lines).unwrap();
-            let error = again().err().unwrap().to_string();
-            assert!(error.contains("episodes.jsonl") && error.contains(told), "{told}: {error}");
-            assert_eq!(std::fs::read_to_string(&file).unwrap(), lines, "nothing is written");
-        }
-        std::fs::write(&file, &whole).unwrap();
-        assert_eq!(again().unwrap().lines, whole);
-    }
-
     #[test]
     fn errors_and_panics_end_their_episode_and_stay_in_the_count() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,6 @@
 //! Evaluation: task sets, workers that play them, verification and replay.
 
+mod earlier;
 pub mod evaluation;
 pub mod executor;
 pub(crate) mod in_flight;

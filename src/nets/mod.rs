@@ -23,6 +23,7 @@ pub(crate) mod value;
 pub(crate) mod visual;
 pub mod visual_encoder;
 pub mod weights;
+mod weights_error;
 
 mod bert;
 mod bounds;

@@ -4,6 +4,7 @@
 //! worker thread owns house and policy; a second one encodes pictures. [`view`] draws the state and nothing else.
 
 pub mod app;
+mod capabilities;
 mod completion;
 pub mod config;
 pub(crate) mod editor;

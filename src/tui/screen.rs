@@ -12,12 +12,12 @@ use crossterm::queue;
 use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
 use ratatui::backend::{Backend, ClearType, CrosstermBackend};
-use termprofile::TermProfile;
 
-use super::app::{App, Graphics};
+use super::app::App;
+use super::capabilities::{ability, first_answer, graphics};
 use super::config::ExplorerConfig;
 use super::graphics::encoder::PictureEncoder;
-use super::graphics::{Protocol, detect, inline};
+use super::graphics::{Protocol, inline};
 use super::history;
 use super::keyboard::Keyboard;
 use super::opening::{Open, Opening, Picked, StartStyle, pick};
@@ -25,7 +25,6 @@ use super::pacing::{self, Pacer};
 use super::signals::{self, PATIENCE};
 use super::start_page::StartPage;
 use super::terminal::{self, Counted};
-use super::theme::Ability;
 use super::update::{Effect, ExitReason, Msg, update};
 use super::worker;
 use crate::agent::registry::PolicyKind;
@@ -369,64 +368,6 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
 /// When the terminal cannot be written.
 pub(crate) fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::Error> {
     display.draw(|frame| frame.render_widget(app, frame.area())).map(drop)
-}
-
-/// What the terminal can show, from the environment.
-fn ability() -> Ability {
-    let colours = TermProfile::detect(&io::stdout(), termprofile::DetectorSettings::new());
-    let variable = |name: &str| std::env::var(name).ok();
-    // tmux brings colours down to what its terminal has by itself; whoever says that there are all of them is believed.
-    let all = matches!(variable("COLORTERM").as_deref(), Some("truecolor" | "24bit"));
-    let in_tmux = variable("TERM_PROGRAM").as_deref() == Some("tmux");
-    let colours = if all && in_tmux && colours >= TermProfile::Ansi256 { TermProfile::TrueColor } else { colours };
-    Ability { colours, unicode: detect::shows_unicode(variable) }
-}
-
-/// Whether the terminal is at the other end of a link.
-fn is_remote() -> bool {
-    std::env::var_os("SSH_CONNECTION").is_some()
-}
-
-/// How long the first answer of a terminal is waited for: most answer at once, and a link takes its time.
-fn first_answer() -> Duration {
-    if is_remote() { Duration::from_secs(3) } else { Duration::from_millis(300) }
-}
-
-/// Asks the terminal whether it shows sixels. An answer that comes later does no harm: it is no key.
-fn has_sixel(keyboard: &mut Keyboard, patience: Duration) -> io::Result<bool> {
-    let mut out = io::stdout();
-    out.write_all(detect::QUESTION)?;
-    out.flush()?;
-    Ok(keyboard.attributes(patience)?.is_some_and(|numbers| numbers.contains(&detect::SIXEL)))
-}
-
-/// How to show pictures: as asked, or as the environment and the terminal's own answer suggest.
-fn graphics(asked: Option<Protocol>, ability: Ability, memory: Option<&Path>, keyboard: &mut Keyboard) -> Graphics {
-    let cell_pixels = match crossterm::terminal::window_size() {
-        Ok(window) if window.width > 0 && window.height > 0 => {
-            ((window.width / window.columns.max(1)).max(1), (window.height / window.rows.max(1)).max(1))
-        }
-        _ => (10, 20),
-    };
-    let (protocol, reason) = match asked {
-        Some(protocol) => (protocol, "asked for".to_string()),
-        None => {
-            let (protocol, reason) = detect::guess(|name| std::env::var(name).ok());
-            let patience = Duration::from_millis(if is_remote() { 700 } else { 250 });
-            let ask = || has_sixel(keyboard, patience).unwrap_or(false);
-            let name =
-                ["TERM", "TERM_PROGRAM", "COLORTERM"].map(|name| std::env::var(name).unwrap_or_default()).join("/");
-            if reason == detect::UNKNOWN && detect::remembered(memory, &name, ask) {
-                (Protocol::Sixel, "the terminal says that it has sixels".into())
-            } else if protocol == Protocol::HalfBlocks && !ability.shades() {
-                (Protocol::Ascii, "the terminal has few colours".into())
-            } else {
-                (protocol, reason)
-            }
-        }
-    };
-    let in_tmux = std::env::var_os("TMUX").is_some();
-    Graphics { protocol, reason, cell_pixels, in_tmux }
 }
 
 #[cfg(test)]

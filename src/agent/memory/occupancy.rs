@@ -86,10 +86,7 @@ impl Occupancy {
                 let depth = frame.depth[row * frame.width + column];
                 let (x, y) = ((column as f32 + 0.5) * scale, (row as f32 + 0.5) * scale);
                 if depth < self.clearance.farthest && !eye::is_in_hand(x, y, depth) {
-                    let point = camera.unproject(x, y, depth);
-                    let glimpses = seen.entry(eye::cell_under(point)).or_default();
-                    glimpses.nearness = glimpses.nearness.max(1.0 / depth);
-                    self.vote(point, &mut seen);
+                    self.vote(camera.unproject(x, y, depth), depth, &mut seen);
                 }
             }
         }
@@ -108,9 +105,10 @@ impl Occupancy {
         self.cells.entry(pose.cell).or_default().visited = true;
     }
 
-    fn vote(&self, point: Vec3, seen: &mut BTreeMap<Cell, Glimpses>) {
+    fn vote(&self, point: Vec3, depth: f32, seen: &mut BTreeMap<Cell, Glimpses>) {
         let Clearance { floor, body: [low, high], radius, round, .. } = self.clearance;
         let own = seen.entry(eye::cell_under(point)).or_default();
+        own.nearness = own.nearness.max(1.0 / depth);
         if point.y <= self.clearance.body[1] {
             own.top = own.top.max(point.y);
         }

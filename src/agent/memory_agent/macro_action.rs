@@ -1,5 +1,6 @@
 //! What the agent could set out to do: an interaction with a thing that it remembers, with the way to where that is possible; a
-//! walk to the edge of what it has seen; a turn or a look. Each begins with one of the 12 actions.
+//! look from near at what may hold the thing that it is after; a walk to the edge of what it has seen; a turn or a look. Each
+//! begins with one of the 12 actions.
 
 use super::goal::Goal;
 use super::progress::Progress;
@@ -19,7 +20,7 @@ const ENDS: usize = 8;
 /// Ways to the edge of what was seen, and how far their ends lie apart at least, in cells.
 const EXPLORATIONS: usize = 2;
 const APART: u16 = 4;
-/// So many things are searched for the object at most, and each from so many poses.
+/// So many things are offered to be searched at one step, and those of a class are looked at from so many poses.
 const SEARCHED: usize = 6;
 const GLANCES: usize = 3;
 /// How far the camera is tilted down, in degrees, by who walks.

@@ -168,6 +168,7 @@ fn picture(frame: &Frame, bounds: Option<[f32; 4]>, file: &Path) -> anyhow::Resu
 mod tests {
     use super::*;
     use crate::house::testing::{kitchen, named};
+    use crate::house::view::code;
 
     #[test]
     fn what_keeps_a_target_from_being_acted_on_is_told() {
@@ -190,6 +191,19 @@ mod tests {
             }
         }
         assert!(causes.contains(&Cause::TooFar) && causes.contains(&Cause::OutOfFrame), "{causes:?}");
+    }
+
+    #[test]
+    fn what_is_in_front_is_what_most_pixels_show_and_the_target_where_any_does() {
+        let (mug, fridge) = (Instance::Object(0), Instance::Fixture(3));
+        let ids = |codes: [u16; 4]| codes.into_iter().flat_map(|code| [code; 4]).collect::<Vec<u16>>();
+        let front = |codes: [u16; 4]| {
+            let frame = Frame { width: 4, height: 4, rgb: vec![0; 48], depth: vec![1.0; 16], ids: ids(codes) };
+            in_front(&frame, [0.0, 0.0, 299.0, 299.0], mug)
+        };
+        assert_eq!(front([0, code(fridge), code(fridge), 0x8001]), Some(fridge));
+        assert_eq!(front([0, 0, 0, code(fridge)]), None, "a wall");
+        assert_eq!(front([code(mug), code(fridge), code(fridge), 0]), Some(mug), "too few of its pixels");
     }
 
     #[test]

@@ -1,14 +1,13 @@
 //! The session is kept in a file at every step, and taken up again from there.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use super::Exploration;
 use super::state::{Autosave, Progress, Unsaved};
 use crate::agent::registry::Policies;
 use crate::domain::task::SceneRef;
 use crate::episode::record::{Author, Episode};
-use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource, EpisodeStart};
+use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::kept_session::KeptSession;
 
 /// States up to which a run writes the file at every step; it is written less often in larger trees.
@@ -122,18 +121,7 @@ impl Exploration {
     }
 
     fn take_branch_again(&mut self, episode: &Episode) -> anyhow::Result<()> {
-        self.seek(0);
-        let start = EpisodeStart {
-            scene: self.rollout.env.house.scene().clone(),
-            world: self.rollout.env.house.world().clone(),
-            task: self.episode.task.clone(),
-            reference: self.episode.reference.clone(),
-            limited: self.episode.limited,
-        };
-        let fresh = start.rollout();
-        self.rollout.env.grader = fresh.env.grader;
-        self.rollout.horizon = fresh.horizon;
-        self.wishes = vec![Arc::new(self.first_wish())];
+        self.back_to_task();
         let author = Author { policy: String::new(), checkpoint: None, seed: 0, sampling: false };
         self.retrace(episode, &author, false)?;
         // It has that name already where it is the first, or was numbered alike.

@@ -148,6 +148,14 @@ impl Exploration {
     /// Back to the start, with the present instruction. What was tried stays.
     pub(crate) fn reset(&mut self) {
         let instruction = self.rollout.instruction.clone();
+        self.back_to_task();
+        // The text was checked when it came in.
+        let _ = self.instruct(&instruction);
+        self.make_start();
+    }
+
+    /// At the start, graded by the task alone, as if nothing had been told.
+    pub(super) fn back_to_task(&mut self) {
         self.seek(0);
         let start = EpisodeStart {
             scene: self.rollout.env.house.scene().clone(),
@@ -161,9 +169,6 @@ impl Exploration {
         self.rollout.horizon = fresh.horizon;
         self.wishes = vec![Arc::new(self.first_wish())];
         self.task_aside = None;
-        // The text was checked when it came in.
-        let _ = self.instruct(&instruction);
-        self.make_start();
     }
 
     /// Takes the steps of a recorded episode again, and stays at its end. The policy looks at every state where `thinks`;

@@ -94,3 +94,52 @@ fn foot(page: &StartPage, width: u16) -> Vec<(String, Style)> {
     lines.push((if width < keys.width() { short } else { keys }.into(), THEME.quiet));
     lines
 }
+
+#[cfg(test)]
+mod tests {
+    use crossterm::event::KeyCode;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+    use termprofile::TermProfile;
+
+    use super::*;
+    use crate::tui::start_page;
+    use crate::tui::view::tests::check;
+
+    /// The start page as text.
+    fn start_screen(page: &StartPage, width: u16, height: u16, ability: Ability) -> String {
+        let area = Rect::new(0, 0, width, height);
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        let view = || StartView { page, scheme: Scheme::default(), ability };
+        terminal.draw(|frame| frame.render_widget(view(), area)).unwrap();
+        terminal.backend().to_string()
+    }
+
+    #[test]
+    fn the_start_page_lists_what_there_is_and_searches_it() {
+        for (width, height) in [(80, 24), (60, 20)] {
+            let mut page = start_page::tests::page();
+            check(&format!("start-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
+            start_page::tests::type_text(&mut page, "bed 7");
+            check(&format!("start-search-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
+            start_page::tests::type_text(&mut page, "zzz");
+            assert!(start_screen(&page, width, height, Ability::FULL).contains("nothing fits"));
+        }
+    }
+
+    #[test]
+    fn the_start_page_says_what_is_opened_and_what_could_not_be() {
+        let mut page = start_page::tests::page();
+        (0..4).for_each(|_| drop(page.on_key(KeyCode::Tab.into())));
+        page.on_key(KeyCode::Enter.into());
+        assert!(start_screen(&page, 60, 20, Ability::FULL).contains("opening alfred ..."));
+        page.fail(
+            "checkpoints/alfred holds no checkpoint: config.json is missing in it, and so is model.safetensors".into(),
+        );
+        let bare = Ability { colours: TermProfile::NoColor, unicode: false };
+        check("start-failed-60x20", &start_screen(&page, 60, 20, bare));
+        for (width, height) in [(1, 1), (29, 20), (30, 8), (60, 9), (200, 60)] {
+            start_screen(&page, width, height, bare);
+        }
+    }
+}

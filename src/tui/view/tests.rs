@@ -3,36 +3,29 @@
 use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
-use ratatui::Terminal;
-use ratatui::backend::TestBackend;
-use ratatui::layout::Rect;
 use termprofile::TermProfile;
 
 use super::panel::{bar, fit, share, wrap};
-use super::start::StartView;
-use crate::agent::registry::{PolicyIdentity, PolicyKind};
-use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
+use crate::agent::registry::PolicyKind;
 use crate::analysis::value_map::{CellValue, Measure, ValueMap};
-use crate::domain::{Action, ActionType, World};
-use crate::explore::chain_report::ChainReport;
+use crate::domain::{Action, ActionType};
 use crate::explore::exploration::{Exploration, StepTaken};
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::graphics::Protocol;
 use crate::tui::keys::{Mode, bindings};
-use crate::tui::start_page::{self, StartPage};
-use crate::tui::testing::{app, decided, exploration, screen, snapshot, values};
-use crate::tui::theme::{Ability, Scheme};
+use crate::tui::testing::{app, chained, decided, exploration, screen, snapshot, values};
+use crate::tui::theme::Ability;
 use crate::tui::update::{Effect, ExitReason, Msg, on_action, update};
 
 /// The smallest screen, and a large one.
-const SIZES: [(u16, u16); 2] = [(80, 24), (120, 36)];
+pub(super) const SIZES: [(u16, u16); 2] = [(80, 24), (120, 36)];
 /// Every page but the main one.
 const PAGES: [ExplorerPage; 5] =
     [ExplorerPage::Branches, ExplorerPage::Mind, ExplorerPage::World, ExplorerPage::Compare, ExplorerPage::Chain];
 
-fn check(name: &str, text: &str) {
+pub(super) fn check(name: &str, text: &str) {
     insta::with_settings!({ snapshot_path => "../snapshots", prepend_module_to_snapshot => false }, {
         insta::assert_snapshot!(name, text);
     });
@@ -110,43 +103,6 @@ fn a_wish_is_shown_from_how_it_is_understood_to_what_came_of_it() {
     let mut app = shown("refused", &mut exploration);
     on_action(&mut app, Verb::Show(ExplorerPage::Branches));
     check("wish-list-80x24", &screen(&mut app));
-}
-
-/// The start page as text.
-fn start_screen(page: &StartPage, width: u16, height: u16, ability: Ability) -> String {
-    let area = Rect::new(0, 0, width, height);
-    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-    let view = || StartView { page, scheme: Scheme::default(), ability };
-    terminal.draw(|frame| frame.render_widget(view(), area)).unwrap();
-    terminal.backend().to_string()
-}
-
-#[test]
-fn the_start_page_lists_what_there_is_and_searches_it() {
-    for (width, height) in [(80, 24), (60, 20)] {
-        let mut page = start_page::tests::page();
-        check(&format!("start-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
-        start_page::tests::type_text(&mut page, "bed 7");
-        check(&format!("start-search-{width}x{height}"), &start_screen(&page, width, height, Ability::FULL));
-        start_page::tests::type_text(&mut page, "zzz");
-        assert!(start_screen(&page, width, height, Ability::FULL).contains("nothing fits"));
-    }
-}
-
-#[test]
-fn the_start_page_says_what_is_opened_and_what_could_not_be() {
-    let mut page = start_page::tests::page();
-    (0..4).for_each(|_| drop(page.on_key(KeyCode::Tab.into())));
-    page.on_key(KeyCode::Enter.into());
-    assert!(start_screen(&page, 60, 20, Ability::FULL).contains("opening alfred ..."));
-    page.fail(
-        "checkpoints/alfred holds no checkpoint: config.json is missing in it, and so is model.safetensors".into(),
-    );
-    let bare = Ability { colours: TermProfile::NoColor, unicode: false };
-    check("start-failed-60x20", &start_screen(&page, 60, 20, bare));
-    for (width, height) in [(1, 1), (29, 20), (30, 8), (60, 9), (200, 60)] {
-        start_screen(&page, width, height, bare);
-    }
 }
 
 #[test]
@@ -315,7 +271,7 @@ fn without_colour_and_unicode_letters_say_it_all() {
 }
 
 /// An app whose state is that of an exploration with a fork: main has three steps, b1 leaves it after the first.
-fn forked(width: u16, height: u16) -> (App, Exploration) {
+pub(super) fn forked(width: u16, height: u16) -> (App, Exploration) {
     let mut app = app(width, height, Protocol::HalfBlocks, Ability::FULL);
     let mut exploration = exploration();
     let turn = |kind| Action::navigate(kind);
@@ -398,53 +354,6 @@ fn two_instructions_are_compared_and_swapped() {
     }
 }
 
-/// A chain of three links by a policy: the second link is done or not, the link values are V or not.
-fn chained(name: &str, second: bool, by_value: bool) -> ChainReport {
-    let outcome = |reached: bool, done: bool, steps, worth: Option<f32>| LinkOutcome {
-        taken: Vec::new(),
-        failure: None,
-        reached,
-        done: Some(done),
-        steps,
-        entry: World::default(),
-        exit: World::default(),
-        handover: worth.filter(|_| by_value).map(|worth| Handover { worth, next: worth - 0.1, joined: 0.3 }),
-    };
-    let play = |second: bool| ChainRun {
-        outcomes: vec![
-            outcome(true, true, 9, Some(0.62)),
-            outcome(true, second, 14, Some(-0.07)),
-            outcome(second, false, 0, None),
-        ],
-        link_values: (0..23).map(|step| vec![1.0 - step as f32 / 23.0, step as f32 / 23.0, 0.1]).collect(),
-        by_value,
-        in_force: (0..23).map(|step| usize::from(step >= 9)).collect(),
-    };
-    ChainReport {
-        who: PolicyIdentity { name: name.into(), checkpoint: Some(name.into()) },
-        links: vec!["Pick up the knife.".into(), "Slice the tomato.".into(), "Put a slice in the fridge.".into()],
-        start: "a kitchen".into(),
-        graded: true,
-        by_link: Some(play(second)),
-        as_one: Some(play(true)),
-        trials: None,
-    }
-}
-
-#[test]
-fn a_chain_shows_each_link_and_which_one_breaks() {
-    let rate = |done| LinkRate { done, of: 8 };
-    let trials =
-        LinkSuccess { expert: vec![rate(8), rate(6), rate(7)], own: vec![rate(8), rate(1), LinkRate::default()] };
-    let chained = ChainReport { trials: Some(trials), ..chained("first", false, false) };
-    for (width, height) in SIZES {
-        let (mut app, _) = forked(width, height);
-        on_action(&mut app, Verb::Show(ExplorerPage::Chain));
-        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(chained.clone()))));
-        check(&format!("chain-{width}x{height}"), &screen(&mut app));
-    }
-}
-
 #[test]
 fn a_critic_shows_values_targets_and_advantages() {
     for (width, height) in SIZES {
@@ -472,25 +381,6 @@ fn a_critic_shows_values_targets_and_advantages() {
         contrast.sides[0].values = Some(values(&now));
         update(&mut app, Msg::Session(SessionEvent::Compared(Box::new(contrast))));
         check(&format!("critic-compare-{width}x{height}"), &screen(&mut app));
-    }
-}
-
-#[test]
-fn two_policies_follow_the_same_chain_side_by_side() {
-    for (width, height) in [(80, 24), (120, 36), (200, 60)] {
-        let (mut app, _) = forked(width, height);
-        on_action(&mut app, Verb::Show(ExplorerPage::Chain));
-        for report in [chained("sprint", true, true), chained("first", false, false)] {
-            update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(report))));
-        }
-        check(&format!("chains-{width}x{height}"), &screen(&mut app));
-        let again = ChainReport { trials: Some(LinkSuccess::default()), ..chained("first", false, false) };
-        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(again))));
-        assert_eq!(app.chain.own.as_ref().unwrap().who.name, "sprint", "each stays on its side");
-        assert!(app.chain.rival.as_ref().unwrap().trials.is_some());
-        let elsewhere = ChainReport { start: "another kitchen".into(), ..chained("sprint", true, true) };
-        update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(elsewhere))));
-        assert!(app.chain.rival.is_none(), "another start is another chain");
     }
 }
 

@@ -4,6 +4,8 @@
 mod link_values;
 mod link;
 mod links;
+#[cfg(test)]
+mod page_tests;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
