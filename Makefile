@@ -1,6 +1,6 @@
 # `make explore` and `make test` do everything on a fresh machine; `make help` lists the rest.
 .DEFAULT_GOAL := help
-.PHONY: explore test setup build fmt lint lint-tools typos cargo-machete cargo-deny bench help
+.PHONY: explore test test-python setup build fmt lint lint-tools typos cargo-machete cargo-deny bench help
 
 TOOLS := $(CURDIR)/target/tools
 export PATH := $(TOOLS)/bin:$(PATH)
@@ -17,6 +17,16 @@ explore: build ## set up, build, and start the explorer (ARGS="--seed 7" passes 
 test: setup ## set up, and run all tests
 	python3 -B -m unittest -q tests/setup_test.py
 	OMP_NUM_THREADS=1 cargo test --release --locked
+
+# Its packages are not needed by `make test`.
+PYTHON_TESTS := target/python
+test-python: $(PYTHON_TESTS)/installed ## install environments in Python, and test sprint_env with them
+	cd assets/python && $(CURDIR)/$(PYTHON_TESTS)/bin/python -B -m unittest -q
+
+$(PYTHON_TESTS)/installed: assets/python/tests/requirements.txt
+	python3 -m venv $(PYTHON_TESTS)
+	$(PYTHON_TESTS)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	touch $@
 
 setup: ## find or fetch libtorch and the sentence encoder
 	@command -v python3 >/dev/null || { echo "set-up failed: python3 is missing; run \`apt install python3 python3-pip\`" >&2; exit 1; }
