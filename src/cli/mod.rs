@@ -18,6 +18,7 @@ mod exit_status;
 mod export;
 mod import;
 mod jobs;
+mod language_model;
 mod logging;
 mod plot;
 mod merge;

@@ -5,12 +5,15 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::exit_status::ExitStatus;
+use super::language_model::LanguageModelArgs;
 use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use crate::language::count::counted;
 use crate::language::passage::{Concatenation, Summarizer};
 use crate::language::rules::Rules;
+use crate::nets::device::best_device;
+use crate::train::opt_summarizer::OptSummarizer;
 use crate::train::relabel::relabel;
 
 /// Labels runs of skills.
@@ -21,6 +24,11 @@ pub(crate) struct Relabel {
     /// Who writes the labels
     #[arg(long)]
     with: With,
+    #[command(flatten)]
+    language_model: LanguageModelArgs,
+    /// Label only so many passages, chosen by chance; a larger sample holds a smaller one
+    #[arg(long, value_name = "N")]
+    sample: Option<usize>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -29,34 +37,51 @@ enum With {
     Rules,
     /// The annotator's sentences one after the other
     Concat,
+    /// An OPT model in this process
+    Opt,
 }
 
 impl Relabel {
     /// Writes the labels that are missing in the dataset's labels.jsonl.
     ///
     /// # Errors
-    /// When the dataset cannot be read or its folder not be written to.
+    /// When the dataset cannot be read, its folder not be written to, or the model not be asked.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let summarizer: &dyn Summarizer = match self.with {
-            With::Rules => &Rules,
-            With::Concat => &Concatenation,
-        };
         let stop = stop::on_signals()?;
+        let summarizer = self.summarizer()?;
         let mut progress = Progress::new();
-        let found = relabel(&self.data, summarizer, &mut progress, &stop)?;
+        let found = relabel(&self.data, summarizer.as_ref(), self.sample, &mut progress, &stop)?;
         progress.end();
+        let malformed = match found.malformed {
+            0 => String::new(),
+            count => format!(", {} without a summary", counted(count, "answer")),
+        };
         if found.stopped {
-            say("stopped; the same command goes on from here");
+            say(&format!(
+                "stopped after {}{malformed}; the same command goes on from here",
+                counted(found.asked, "text")
+            ));
             return Ok(ExitStatus::Interrupted);
         }
         let (source, version) = (summarizer.source(), summarizer.version());
         say(&format!(
-            "{}: {}, {} labelled before, {} written by {source} {version}",
+            "{}: {}, {} labelled before, {} written by {source} {version}{malformed}",
             self.data.join("labels.jsonl").display(),
             counted(found.spans, "span"),
             found.known,
             counted(found.asked, "text")
         ));
         Ok(ExitStatus::Ok)
+    }
+
+    fn summarizer(&self) -> anyhow::Result<Box<dyn Summarizer>> {
+        let model = &self.language_model;
+        Ok(match self.with {
+            With::Rules => Box::new(Rules),
+            With::Concat => Box::new(Concatenation),
+            With::Opt => {
+                Box::new(OptSummarizer::open(model.folder()?, model.name.clone(), model.sampling(), best_device())?)
+            }
+        })
     }
 }

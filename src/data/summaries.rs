@@ -9,10 +9,11 @@ use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::text_file;
+use crate::language::maker::Maker;
 use crate::language::passage::Passage;
 
 /// A line: the label of one span of one annotator.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpanSummary {
     /// The trajectory's name.
@@ -21,7 +22,7 @@ pub struct SpanSummary {
     pub annotator: u32,
     /// The span's first skill, and the one after its last.
     pub skills: [u8; 2],
-    /// The summary, as an instruction.
+    /// The summary, as an instruction; empty where there is none, so that nothing is learned under it.
     pub text: String,
     /// Who made it: `rules`, `concat`, a model.
     pub source: String,
@@ -29,6 +30,12 @@ pub struct SpanSummary {
     pub version: u32,
     /// The digest of what it was made of; see [`Passage::digest`].
     pub input: String,
+    /// The model that wrote it, where one did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maker: Option<Maker>,
+    /// What the model said where that holds no summary.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub malformed: Option<String>,
 }
 
 /// The file's first line.
@@ -179,6 +186,8 @@ mod tests {
             source: source.into(),
             version: 1,
             input: input.into(),
+            maker: None,
+            malformed: None,
         }
     }
 

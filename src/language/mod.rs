@@ -3,9 +3,11 @@
 pub(crate) mod count;
 pub(crate) mod grammar;
 pub(crate) mod instruction;
+pub(crate) mod maker;
 pub(crate) mod nouns;
 pub(crate) mod passage;
 pub(crate) mod phrases;
+pub(crate) mod prompt;
 pub mod reader;
 pub(crate) mod rules;
 pub(crate) mod story;

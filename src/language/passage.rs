@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use sha2::{Digest, Sha256};
 
+use super::maker::Maker;
 use crate::domain::trajectory::Annotation;
 use crate::domain::{Role, Subtask, Trajectory};
 
@@ -56,21 +57,46 @@ impl<'a> Passage<'a> {
         }
         format!("{:x}", hash.finalize())[..16].to_string()
     }
+
+    /// Seeds what is drawn for this passage: the digest's number.
+    pub(crate) fn seed(&self) -> u64 {
+        u64::from_str_radix(&self.digest(), 16).unwrap_or_default()
+    }
 }
 
+/// What a summarizer makes of a passage.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Summary {
+    /// An instruction.
+    Sentence(String),
+    /// An answer in which there is none.
+    Malformed(String),
+}
+
+/// Takes the summary of the passage at a position as soon as it is there.
+pub(crate) type TakeSummary<'a> = dyn FnMut(usize, Summary) -> anyhow::Result<()> + 'a;
+
 /// Sums passages up.
-pub(crate) trait Summarizer: Sync {
+pub(crate) trait Summarizer {
     /// What it is called where its work is kept: `rules`, `concat`, the name of a model.
     fn source(&self) -> &str;
 
     /// Changes whenever it would say something else of the same passage.
     fn version(&self) -> u32;
 
-    /// A sentence for each passage, in order.
+    /// The model that writes, where one does.
+    fn maker(&self) -> Option<&Maker> {
+        None
+    }
+
+    /// How many passages it is best given at once; between two lots a relabelling can be stopped.
+    fn together(&self) -> usize;
+
+    /// Sums passages up, in any order.
     ///
     /// # Errors
-    /// When it cannot do its work; none of the passages counts as summed up then.
-    fn summaries(&self, passages: &[Passage<'_>]) -> anyhow::Result<Vec<String>>;
+    /// When it cannot do its work, or what it made is not taken; what was taken until then stands.
+    fn summaries(&self, passages: &[Passage<'_>], take: &mut TakeSummary<'_>) -> anyhow::Result<()>;
 }
 
 /// One sentence after the other, as they are: what the paper's ablation trains on.
@@ -91,8 +117,13 @@ impl Summarizer for Concatenation {
         1
     }
 
-    fn summaries(&self, passages: &[Passage<'_>]) -> anyhow::Result<Vec<String>> {
-        Ok(passages.iter().map(|passage| concatenated(passage.sentences)).collect())
+    fn together(&self) -> usize {
+        4096
+    }
+
+    fn summaries(&self, passages: &[Passage<'_>], take: &mut TakeSummary<'_>) -> anyhow::Result<()> {
+        let texts = passages.iter().map(|passage| Summary::Sentence(concatenated(passage.sentences)));
+        texts.enumerate().try_for_each(|(index, text)| take(index, text))
     }
 }
 

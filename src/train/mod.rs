@@ -8,6 +8,7 @@ pub(crate) mod frame_store;
 pub(crate) mod in_training_eval;
 pub(crate) mod memory_agent;
 pub mod metrics;
+pub(crate) mod opt_summarizer;
 pub(crate) mod model_card;
 pub(crate) mod perception_targets;
 pub mod preset;

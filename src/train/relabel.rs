@@ -10,10 +10,7 @@ use crate::data::Dataset;
 use crate::data::items::composites;
 use crate::data::summaries::{Ledger, SpanSummary};
 use crate::domain::Trajectory;
-use crate::language::passage::{Passage, Summarizer};
-
-/// Spans whose labels are appended at once; after each chunk a relabelling can be stopped.
-const CHUNK: usize = 4096;
+use crate::language::passage::{Passage, Summarizer, Summary};
 
 /// Counts of a relabelling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,6 +21,8 @@ pub(crate) struct Relabelled {
     pub(crate) known: usize,
     /// How many passages the summarizer was asked for.
     pub(crate) asked: usize,
+    /// In how many of its answers there was no summary.
+    pub(crate) malformed: usize,
     /// Whether it was stopped before the end.
     pub(crate) stopped: bool,
 }
@@ -33,74 +32,126 @@ struct CompositeSpan<'a> {
     trajectory: &'a Trajectory,
     annotator: usize,
     skills: Range<usize>,
+}
+
+/// A passage and the spans that say the same, which share its summary.
+struct PassageSpans<'a> {
     passage: Passage<'a>,
     digest: String,
+    /// Those that have no label yet.
+    missing: Vec<CompositeSpan<'a>>,
+    /// How many there are.
+    spans: usize,
 }
 
 /// Writes the labels that are missing. A passage that the same source and version summed up before, here or in an earlier run, is not
-/// asked for again.
+/// asked for again: each answer is kept as soon as it is there. With a `sample` only so many passages are labelled, those whose digests come
+/// first: chance decides which, every time the same, and a larger sample holds a smaller one.
 ///
 /// # Errors
-/// When the dataset cannot be read, its labels not be written, or the summarizer fails; what was labelled until then stays.
+/// When the dataset cannot be read, its labels not be written, another maker wrote labels under the same name, or the summarizer fails; what
+/// was labelled until then stays.
 pub(crate) fn relabel(
     folder: &Path,
     summarizer: &dyn Summarizer,
+    sample: Option<usize>,
     logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<Relabelled> {
     let dataset = Dataset::open(folder)?;
     let trajectories = dataset.trajectories()?.collect::<anyhow::Result<Vec<_>>>()?;
     let (mut ledger, lines) = Ledger::open(folder)?;
-    let ours = |line: &SpanSummary| line.source == summarizer.source() && line.version == summarizer.version();
-    let mut texts: HashMap<String, String> = HashMap::new();
-    let mut labelled = HashSet::new();
-    for line in lines.into_iter().filter(ours) {
-        labelled.insert((line.trajectory, line.annotator, line.skills, line.input.clone()));
-        texts.insert(line.input, line.text);
+    let mut kept = KeptLabels::of(lines, summarizer)?;
+    let mut passages = passages(&trajectories, &dataset.manifest().held_out);
+    if let Some(sample) = sample {
+        passages.sort_by(|a, b| a.digest.cmp(&b.digest));
+        passages.truncate(sample);
     }
-    let mut missing = Vec::new();
-    let mut found = Relabelled::default();
-    for trajectory in &trajectories {
-        for span in composite_spans(trajectory, &dataset.manifest().held_out) {
-            found.spans += 1;
-            let line = span.line(String::new(), summarizer);
-            match labelled.contains(&(line.trajectory, line.annotator, line.skills, line.input)) {
-                true => found.known += 1,
-                false => missing.push(span),
-            }
+    let mut found = Relabelled { spans: passages.iter().map(|passage| passage.spans).sum(), ..Relabelled::default() };
+    for passage in &mut passages {
+        let digest = &passage.digest;
+        passage.missing.retain(|span| !kept.labelled.contains(&span.key(digest)));
+    }
+    passages.retain(|passage| !passage.missing.is_empty());
+    found.known = found.spans - passages.iter().map(|passage| passage.missing.len()).sum::<usize>();
+    let mut done = found.known;
+    let mut write = |passage: &PassageSpans<'_>, summary: &Summary| -> anyhow::Result<()> {
+        ledger
+            .append(&passage.missing.iter().map(|span| span.line(passage, summary, summarizer)).collect::<Vec<_>>())?;
+        done += passage.missing.len();
+        logger.log(&Scalars::new("labels", done as u64, found.spans as u64))
+    };
+    let mut asked = Vec::new();
+    for passage in passages {
+        match kept.summaries.remove(&passage.digest) {
+            Some(summary) => write(&passage, &summary)?,
+            None => asked.push(passage),
         }
     }
-    let mut done = found.known;
-    for chunk in missing.chunks(CHUNK) {
+    for lot in asked.chunks(summarizer.together().max(1)) {
         if stop.load(Ordering::Relaxed) {
             found.stopped = true;
             break;
         }
-        let mut asked = HashSet::new();
-        let new: Vec<&CompositeSpan> = chunk
-            .iter()
-            .filter(|span| !texts.contains_key(&span.digest) && asked.insert(span.digest.as_str()))
-            .collect();
-        let passages: Vec<Passage> = new.iter().map(|span| span.passage).collect();
-        let summaries = summarizer.summaries(&passages)?;
-        anyhow::ensure!(summaries.len() == new.len(), "{} gave too few summaries", summarizer.source());
-        found.asked += new.len();
-        texts.extend(new.iter().map(|span| span.digest.clone()).zip(summaries));
-        let lines = chunk.iter().map(|span| span.line(texts[&span.digest].clone(), summarizer));
-        ledger.append(&lines.collect::<Vec<_>>())?;
-        done += chunk.len();
-        logger.log(&Scalars::new("labels", done as u64, found.spans as u64))?;
+        let mut missing = lot.len();
+        let passages: Vec<Passage<'_>> = lot.iter().map(|passage| passage.passage).collect();
+        summarizer.summaries(&passages, &mut |index, summary| {
+            missing -= 1;
+            found.asked += 1;
+            found.malformed += usize::from(matches!(summary, Summary::Malformed(_)));
+            write(&lot[index], &summary)
+        })?;
+        found.stopped = missing > 0 && stop.load(Ordering::Relaxed);
+        anyhow::ensure!(missing == 0 || found.stopped, "{} gave too few summaries", summarizer.source());
     }
     Ok(found)
 }
 
-/// The composite spans of a trajectory, once for each aligned annotation.
-fn composite_spans<'a>(trajectory: &'a Trajectory, held_out: &[String]) -> Vec<CompositeSpan<'a>> {
-    let mut found = Vec::new();
-    for (annotator, annotation) in trajectory.annotations.iter().enumerate() {
-        for skills in composites(trajectory, held_out) {
-            if let Some(passage) = Passage::of(trajectory, annotation, skills.clone()) {
-                found.push(CompositeSpan { trajectory, annotator, skills, passage, digest: passage.digest() });
+/// What a label is of: trajectory, annotator, skills, and the passage's digest.
+type LabelKey = (String, u32, [u8; 2], String);
+
+/// The labels that a summarizer wrote before.
+struct KeptLabels {
+    labelled: HashSet<LabelKey>,
+    summaries: HashMap<String, Summary>,
+}
+
+impl KeptLabels {
+    fn of(lines: Vec<SpanSummary>, summarizer: &dyn Summarizer) -> anyhow::Result<KeptLabels> {
+        let mut kept = KeptLabels { labelled: HashSet::new(), summaries: HashMap::new() };
+        for line in lines {
+            if line.source != summarizer.source() || line.version != summarizer.version() {
+                continue;
+            }
+            anyhow::ensure!(
+                line.maker.as_ref() == summarizer.maker(),
+                "{} has labels already that were made otherwise ({}): give these another name with --name",
+                line.source,
+                line.maker.as_ref().map_or_else(|| "by no model".into(), |maker| maker.to_string())
+            );
+            let summary = line.malformed.map_or(Summary::Sentence(line.text), Summary::Malformed);
+            kept.summaries.insert(line.input.clone(), summary);
+            kept.labelled.insert((line.trajectory, line.annotator, line.skills, line.input));
+        }
+        Ok(kept)
+    }
+}
+
+/// The passages of all composite spans, once for each aligned annotation, in the order in which they first occur.
+fn passages<'a>(trajectories: &'a [Trajectory], held_out: &[String]) -> Vec<PassageSpans<'a>> {
+    let mut found: Vec<PassageSpans<'a>> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
+    for trajectory in trajectories {
+        for (annotator, annotation) in trajectory.annotations.iter().enumerate() {
+            for skills in composites(trajectory, held_out) {
+                let Some(passage) = Passage::of(trajectory, annotation, skills.clone()) else { continue };
+                let digest = passage.digest();
+                let place = *places.entry(digest.clone()).or_insert(found.len());
+                if place == found.len() {
+                    found.push(PassageSpans { passage, digest, missing: Vec::new(), spans: 0 });
+                }
+                found[place].missing.push(CompositeSpan { trajectory, annotator, skills });
+                found[place].spans += 1;
             }
         }
     }
@@ -108,15 +159,29 @@ fn composite_spans<'a>(trajectory: &'a Trajectory, held_out: &[String]) -> Vec<C
 }
 
 impl CompositeSpan<'_> {
-    fn line(&self, text: String, summarizer: &dyn Summarizer) -> SpanSummary {
+    fn numbers(&self) -> [u8; 2] {
+        [self.skills.start as u8, self.skills.end as u8]
+    }
+
+    fn key(&self, digest: &str) -> LabelKey {
+        (self.trajectory.id.clone(), self.annotator as u32, self.numbers(), digest.to_owned())
+    }
+
+    fn line(&self, passage: &PassageSpans<'_>, summary: &Summary, summarizer: &dyn Summarizer) -> SpanSummary {
+        let (text, malformed) = match summary {
+            Summary::Sentence(text) => (text.clone(), None),
+            Summary::Malformed(said) => (String::new(), Some(said.clone())),
+        };
         SpanSummary {
             trajectory: self.trajectory.id.clone(),
             annotator: self.annotator as u32,
-            skills: [self.skills.start as u8, self.skills.end as u8],
+            skills: self.numbers(),
             text,
             source: summarizer.source().to_string(),
             version: summarizer.version(),
-            input: self.digest.clone(),
+            input: passage.digest.clone(),
+            maker: summarizer.maker().cloned(),
+            malformed,
         }
     }
 }
@@ -135,7 +200,7 @@ mod tests {
     use crate::domain::trajectory::Annotation;
     use crate::domain::{Action, ActionType, SkillKind};
     use crate::house::testing::{put_subtask, role, subtask};
-    use crate::language::passage::Concatenation;
+    use crate::language::passage::{Concatenation, TakeSummary};
     use crate::language::rules::Rules;
 
     /// Counts what it is asked.
@@ -150,9 +215,14 @@ mod tests {
             1
         }
 
-        fn summaries(&self, passages: &[Passage<'_>]) -> anyhow::Result<Vec<String>> {
+        fn together(&self) -> usize {
+            2
+        }
+
+        fn summaries(&self, passages: &[Passage<'_>], take: &mut TakeSummary<'_>) -> anyhow::Result<()> {
             self.0.fetch_add(passages.len(), Ordering::Relaxed);
-            Ok(passages.iter().map(|passage| format!("{} steps", passage.sentences.len())).collect())
+            let told = passages.iter().map(|passage| Summary::Sentence(format!("{} steps", passage.sentences.len())));
+            told.enumerate().try_for_each(|(index, text)| take(index, text))
         }
     }
 
@@ -188,7 +258,7 @@ mod tests {
     }
 
     fn run(folder: &Path, summarizer: &dyn Summarizer) -> Relabelled {
-        relabel(folder, summarizer, &mut Silent, &AtomicBool::new(false)).unwrap()
+        relabel(folder, summarizer, None, &mut Silent, &AtomicBool::new(false)).unwrap()
     }
 
     #[test]
@@ -196,9 +266,9 @@ mod tests {
         let folder = dataset();
         let counting = Counting(AtomicUsize::new(0));
         let first = run(folder.path(), &counting);
-        assert_eq!(first, Relabelled { spans: 16, known: 0, asked: 3, stopped: false });
+        assert_eq!(first, Relabelled { spans: 16, known: 0, asked: 3, malformed: 0, stopped: false });
         let second = run(folder.path(), &counting);
-        assert_eq!(second, Relabelled { spans: 16, known: 16, asked: 0, stopped: false });
+        assert_eq!(second, Relabelled { spans: 16, known: 16, asked: 0, malformed: 0, stopped: false });
         assert_eq!(counting.0.load(Ordering::Relaxed), 3);
     }
 

@@ -233,6 +233,8 @@ fn labels(at: &Path) -> Vec<Vec<u8>> {
         source: "rules".into(),
         version: 1,
         input: "00ff".into(),
+        maker: None,
+        malformed: None,
     };
     Ledger::open(at).unwrap().0.append(&[label("a"), label("b"), label("c")]).unwrap();
     vec![std::fs::read(at.join("labels.jsonl")).unwrap()]

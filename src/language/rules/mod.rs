@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::nouns::Noun;
 use super::outcome::{ChainOutcome, outcomes};
-use super::passage::{Passage, Summarizer};
+use super::passage::{Passage, Summarizer, Summary, TakeSummary};
 use super::story::Story;
 use crate::domain::skill::SkillKind;
 
@@ -30,14 +30,19 @@ impl Summarizer for Rules {
         1
     }
 
-    fn summaries(&self, passages: &[Passage<'_>]) -> anyhow::Result<Vec<String>> {
-        Ok(passages.par_iter().map(summary).collect())
+    fn together(&self) -> usize {
+        4096
+    }
+
+    fn summaries(&self, passages: &[Passage<'_>], take: &mut TakeSummary<'_>) -> anyhow::Result<()> {
+        let texts: Vec<String> = passages.par_iter().map(summary).collect();
+        texts.into_iter().map(Summary::Sentence).enumerate().try_for_each(|(index, text)| take(index, text))
     }
 }
 
 /// A passage in a sentence. The same passage always gives the same one.
 pub(crate) fn summary(passage: &Passage<'_>) -> String {
-    let digest = u64::from_str_radix(&passage.digest(), 16).unwrap_or_default();
+    let digest = passage.seed();
     // Each manner is shorter than the one before.
     let mut sentence = String::new();
     for manner in [DetailLevel::Full, DetailLevel::Plain, DetailLevel::Last] {
@@ -258,7 +263,13 @@ mod tests {
         let subtasks = [subtask(SkillKind::Pickup, 0), put_subtask(0, 1)];
         let sentences = ["Take the book.".to_string(), "Put it down.".to_string()];
         let passage = Passage { roles: &roles, subtasks: &subtasks, sentences: &sentences };
-        assert_eq!(Rules.summaries(&[passage, passage]).unwrap(), [summary(&passage), summary(&passage)]);
+        let mut texts = Vec::new();
+        let mut take = |index, text| {
+            texts.push((index, text));
+            Ok(())
+        };
+        Rules.summaries(&[passage, passage], &mut take).unwrap();
+        assert_eq!(texts, [0, 1].map(|index| (index, Summary::Sentence(summary(&passage)))));
     }
 
     prop_compose! {
