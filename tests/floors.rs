@@ -12,7 +12,7 @@ const FLOORS: [&str; 17] = [
 ];
 
 /// Libraries, and the floors that may use them.
-const LIBRARIES: [(&str, &[&str]); 9] = [
+const LIBRARIES: [(&str, &[&str]); 10] = [
     ("tch", &["nets", "algo", "agent", "train"]),
     ("ratatui", &["tui"]),
     ("ratatui_textarea", &["tui"]),
@@ -22,6 +22,7 @@ const LIBRARIES: [(&str, &[&str]); 9] = [
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("indicatif", &["cli"]),
+    ("ureq", &["train"]),
 ];
 
 /// The commands that use the explorer's screen: the one that opens it, and the one that says what the terminal can draw.

@@ -5,10 +5,12 @@
 
 mod alfred;
 mod circles;
+mod completions;
 mod explore;
 mod eval;
 mod floors;
 mod imports;
+mod labels;
 mod needed;
 mod fuzz;
 mod command_line;

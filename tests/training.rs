@@ -12,7 +12,7 @@ use crate::needed;
 use crate::program::{Sprint, wait_for};
 
 /// SPRINT in miniature: every part of it, in seconds.
-const TINY: &str = r#"
+pub(crate) const TINY: &str = r#"
 extends = "sprint"
 hold_out = 3
 save_every = 2
@@ -97,7 +97,7 @@ swaps = 0
 "#;
 
 /// A folder with a few labelled demonstrations; nothing where the sentence encoder is not there.
-fn demonstrations() -> Option<Sprint> {
+pub(crate) fn demonstrations() -> Option<Sprint> {
     let sprint = Sprint::new();
     let encoder = needed::sentence_encoder(&default_folder())?;
     std::fs::create_dir_all(sprint.path("home/encoders")).unwrap();

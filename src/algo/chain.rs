@@ -10,6 +10,10 @@ use tch::Tensor;
 pub struct Chaining {
     /// Drawn from the batch, or from a pool.
     pub pairs: PairSource,
+    /// Only pairs that a language model ranked high, under its own text: those of the datasets' chains.jsonl (the paper's LLM-chain).
+    /// `pairs` does not count then.
+    #[serde(default)]
+    pub(crate) ranked: bool,
     /// Pairs in a step; the paper's is the batch.
     pub batch_size: usize,
     /// What A's reward at the cut is bootstrapped from.

@@ -209,6 +209,7 @@ mod tests {
 
     const CHAINING: Chaining = Chaining {
         pairs: PairSource::Pool(1),
+        ranked: false,
         batch_size: 4,
         bootstrap: Bootstrap::NextValue,
         policy_extraction: PolicyExtraction::Both,

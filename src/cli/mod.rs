@@ -7,6 +7,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use exit_status::ExitStatus;
 
 mod average;
+mod chains;
 mod collect;
 mod compare;
 mod doctor;
@@ -18,6 +19,7 @@ mod exit_status;
 mod export;
 mod import;
 mod jobs;
+mod labels;
 mod language_model;
 mod logging;
 mod plot;
@@ -79,6 +81,10 @@ enum Command {
     Collect(collect::Collect),
     /// Label a dataset's runs of skills, to learn from them
     Relabel(relabel::Relabel),
+    /// Look at a dataset's labels
+    Labels(labels::Labels),
+    /// Rank pairs of instructions to chain by a language model
+    Chains(chains::Chains),
     /// Draw and encode every frame of a dataset, ahead of a training
     Encode(encode::Encode),
     /// Train an agent on a dataset
@@ -130,6 +136,8 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
         Command::Relabel(relabel) => relabel.run(),
+        Command::Labels(labels) => labels.run(),
+        Command::Chains(chains) => chains.run(),
         Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Average(average) => average.run(),

@@ -26,7 +26,7 @@ pub(crate) struct Pretrain {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, l-bc-agg, sprint-memory; or a preset's
+    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, sprint-llm-chain, l-bc-agg, sprint-memory; or a preset's
     /// file, which may extend one of these
     #[arg(long)]
     preset: String,

@@ -1,6 +1,8 @@
 //! `sprint relabel`: what runs of skills are called.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 
@@ -13,6 +15,7 @@ use crate::language::count::counted;
 use crate::language::passage::{Concatenation, Summarizer};
 use crate::language::rules::Rules;
 use crate::nets::device::best_device;
+use crate::train::http_summarizer::HttpSummarizer;
 use crate::train::opt_summarizer::OptSummarizer;
 use crate::train::relabel::relabel;
 
@@ -39,6 +42,8 @@ enum With {
     Concat,
     /// An OPT model in this process
     Opt,
+    /// A model on an OpenAI-compatible server (llama.cpp, vLLM, Ollama)
+    Http,
 }
 
 impl Relabel {
@@ -48,7 +53,7 @@ impl Relabel {
     /// When the dataset cannot be read, its folder not be written to, or the model not be asked.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let stop = stop::on_signals()?;
-        let summarizer = self.summarizer()?;
+        let summarizer = self.summarizer(&stop)?;
         let mut progress = Progress::new();
         let found = relabel(&self.data, summarizer.as_ref(), self.sample, &mut progress, &stop)?;
         progress.end();
@@ -74,13 +79,17 @@ impl Relabel {
         Ok(ExitStatus::Ok)
     }
 
-    fn summarizer(&self) -> anyhow::Result<Box<dyn Summarizer>> {
+    fn summarizer(&self, stop: &Arc<AtomicBool>) -> anyhow::Result<Box<dyn Summarizer>> {
         let model = &self.language_model;
         Ok(match self.with {
             With::Rules => Box::new(Rules),
             With::Concat => Box::new(Concatenation),
             With::Opt => {
                 Box::new(OptSummarizer::open(model.folder()?, model.name.clone(), model.sampling(), best_device())?)
+            }
+            With::Http => {
+                let (server, name) = model.server(stop)?;
+                Box::new(HttpSummarizer::new(server, name, model.name.clone(), model.sampling()))
             }
         })
     }

@@ -9,6 +9,8 @@ pub mod features;
 pub(crate) mod folder_lock;
 pub mod items;
 pub mod json;
+pub(crate) mod line_log;
+pub(crate) mod ranked_chains;
 pub mod schema;
 pub mod selection;
 pub mod summaries;

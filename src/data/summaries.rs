@@ -77,6 +77,14 @@ fn read(folder: &Path) -> anyhow::Result<(Vec<SpanSummary>, usize)> {
     Ok((lines.enumerate().map(parse).collect::<anyhow::Result<_>>()?, whole))
 }
 
+/// All labels in a dataset's folder, as they were added.
+///
+/// # Errors
+/// When the file is malformed; the line is named.
+pub(crate) fn lines(folder: &Path) -> anyhow::Result<Vec<SpanSummary>> {
+    Ok(read(folder)?.0)
+}
+
 /// The labels of datasets, to be looked up.
 #[derive(Clone, Debug, Default)]
 pub struct Summaries {

@@ -55,6 +55,10 @@ impl<'a> Passage<'a> {
             }
             hash.update(format!("\n{}\n{sentence}\n", sentence.len()));
         }
+        // Sentences of which no skill is told count by themselves.
+        for sentence in self.sentences.iter().skip(self.subtasks.len()) {
+            hash.update(format!("\n{}\n{sentence}\n", sentence.len()));
+        }
         format!("{:x}", hash.finalize())[..16].to_string()
     }
 

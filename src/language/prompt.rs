@@ -24,9 +24,13 @@ pub(crate) fn summarise(sentences: &[String]) -> String {
 }
 
 /// What stands before a second step when a model is asked how likely it follows on the first, and that step as it would go on.
-#[cfg(test)]
 pub(crate) fn follow(first: &str, second: &str) -> (String, String) {
     (format!("{EXAMPLES}{STEPS}1: {}\n2:", normalise(first)), format!(" {}", normalise(second)))
+}
+
+/// The summaries of the examples, which a model may say again.
+pub(crate) fn example_summaries() -> impl Iterator<Item = &'static str> {
+    EXAMPLES.lines().filter_map(|line| line.strip_prefix(SUMMARY))
 }
 
 /// Identifies the prompt, without the steps: the first 16 digits of a sha256.

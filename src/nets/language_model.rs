@@ -191,7 +191,6 @@ impl LanguageModel {
     ///
     /// # Errors
     /// When a pair is longer than the model reads, the tokenizer refuses, or a text has no token of its own.
-    #[cfg(test)]
     pub(crate) fn mean_log_probabilities(&self, pairs: &[(String, String)]) -> anyhow::Result<Vec<f64>> {
         if pairs.is_empty() {
             return Ok(Vec::new());

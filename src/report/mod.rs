@@ -6,6 +6,7 @@ pub(crate) mod estimates;
 pub(crate) mod export;
 pub(crate) mod groups;
 pub(crate) mod html;
+pub(crate) mod label_comparison;
 pub(crate) mod markdown_table;
 pub(crate) mod pixmap;
 pub(crate) mod shell_word;

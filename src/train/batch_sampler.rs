@@ -7,7 +7,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::training_data::{ConditioningTable, TrainingData};
 use crate::algo::batch::{Batch, ChainedPairs, Transitions};
-use crate::algo::chain::{Chaining, PairSource, cut_chance};
+use crate::algo::chain::{Chaining, cut_chance};
 use crate::data::items::{Item, Span};
 use crate::nets::visual::SIDE;
 
@@ -87,8 +87,8 @@ impl<'a> BatchSampler<'a> {
     /// Pairs (A, B): from the batch by a permutation, or from the pool.
     fn pairs(&self, chaining: &Chaining, items: &[Item], step: u64) -> anyhow::Result<ChainedPairs> {
         let mut rng = self.random_stream(CHAINING, step);
-        let (first, second, joint) = match (chaining.pairs, &self.data.pool) {
-            (PairSource::Pool(_), Some(pool)) => {
+        let (first, second, joint) = match &self.data.pool {
+            Some(pool) => {
                 let drawn: Vec<usize> =
                     (0..chaining.batch_size).map(|_| rng.random_range(0..pool.pairs.len())).collect();
                 let mut of = |text: u32| pool.item(self.data.items, text, &mut rng);
@@ -96,7 +96,7 @@ impl<'a> BatchSampler<'a> {
                 let second: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].1)).collect();
                 (first, second, pool.joint.rows(drawn.into_iter(), self.device)?)
             }
-            _ => {
+            None => {
                 let mut order: Vec<usize> = (0..items.len()).collect();
                 order.shuffle(&mut rng);
                 let first = items[..chaining.batch_size.min(items.len())].to_vec();

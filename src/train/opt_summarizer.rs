@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tch::Device;
 
+use super::ranked_chains::ChainModel;
 use crate::language::maker::{Maker, Sampling};
 use crate::language::passage::{Passage, Summarizer, TakeSummary};
 use crate::language::prompt;
@@ -57,9 +58,28 @@ impl Summarizer for OptSummarizer {
     fn summaries(&self, passages: &[Passage<'_>], take: &mut TakeSummary<'_>) -> anyhow::Result<()> {
         let prompt =
             |passage: &Passage<'_>| Prompt { text: prompt::summarise(passage.sentences), seed: passage.seed() };
-        let prompts: Vec<Prompt> = passages.iter().map(prompt).collect();
-        let answers = self.model.complete(&prompts, &self.maker.sampling, &prompt::is_whole)?;
-        let summaries = answers.iter().map(|answer| prompt::summary(&answer.text, answer.ended));
-        summaries.enumerate().try_for_each(|(index, summary)| take(index, summary))
+        for (lot, passages) in passages.chunks(self.together()).enumerate() {
+            let prompts: Vec<Prompt> = passages.iter().map(prompt).collect();
+            let answers = self.model.complete(&prompts, &self.maker.sampling, &prompt::is_whole)?;
+            for (index, answer) in answers.iter().enumerate() {
+                take(lot * self.together() + index, prompt::summary(&answer.text, answer.ended))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ChainModel for OptSummarizer {
+    fn log_probabilities(&self, steps: &[(String, String)]) -> anyhow::Result<Option<Vec<f64>>> {
+        let steps: Vec<_> = steps.iter().map(|(first, second)| prompt::follow(first, second)).collect();
+        let mut found = Vec::new();
+        for chunk in steps.chunks(self.together()) {
+            found.extend(self.model.mean_log_probabilities(chunk)?);
+        }
+        Ok(Some(found))
+    }
+
+    fn chain_maker(&self) -> Maker {
+        self.maker.clone()
     }
 }

@@ -7,7 +7,7 @@ use anyhow::Context;
 use super::Preset;
 use crate::data::text_file;
 
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 10] = [
     ("sprint", include_str!("../../../assets/presets/sprint.toml")),
     ("l-bc", include_str!("../../../assets/presets/l-bc.toml")),
     ("iql-primitive", include_str!("../../../assets/presets/iql-primitive.toml")),
@@ -16,6 +16,7 @@ const SHIPPED: [(&str, &str); 9] = [
     ("sprint-no-chain", include_str!("../../../assets/presets/sprint-no-chain.toml")),
     ("sprint-no-agg", include_str!("../../../assets/presets/sprint-no-agg.toml")),
     ("sprint-concat-agg", include_str!("../../../assets/presets/sprint-concat-agg.toml")),
+    ("sprint-llm-chain", include_str!("../../../assets/presets/sprint-llm-chain.toml")),
     ("l-bc-agg", include_str!("../../../assets/presets/l-bc-agg.toml")),
 ];
 /// Sizes other than the presets' own, which suits two CPU cores.

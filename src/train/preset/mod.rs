@@ -185,8 +185,12 @@ impl Preset {
             "chaining.aggregate_weight joins sentences; goals have none"
         );
         anyhow::ensure!(
-            sentences || chaining.pairs == PairSource::InBatch,
+            sentences || chaining.pairs == PairSource::InBatch && !chaining.ranked,
             "chaining.pairs: a pool is of sentences; goals are paired in-batch"
+        );
+        anyhow::ensure!(
+            !chaining.ranked || chaining.aggregate_weight > 0.0,
+            "chaining.ranked is about joint sentences, but chaining.aggregate_weight is 0"
         );
         Ok(())
     }

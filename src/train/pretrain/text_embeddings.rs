@@ -1,5 +1,6 @@
 //! The text stage: what policy and critic are conditioned on, and the joint sentences of the pairs to chain.
 
+use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use tch::{Device, Tensor};
@@ -7,6 +8,8 @@ use tch::{Device, Tensor};
 use super::spec::Pretraining;
 use crate::algo::chain::PairSource;
 use crate::data::items::Items;
+use crate::data::ranked_chains;
+use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
 use crate::train::metrics::{ProgressLogger, Scalars};
 use crate::train::training_data::{ChainingPool, ConditioningTable, EmbeddingTable, joint_text};
@@ -42,16 +45,45 @@ pub(super) fn embed_texts(
         let Some(embeddings) = embed(spec, &items.texts, logger, stop)? else { return Ok(None) };
         ConditioningTable::SentenceEmbeddings(EmbeddingTable::new(&embeddings, spec.device)?)
     };
-    let pool = match spec.preset.chaining.as_ref().map(|chaining| chaining.pairs) {
-        Some(PairSource::Pool(count)) => {
-            let pairs = ChainingPool::draw(items, spec.preset.seed, count);
-            let texts: Vec<String> = pairs.iter().map(|&pair| joint_text(items, pair)).collect();
+    let pool = match spec.preset.chaining.as_ref().map(|chaining| (chaining.ranked, chaining.pairs)) {
+        Some((ranked, source)) if ranked || source != PairSource::InBatch => {
+            let (pairs, texts) = match source {
+                PairSource::Pool(count) if !ranked => {
+                    let pairs = ChainingPool::draw(items, spec.preset.seed, count);
+                    let texts = pairs.iter().map(|&pair| joint_text(items, pair)).collect();
+                    (pairs, texts)
+                }
+                _ => ranked_pairs(spec, items)?,
+            };
             let Some(joint) = embed(spec, &texts, logger, stop)? else { return Ok(None) };
             Some(ChainingPool::new(items, pairs, &joint, spec.device)?)
         }
         _ => None,
     };
     Ok(Some(Texts { conditioning, pool, vocabulary }))
+}
+
+/// The pairs of the datasets' chains.jsonl whose instructions the items bear, and what a model calls both together.
+fn ranked_pairs(spec: &Pretraining, items: &Items) -> anyhow::Result<(Vec<(u32, u32)>, Vec<String>)> {
+    let learned: HashSet<u32> = items.training.iter().map(|span| span.text).collect();
+    let numbers: HashMap<&str, u32> =
+        learned.into_iter().map(|number| (items.texts[number as usize].as_str(), number)).collect();
+    let (mut pairs, mut texts, mut ranked) = (Vec::new(), Vec::new(), 0);
+    for folder in &spec.data {
+        for pair in ranked_chains::read(folder)? {
+            ranked += 1;
+            let both = numbers.get(pair.first.as_str()).zip(numbers.get(pair.second.as_str()));
+            let Some((&first, &second)) = both.filter(|_| !pair.text.is_empty()) else { continue };
+            pairs.push((first, second));
+            texts.push(normalise(&pair.text));
+        }
+    }
+    tracing::info!("{} of {ranked} ranked pairs are chained", pairs.len());
+    anyhow::ensure!(
+        !pairs.is_empty(),
+        "of {ranked} pairs in chains.jsonl none is of instructions that are learned: rank them with the labels that the preset uses"
+    );
+    Ok((pairs, texts))
 }
 
 /// Sentence embeddings [texts, width] in this machine's memory; nothing when it was stopped.
