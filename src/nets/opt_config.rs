@@ -27,8 +27,8 @@ pub(super) struct OptConfig {
     pub(super) enable_bias: bool,
     pub(super) layer_norm_elementwise_affine: bool,
     pub(super) tie_word_embeddings: bool,
-    pub(super) bos_token_id: u32,
-    pub(super) eos_token_id: u32,
+    pub(super) bos_token_id: Option<u32>,
+    pub(super) eos_token_id: Option<u32>,
 }
 
 impl Default for OptConfig {
@@ -47,8 +47,8 @@ impl Default for OptConfig {
             enable_bias: true,
             layer_norm_elementwise_affine: true,
             tie_word_embeddings: true,
-            bos_token_id: 2,
-            eos_token_id: 2,
+            bos_token_id: Some(2),
+            eos_token_id: Some(2),
         }
     }
 }
