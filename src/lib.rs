@@ -17,7 +17,7 @@
 //! | [`report`] | summaries, statistics, comparisons, pages, charts, films |
 //! | [`eval`] | evaluation on workers, task sets, verification, replay |
 //! | [`train`] | presets, data, batches, the trainer; relabelling, collection, pretraining |
-//! | [`analysis`] | chains link by link, two instructions in one state, the value of every cell |
+//! | [`analysis`] | chains link by link, two instructions in one state, the value of every cell; benchmarks |
 //! | [`explore`] | an explorer session without a screen, and the plain mode |
 //! | [`tui`] | the explorer's screen |
 //! | [`cli`] | the command line |
@@ -35,7 +35,7 @@ pub mod run_dir;
 pub mod report;
 pub mod eval;
 pub mod train;
-mod analysis;
+pub mod analysis;
 pub mod explore;
 pub mod tui;
 pub mod cli;

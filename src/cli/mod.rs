@@ -7,6 +7,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use exit_status::ExitStatus;
 
 mod average;
+mod bench;
 mod chains;
 mod collect;
 mod compare;
@@ -57,6 +58,8 @@ enum Command {
     Explore(explore::Explore),
     /// Print what was found on this machine; exits 1 with the remedy when something is missing
     Doctor(doctor::Doctor),
+    /// Measure how fast the program is on this machine
+    Bench(bench::Bench),
     /// Play a task set, and write a run folder with every episode and a summary
     Eval(eval::Eval),
     /// Compare runs of the same tasks, episode by episode
@@ -124,6 +127,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
     match command {
         Command::Explore(explore) => explore.run(),
         Command::Doctor(doctor) => doctor.run(),
+        Command::Bench(bench) => bench.run(),
         Command::Eval(eval) => eval.run(),
         Command::Compare(compare) => compare.run(),
         Command::Merge(merge) => merge.run(),

@@ -21,5 +21,6 @@ pub(crate) mod tensorboard;
 pub mod trainer;
 pub mod training_data;
 pub mod training_state;
+pub mod update_timing;
 pub(crate) mod validation;
 pub(crate) mod visual;

@@ -1,47 +1,39 @@
-//! Figures beside their baselines, `baselines.json`. A figure is how many times as long something takes as copying a mebibyte
-//! takes in the same process, so that figures of different machines can be compared; both are the least of many measurements,
-//! so that other work on the machine matters little. `SPRINT_RECORD_BASELINES=1 make bench` stores what it measures.
+//! Figures beside their baselines, as `sprint bench` compares them; `SPRINT_RECORD_BASELINES=1 make bench` stores what it measures.
 
 // Each bench is a program of its own and uses a part of this.
 #![allow(dead_code, clippy::print_stdout)]
 
-use std::collections::BTreeMap;
-use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
 use anyhow::Context;
+use sprint_explorer::analysis::bench::Baselines;
 
-const MEBIBYTE: usize = 1 << 20;
-
-pub(crate) struct Baselines {
+pub(crate) struct CriterionBaselines {
     path: PathBuf,
-    stored: BTreeMap<String, f64>,
-    copy: f64,
+    baselines: Baselines,
     begun: SystemTime,
     record: bool,
 }
 
-impl Baselines {
-    pub(crate) fn open() -> anyhow::Result<Baselines> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bench/baselines.json");
-        let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let stored = serde_json::from_str(&text).with_context(|| format!("{} is not a table", path.display()))?;
+impl CriterionBaselines {
+    pub(crate) fn open() -> anyhow::Result<CriterionBaselines> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/bench_baselines.json");
+        let baselines = Baselines::read(&path)?;
         let record = std::env::var_os("SPRINT_RECORD_BASELINES").is_some();
-        Ok(Baselines { path, stored, copy: copy_seconds(), begun: SystemTime::now(), record })
+        Ok(CriterionBaselines { path, baselines, begun: SystemTime::now(), record })
     }
 
     /// Prints how long something takes in copies of a mebibyte, beside its baseline.
     pub(crate) fn compare(&mut self, name: &str, least: Duration) -> anyhow::Result<()> {
-        let copies = least.as_secs_f64() / self.copy;
-        let beside = match self.stored.get(name) {
-            Some(&stored) => format!("baseline {stored:.3}, {:.2} times that", copies / stored),
+        let comparison = self.baselines.compare(name, least).clone();
+        let beside = match comparison.ratio {
+            Some(ratio) => format!("{ratio:.2} times the baseline"),
             None => "no baseline".to_owned(),
         };
-        println!("{name}: {copies:.3} copies of 1 MiB; {beside}");
+        println!("{name}: {:.3} copies of 1 MiB; {beside}", comparison.copies);
         if self.record {
-            self.stored.insert(name.to_owned(), (copies * 1e3).round() / 1e3);
-            std::fs::write(&self.path, serde_json::to_string_pretty(&self.stored)? + "\n")?;
+            Baselines::store(&[comparison], &self.path)?;
         }
         Ok(())
     }
@@ -71,16 +63,4 @@ impl Baselines {
 struct Sample {
     iters: Vec<f64>,
     times: Vec<f64>,
-}
-
-/// The least that copying a mebibyte takes here.
-fn copy_seconds() -> f64 {
-    let (from, mut to) = (vec![1u8; MEBIBYTE], vec![0u8; MEBIBYTE]);
-    let mut once = || {
-        let begun = Instant::now();
-        to.copy_from_slice(black_box(&from));
-        black_box(&mut to);
-        begun.elapsed().as_secs_f64()
-    };
-    (0..2000).map(|_| once()).fold(f64::INFINITY, f64::min)
 }

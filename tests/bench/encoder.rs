@@ -4,7 +4,7 @@ mod baseline;
 
 use std::hint::black_box;
 
-use baseline::Baselines;
+use baseline::CriterionBaselines;
 use criterion::{Criterion, criterion_group};
 use sprint_explorer::nets::device;
 use sprint_explorer::nets::embedding_cache::{Embedder, EmbeddingCache};
@@ -44,7 +44,7 @@ fn encoder(bench: &mut Criterion) {
 criterion_group!(benches, encoder);
 
 fn main() -> anyhow::Result<()> {
-    let mut baselines = Baselines::open()?;
+    let mut baselines = CriterionBaselines::open()?;
     benches();
     Criterion::default().configure_from_args().final_summary();
     baselines.compare_criterion(&[

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
-use baseline::Baselines;
+use baseline::CriterionBaselines;
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::{Rect, Size};
@@ -55,7 +55,7 @@ struct Target {
 }
 
 /// The typical cost of a step's picture, in bytes and encoding time, while the expert does a task. Returns what misses its target.
-fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
+fn frames(baselines: &mut CriterionBaselines) -> anyhow::Result<Vec<String>> {
     let target = |protocol, cells, kilobytes, encoding| Target { protocol, cells, kilobytes, encoding };
     // Half-blocks at 40 x 20 cells; sixels at 300 x 300 pixels; kitty and iTerm2 get the frame at its own 300 x 300.
     let targets = [
@@ -125,7 +125,7 @@ fn frames(baselines: &mut Baselines) -> anyhow::Result<Vec<String>> {
 }
 
 fn main() -> anyhow::Result<()> {
-    let mut missed = frames(&mut Baselines::open()?)?;
+    let mut missed = frames(&mut CriterionBaselines::open()?)?;
     let (tell, messages) = sync_channel(64);
     let reports = tell.clone();
     let open = || {

@@ -14,7 +14,7 @@ use sprint_explorer::house::render::Renderer;
 use sprint_explorer::house::view::View;
 use sprint_explorer::house::{House, generate, rules};
 
-use baseline::Baselines;
+use baseline::CriterionBaselines;
 
 /// Houses of all kinds.
 fn houses() -> Vec<(Scene, World)> {
@@ -117,7 +117,7 @@ fn resets(criterion: &mut Criterion) {
 criterion_group!(benches, frames, steps, resets);
 
 fn main() -> anyhow::Result<()> {
-    let mut baselines = Baselines::open()?;
+    let mut baselines = CriterionBaselines::open()?;
     benches();
     Criterion::default().configure_from_args().final_summary();
     baselines.compare_criterion(&[
