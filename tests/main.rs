@@ -18,6 +18,7 @@ mod generated;
 mod properties;
 mod reading;
 mod program;
+mod environments;
 mod evaluator;
 mod faults;
 mod scenarios;

@@ -16,6 +16,9 @@ pub struct Decision {
     /// How likely the instruction is fulfilled in the state it was decided from, by the agent's own learned end; `None` where an
     /// agent has none.
     pub(crate) done: Option<f32>,
+    /// The probability of each thing that could be done, in any order, where the environment's actions are its own; what is left
+    /// out is impossible.
+    pub(crate) own: Option<Vec<(Action, f32)>>,
 }
 
 impl Decision {
@@ -35,7 +38,7 @@ impl Decision {
 
     /// An action with nothing behind it, as a person or a script chooses.
     pub(crate) fn of(action: Action) -> Decision {
-        Decision { action, distribution: None, values: None, done: None }
+        Decision { action, distribution: None, values: None, done: None, own: None }
     }
 }
 

@@ -91,6 +91,11 @@ pub trait Policy: Send {
     /// Whether it draws its actions by chance instead of taking the likeliest, where it can do either.
     fn set_sampling(&mut self, _samples: bool) {}
 
+    /// Whether it can act where an environment's actions are its own in place of ALFRED's 12.
+    fn takes_own_actions(&self) -> bool {
+        false
+    }
+
     /// How much it reads of an instruction, where it has a limit.
     fn reading(&self, _instruction: &str) -> Option<Reading> {
         None

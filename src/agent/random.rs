@@ -1,5 +1,6 @@
 //! Chance as a policy: uniform over the actions that are possible, then over the classes they could name.
 
+use anyhow::Context;
 use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
@@ -7,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::decision::{ActionDistribution, Decision};
 use super::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
 use crate::domain::{Action, ActionType, Class};
+use crate::env::own_view::Possible;
 use crate::house::view::{self, Candidate};
 
 /// Draws every action by chance.
@@ -53,6 +55,10 @@ impl Policy for RandomPolicy {
         each_alone(observations, |_, here| self.decide(here))
     }
 
+    fn takes_own_actions(&self) -> bool {
+        true
+    }
+
     fn state(&self, _slot: usize) -> PolicyState {
         PolicyState::Random(Box::new(self.rng.clone()))
     }
@@ -66,6 +72,10 @@ impl Policy for RandomPolicy {
 
 impl RandomPolicy {
     fn decide(&mut self, observation: &mut Observation<'_>) -> anyhow::Result<Decision> {
+        if let Some(view) = observation.environment.own() {
+            let possible = view.possible();
+            return self.decide_among(&possible);
+        }
         let candidates = observation.environment.legal_actions()?;
         let possible: Vec<ActionType> = ActionType::ALL
             .into_iter()
@@ -84,7 +94,21 @@ impl RandomPolicy {
             entropy: (possible.len() as f32).ln(),
             greedy: action,
         };
-        Ok(Decision { action, distribution: Some(distribution), values: None, done: None })
+        Ok(Decision { distribution: Some(distribution), ..Decision::of(action) })
+    }
+
+    /// Uniform over the actions that are possible, then over their arguments.
+    fn decide_among(&mut self, possible: &[Possible]) -> anyhow::Result<Decision> {
+        let chosen = possible.choose(&mut self.rng).context("nothing is possible here")?;
+        let actions = chosen.actions();
+        let action = *actions.choose(&mut self.rng).context("nothing is possible here")?;
+        let each = 1.0 / possible.len() as f32;
+        let shares = possible.iter().flat_map(|one| {
+            let actions = one.actions();
+            let share = each / actions.len() as f32;
+            actions.into_iter().map(move |action| (action, share))
+        });
+        Ok(Decision { own: Some(shares.collect()), ..Decision::of(action) })
     }
 }
 

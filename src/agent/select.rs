@@ -78,7 +78,7 @@ pub(crate) fn decide(
         entropy,
         greedy,
     };
-    Decision { action, distribution: Some(distribution), values: None, done: None }
+    Decision { action, distribution: Some(distribution), values: None, done: None, own: None }
 }
 
 /// Each possible action's share times that of its candidates among all classes, each choice weighed by its advantage,

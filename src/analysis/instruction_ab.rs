@@ -139,7 +139,7 @@ mod tests {
                 let action = Action::navigate(likely);
                 let (objects, choices) = (vec![], vec![]);
                 let distribution = ActionDistribution { actions, objects, choices, entropy: 0.0, greedy: action };
-                Ok(Decision { action, distribution: Some(distribution), values: None, done: None })
+                Ok(Decision { action, distribution: Some(distribution), values: None, done: None, own: None })
             })
         }
     }

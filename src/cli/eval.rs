@@ -6,18 +6,23 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use sha2::{Digest, Sha256};
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::policies::PolicyChoice;
 use super::streams::say;
 use super::{jobs, progress, stop, streams};
-use crate::data::taskset;
+use crate::data::json::Document;
+use crate::data::{json, taskset};
+use crate::domain::{Task, TaskSet};
+use crate::env::remote::Sessions;
 use crate::episode::rollout::EndedBy;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
 use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
-use crate::eval::tasks::sample;
+use crate::eval::tasks::{elsewhere, sample};
 use crate::house::grading::Grading;
 use crate::report::summary::RunSummary;
 use crate::report::threshold::Threshold;
@@ -28,9 +33,12 @@ use crate::run_dir::writer::RunWriter;
 /// Plays a task set and writes a run folder.
 #[derive(Args)]
 pub(crate) struct Eval {
-    /// The task file
-    #[arg(long, value_name = "FILE")]
-    tasks: PathBuf,
+    /// The task file; with --env it may be left out: the episodes of the seeds 0, 1, ... are played then, as many as --limit says
+    /// [default there: 100]
+    #[arg(long, value_name = "FILE", required_unless_present = "env")]
+    tasks: Option<PathBuf>,
+    #[command(flatten)]
+    environment: EnvironmentChoice,
     #[command(flatten)]
     policy: PolicyChoice,
     /// The run folder to write; one that the same run began is continued [default: runs/NAME-TIME]
@@ -93,15 +101,22 @@ impl Eval {
     /// # Errors
     /// When the tasks, the policy or the folder cannot be used. An episode's own errors are counted instead.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let set = taskset::read_told(&self.tasks)?;
-        let scenes = Scenes::of(&self.tasks, &set.value);
+        let (set, file) = self.task_set()?;
+        let scenes = Scenes::of(&file, &set.value);
         let chosen = self.policy.open(self.sample)?;
         let evaluation =
             Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
-                .with_context(|| format!("{}", self.tasks.display()))?;
+                .with_context(|| format!("{}", file.display()))?
+                .reaching(self.environment.reach());
+        // An environment that cannot be reached is no reason to begin a run.
+        if let Some((name, _)) = evaluation.tasks().iter().find_map(Task::played_elsewhere) {
+            Sessions::new(self.environment.reach()).get(0, name)?;
+        } else if let Some(name) = self.environment.elsewhere() {
+            anyhow::bail!("{}: its tasks play in House, not in {name}: leave out --env", file.display());
+        }
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunWriter::open(&path, evaluation.manifest())?;
-        run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &self.tasks, &path)?)?;
+        run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &file, &path)?)?;
         let stop = stop::on_signals()?;
         let mut meter = Meter::new(self.json);
         let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.make, &mut run, &stop, &mut |progress| {
@@ -112,6 +127,19 @@ impl Eval {
         say(&format!("wrote {}", path.display()));
         chosen.check_unchanged()?;
         self.status(&summary)
+    }
+
+    /// The tasks that are played, and the file that they are from.
+    fn task_set(&self) -> anyhow::Result<(Document<TaskSet>, PathBuf)> {
+        match (&self.tasks, self.environment.elsewhere()) {
+            (Some(file), _) => Ok((taskset::read_told(file)?, file.clone())),
+            (None, Some(name)) => {
+                let set = elsewhere::set(name, 0, self.limit.unwrap_or(100));
+                let digest = json::hex(&Sha256::digest(serde_json::to_vec(&set)?));
+                Ok((Document { value: set, digest }, PathBuf::from(name.to_string())))
+            }
+            (None, None) => anyhow::bail!("House has no tasks of its own: name a file with --tasks"),
+        }
     }
 
     fn options(&self) -> Options {

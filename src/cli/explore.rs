@@ -8,17 +8,19 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use etcetera::BaseStrategy;
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::logging;
 use super::recorded::recorded;
 use super::streams::Printable;
 use super::value_names;
-use crate::agent::policy_source;
+use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset, text_file};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
 use crate::episode::wish::Expect;
+use crate::explore::elsewhere::{self, OpenOwn, OwnExploration};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::explore::kept_session::KeptSession;
@@ -63,6 +65,8 @@ struct Origin {
     /// The kind of room of a generated house [default: kitchen]
     #[arg(long, value_parser = value_names::room(), conflicts_with_all = ["scene", "task"])]
     room: Option<Room>,
+    #[command(flatten)]
+    environment: EnvironmentChoice,
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
@@ -111,6 +115,23 @@ impl Display {
         self.show_screen(kind, manual, || Opening::Named(Box::new(open)))
     }
 
+    /// Explores an environment with actions of its own until the person leaves.
+    ///
+    /// # Errors
+    /// When the environment cannot be reached, or there is no terminal.
+    pub(crate) fn show_elsewhere(self, manual: bool, open: OpenOwn, agent: PolicySource) -> anyhow::Result<ExitStatus> {
+        if self.plain {
+            let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
+            let obeyed = elsewhere::plain::run(open()?, &agent, input, out)? || std::io::stdin().is_terminal();
+            return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
+        }
+        let options = self.screen_options(PolicyKind::Random, manual)?;
+        Ok(match crate::tui::elsewhere::run(options, open, agent)? {
+            ExitReason::Signal(_) => ExitStatus::Interrupted,
+            ExitReason::Asked | ExitReason::WorkerGone => ExitStatus::Ok,
+        })
+    }
+
     /// The same on the screen; `opening` says what is opened, once it is known that there is a screen.
     fn show_screen(
         self,
@@ -118,6 +139,15 @@ impl Display {
         manual: bool,
         opening: impl FnOnce() -> Opening,
     ) -> anyhow::Result<ExitStatus> {
+        let screen = self.screen_options(kind, manual)?;
+        match screen::run(screen, opening())? {
+            ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
+            ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
+        }
+    }
+
+    /// What the screen is started with.
+    fn screen_options(self, kind: PolicyKind, manual: bool) -> anyhow::Result<screen::ScreenOptions> {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
         }
@@ -136,12 +166,7 @@ impl Display {
         let runs = !self.paused;
         let session = Some(kept_session());
         let policy = kind;
-        let screen =
-            screen::ScreenOptions { protocol, policy, manual, runs, config, memory, history, session, bandwidth, log };
-        match screen::run(screen, opening())? {
-            ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
-            ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
-        }
+        Ok(screen::ScreenOptions { protocol, policy, manual, runs, config, memory, history, session, bandwidth, log })
     }
 
     /// The same, but waiting for a key before the first step.
@@ -213,6 +238,10 @@ impl Explore {
             Some(PolicyName::Expert) => PolicyKind::Expert,
             Some(PolicyName::Random) => PolicyKind::Random,
         };
+        if let Some(open) = self.from.elsewhere(kind)? {
+            let agent = self.from.policy_elsewhere(kind)?;
+            return self.display.show_elsewhere(manual || self.policy.is_none(), open, agent);
+        }
         let is_named = self.policy.is_some() || self.from.is_named();
         let Explore { display, from, .. } = self;
         if !is_named && !display.plain {
@@ -236,6 +265,40 @@ fn kept_session() -> PathBuf {
 }
 
 impl Origin {
+    /// Who acts in an environment with actions of its own: chance, unless a policy that can was named.
+    fn policy_elsewhere(&self, kind: PolicyKind) -> anyhow::Result<PolicySource> {
+        if let Some(checkpoint) = &self.checkpoint {
+            return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false);
+        }
+        match kind {
+            PolicyKind::Expert => Ok(PolicySource::expert()),
+            PolicyKind::Random | PolicyKind::Agent => Ok(PolicySource::random()),
+        }
+    }
+
+    /// How an exploration of another environment than House is opened, where one was named.
+    fn elsewhere(&self, kind: PolicyKind) -> anyhow::Result<Option<OpenOwn>> {
+        let task = match &self.task {
+            None => None,
+            Some(task) => {
+                let (path, wanted) = taskset::split_reference(task);
+                let set = taskset::read_told(&path)?.value;
+                let index = taskset::pick(&set, wanted.unwrap_or("1")).with_context(|| path.display().to_string())?;
+                set.tasks.into_iter().nth(index).filter(|task| task.env.is_some())
+            }
+        };
+        let named = self.environment.elsewhere().cloned();
+        let Some(name) = named.or_else(|| task.as_ref().and_then(|task| task.env.clone())) else { return Ok(None) };
+        if self.scene.is_some() || self.room.is_some() || (self.task.is_some() && task.is_none()) {
+            bail!("--scene, --room and House's tasks are about House, but --env names {name}");
+        }
+        let (reach, agent) = (self.environment.reach(), self.policy_elsewhere(kind)?);
+        let seed = self.seed.or_else(|| task.as_ref().and_then(|task| task.seed)).unwrap_or(0);
+        let of_task = task.map(|task| task.instruction).filter(|instruction| !instruction.is_empty());
+        let told = self.instruction.clone().or(of_task);
+        Ok(Some(Box::new(move || OwnExploration::new(&name, reach, agent, seed, told.as_deref()))))
+    }
+
     /// Whether the command line says where to start, or with whom.
     fn is_named(&self) -> bool {
         let texts = [&self.scene, &self.task, &self.instruction];
@@ -243,6 +306,7 @@ impl Origin {
             || self.checkpoint.is_some()
             || self.room.is_some()
             || self.seed.is_some()
+            || self.environment.elsewhere().is_some()
     }
 
     /// Everything that there is to start with, and how it is opened.

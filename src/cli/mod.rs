@@ -14,6 +14,7 @@ mod compare;
 mod doctor;
 mod embed;
 mod encode;
+mod environment;
 mod explore;
 mod eval;
 mod exit_status;
@@ -112,7 +113,10 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     logging::start();
-    match run(cli.command) {
+    let ending = run(cli.command);
+    // What a thread that hangs still holds would outlive the program.
+    crate::env::remote::end_children();
+    match ending {
         Ok(ending) => ending.into(),
         Err(error) if reader_left(&error) => ExitStatus::Ok.into(),
         Err(error) => {

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::explore::Display;
-use super::recorded::recorded;
+use super::recorded::{recorded, recorded_elsewhere};
 
 /// Which episode, and how to show it.
 #[derive(Args)]
@@ -21,6 +22,8 @@ pub(crate) struct Open {
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     #[command(flatten)]
+    environment: EnvironmentChoice,
+    #[command(flatten)]
     display: Display,
 }
 
@@ -30,6 +33,10 @@ impl Open {
     /// # Errors
     /// When it cannot be read, its tasks are not at hand, or the simulator does not come to what was recorded.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
+        let elsewhere = recorded_elsewhere(&self.episode, self.tasks.as_deref(), self.environment.reach())?;
+        if let Some((open, agent)) = elsewhere {
+            return self.display.paused().show_elsewhere(true, open, agent);
+        }
         let (kind, open) = recorded(&self.episode, self.tasks.as_deref(), self.checkpoint)?;
         self.display.paused().show(kind, false, open)
     }

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use crate::agent::policy_source;
+use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
+use crate::env::remote::Elsewhere;
 use crate::episode::record::Author;
+use crate::explore::elsewhere::{OpenOwn, OwnExploration};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::run_dir::manifest::RunManifest;
@@ -90,6 +92,34 @@ pub(super) fn recorded(
         Ok(exploration)
     };
     Ok((kind, open))
+}
+
+/// A recorded episode in an environment with actions of its own, as the command line names it; `None` for one in House.
+///
+/// # Errors
+/// When it cannot be read, or its tasks are not at hand. Opening fails where the environment cannot be reached.
+pub(super) fn recorded_elsewhere(
+    episode: &str,
+    tasks: Option<&Path>,
+    elsewhere: Elsewhere,
+) -> anyhow::Result<Option<(OpenOwn, PolicySource)>> {
+    let (reference, recorded) = Reference::find(episode, tasks)?;
+    let episode = recorded.episodes[reference.episode].clone();
+    let task = recorded.task(&episode)?.clone();
+    if task.env.is_none() {
+        return Ok(None);
+    }
+    let at = recorded.set.tasks.iter().position(|other| other.id == task.id).unwrap_or(0);
+    let author = recorded.author(at, &episode);
+    let named = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
+    let acts = named.unwrap_or(&author);
+    // Without its policy an episode can still be seen, step by step, and chance acts on.
+    let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), acts.sampling, None).ok().flatten();
+    let source = found.unwrap_or_else(PolicySource::random);
+    let acting = source.clone();
+    let step = reference.step.unwrap_or(0);
+    let open = move || OwnExploration::open(&task, &episode, &author, elsewhere, source, step);
+    Ok(Some((Box::new(open), acting)))
 }
 
 /// Which kind of policy an author is.

@@ -8,17 +8,21 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::progress::Counter;
 use super::{jobs, streams, value_names};
 use crate::agent::policy_source::PolicySource;
 use crate::data::{Dataset, taskset};
 use crate::domain::{Room, Task};
+use crate::env::Environment;
+use crate::env::remote::{RemoteEnvironment, Sessions};
 use crate::episode::instruction_variant::task_instruction;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, read_instruction};
 use crate::eval::options::Options;
 use crate::eval::tasks::check;
+use crate::eval::tasks::elsewhere;
 use crate::eval::tasks::sample;
 use crate::eval::tasks::sample::{Phrasing, SampleSpec};
 use crate::house::grading::{Grading, describe};
@@ -47,8 +51,10 @@ struct SampleArgs {
     /// The file to write
     out: PathBuf,
     /// Where the tasks play: `generated` houses, or the folder of a dataset
-    #[arg(long, value_name = "generated|DATA")]
-    scenes: PathBuf,
+    #[arg(long, value_name = "generated|DATA", required_unless_present = "env", conflicts_with = "env")]
+    scenes: Option<PathBuf>,
+    #[command(flatten)]
+    environment: EnvironmentChoice,
     /// Subtasks of each task; of several lengths (1,2,3 or 1-5) there are as many tasks each, as far as there are any
     #[arg(long, value_name = "N|N,N|N-N", default_value = "1")]
     length: TaskLengths,
@@ -132,20 +138,21 @@ impl Tasks {
 impl SampleArgs {
     fn run(self) -> anyhow::Result<ExitStatus> {
         ensure!(self.force || !self.out.exists(), "{} exists; --force replaces it", self.out.display());
+        let Some(scenes) = &self.scenes else { return self.elsewhere() };
         let rooms = match self.rooms.is_empty() {
             true => Room::ALL.to_vec(),
-            false => self.rooms,
+            false => self.rooms.clone(),
         };
         let name = self.out.file_stem().map_or_else(|| "tasks".into(), |stem| stem.to_string_lossy().into_owned());
-        let lengths = self.length.0;
+        let lengths = self.length.0.clone();
         let spec = SampleSpec { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
-        let set = if self.scenes == Path::new("generated") {
+        let set = if scenes == Path::new("generated") {
             let counter = Counter::new("sampling", u64::from(self.count));
             let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| counter.add(1)));
             counter.end();
             set?
         } else {
-            let dataset = Dataset::open(&self.scenes)?;
+            let dataset = Dataset::open(scenes)?;
             let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let split = self.split.as_deref();
@@ -153,6 +160,25 @@ impl SampleArgs {
                 sample::sample_dataset(spec, &dataset, split, self.phrasing, folder)
             })?
         };
+        taskset::write(&self.out, &set)?;
+        Ok(ExitStatus::Ok)
+    }
+}
+
+impl SampleArgs {
+    /// Writes the episodes of seeds of an environment in another process, which must be there.
+    fn elsewhere(&self) -> anyhow::Result<ExitStatus> {
+        let name = self.environment.elsewhere().context("House's tasks need --scenes: generated, or a dataset")?;
+        let session = Sessions::new(self.environment.reach()).get(0, name)?;
+        let start = |seed| anyhow::Ok(RemoteEnvironment::begin(session.clone(), seed)?.fingerprint());
+        let (first, again) = (start(self.seed)?, start(self.seed)?);
+        if session.capabilities.seeds == Some(false) || first != again {
+            streams::say(&format!("{name} begins otherwise each time: its seeds name no episodes"));
+        }
+        let mut set = elsewhere::set(name, self.seed, self.count);
+        if let Some(stem) = self.out.file_stem() {
+            set.name = stem.to_string_lossy().into_owned();
+        }
         taskset::write(&self.out, &set)?;
         Ok(ExitStatus::Ok)
     }
@@ -166,7 +192,20 @@ impl CheckArgs {
             writeln!(out, "{}:{mistake}", self.file.display())?;
         }
         check::none(&mistakes, &self.file)?;
-        let set = taskset::read_told(&self.file)?;
+        let mut set = taskset::read_told(&self.file)?;
+        let others = set.value.tasks.iter().filter(|task| task.env.is_some()).count();
+        if others > 0 {
+            writeln!(
+                out,
+                "{}: {} in other environments, which say themselves what is asked",
+                self.file.display(),
+                counted(others, "task")
+            )?;
+            set.value.tasks.retain(|task| task.env.is_none());
+            if set.value.tasks.is_empty() {
+                return Ok(ExitStatus::Ok);
+            }
+        }
         let scenes = Scenes::of(&self.file, &set.value);
         let options = Options { jobs: jobs::threads(self.jobs), ..Options::plain(Grading::Class) };
         let evaluation = Evaluation::prepare(&set, scenes, options, "expert", None)
@@ -207,7 +246,11 @@ impl ShowArgs {
         match wanted {
             None => {
                 for (number, task) in (1..).zip(&set.tasks) {
-                    writeln!(out, "{number:>4}  {}  [{}]", task_instruction(task, false), task.id)?;
+                    let asked = match task.played_elsewhere() {
+                        Some((env, seed)) if task.instruction.is_empty() => format!("what {env} asks with seed {seed}"),
+                        _ => task_instruction(task, false),
+                    };
+                    writeln!(out, "{number:>4}  {asked}  [{}]", task.id)?;
                 }
             }
             Some(wanted) => {
@@ -221,6 +264,18 @@ impl ShowArgs {
 
 /// Prints a task in words.
 fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()> {
+    if let Some((env, seed)) = task.played_elsewhere() {
+        writeln!(out, "task         {}", task.id)?;
+        writeln!(out, "environment  {env}, seed {seed}")?;
+        let asked = if task.instruction.is_empty() {
+            "what the environment asks".into()
+        } else {
+            task_instruction(task, false)
+        };
+        writeln!(out, "instruction  {asked}")?;
+        writeln!(out, "steps        the episode ends after {} at the latest", task.horizon)?;
+        return Ok(());
+    }
     let setting = scenes.setting(task)?;
     let (scene, world) = (&setting.scene, &setting.world);
     writeln!(out, "task         {}", task.id)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::{jobs, streams};
@@ -28,6 +29,8 @@ pub(crate) struct Verify {
     /// Threads; the verdict does not depend on their number [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    #[command(flatten)]
+    environment: EnvironmentChoice,
     /// Print the verdict as JSON
     #[arg(long)]
     json: bool,
@@ -49,9 +52,9 @@ impl Verify {
             )
         };
         let (mut progress, total) = (Progress::new(), run.episodes.len() as u64);
-        let verdict = verify(&run, &mut find, jobs::threads(self.jobs), &mut |done| {
-            progress.show("verifying", done as u64, total, "")
-        })?;
+        let (threads, reach) = (jobs::threads(self.jobs), self.environment.reach());
+        let verdict =
+            verify(&run, &mut find, threads, &reach, &mut |done| progress.show("verifying", done as u64, total, ""))?;
         progress.end();
         let mut out = streams::out();
         if self.json {

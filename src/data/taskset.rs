@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 
 use super::json::{self, Document};
 use crate::domain::task::SceneRef;
-use crate::domain::{Class, Role, SkillKind, Subtask, Task, TaskSet};
+use crate::domain::{Class, EnvironmentName, Role, SkillKind, Subtask, Task, TaskSet};
 use crate::house::validate::Misfit;
 use crate::language::instruction;
 
@@ -21,7 +21,7 @@ pub(crate) const MOST_SUBTASKS: usize = 100;
 /// # Errors
 /// Each names the file, and where it applies the task and the field.
 pub fn read(path: &Path) -> anyhow::Result<Document<TaskSet>> {
-    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    let document = filled(path)?;
     check(&document.value).with_context(|| format!("{}", path.display()))?;
     Ok(document)
 }
@@ -31,9 +31,14 @@ pub fn read(path: &Path) -> anyhow::Result<Document<TaskSet>> {
 /// # Errors
 /// As [`read`].
 pub fn read_told(path: &Path) -> anyhow::Result<Document<TaskSet>> {
-    let document = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    let document = filled(path)?;
     check_each(&document.value, misfits_told).with_context(|| format!("{}", path.display()))?;
     Ok(document)
+}
+
+fn filled(path: &Path) -> anyhow::Result<Document<TaskSet>> {
+    let Document { value, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    Ok(Document { value: value.filled(), digest })
 }
 
 /// Writes a task file atomically, in the form that [`read`] takes.
@@ -109,6 +114,13 @@ pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
     if task.id.trim().is_empty() || task.id.chars().any(char::is_control) || task.id.chars().count() > 200 {
         found.push(Misfit::new("id", "empty, too long, or with control characters"));
     }
+    if let Some(env) = &task.env {
+        found.extend(misfits_elsewhere(task, env));
+        return found;
+    }
+    if task.scene == SceneRef::Elsewhere {
+        found.push(Misfit::new("scene", "missing; a task names a scene of House, or env and seed"));
+    }
     if let SceneRef::Named(name) = &task.scene
         && (name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', '\0']))
     {
@@ -136,6 +148,36 @@ pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
         found.extend(misfit.map(|misfit| misfit.under(&format!("subtasks[{i}]"))));
     }
     if !(1..=LONGEST_HORIZON).contains(&task.horizon) {
+        found.push(Misfit::new("horizon", format!("{} is not 1 to {LONGEST_HORIZON}", task.horizon)));
+    }
+    found
+}
+
+/// What is wrong with a task in another environment than House.
+fn misfits_elsewhere(task: &Task, env: &EnvironmentName) -> Vec<Misfit> {
+    let mut found = Vec::new();
+    if *env == EnvironmentName::House {
+        found.push(Misfit::new("env", "House is meant where a task names a scene; leave it out"));
+    }
+    if task.seed.is_none() {
+        found.push(Misfit::new("seed", format!("missing; it says which episode of {env} is played")));
+    }
+    if !task.instruction.is_empty() {
+        found.extend(text("instruction", &task.instruction).err());
+    }
+    let of_house = [
+        ("scene", task.scene != SceneRef::Elsewhere),
+        ("start", task.start.is_some()),
+        ("sentences", !task.sentences.is_empty()),
+        ("roles", !task.roles.is_empty()),
+        ("subtasks", !task.subtasks.is_empty()),
+        ("goal", task.goal.is_some()),
+    ];
+    for (field, _) in of_house.into_iter().filter(|(_, is_there)| *is_there) {
+        found.push(Misfit::new(field, format!("it is about House, but the task plays in {env}")));
+    }
+    // Absent, it is 0 until the set is filled.
+    if task.horizon > LONGEST_HORIZON {
         found.push(Misfit::new("horizon", format!("{} is not 1 to {LONGEST_HORIZON}", task.horizon)));
     }
     found
@@ -206,6 +248,8 @@ pub(crate) mod tests {
             horizon: 40,
             goal: None,
             source: None,
+            env: None,
+            seed: None,
             reworded: false,
         };
         let second = Task { id: "second".into(), scene: SceneRef::Named("FloorPlan7".into()), ..task.clone() };

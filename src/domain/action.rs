@@ -20,6 +20,9 @@ pub enum ActionType {
     ToggleOn,
     ToggleOff,
     Slice,
+    /// An action of an environment's own, by its place in that environment's action space; House has none.
+    #[serde(skip)]
+    Own(u16),
 }
 
 impl ActionType {
@@ -41,9 +44,23 @@ impl ActionType {
     /// Entries of the policy's action head.
     pub const COUNT: usize = Self::ALL.len();
 
-    /// Position in the action head.
+    /// Position in the action head; those of an environment's own lie behind it.
     pub(crate) fn index(self) -> usize {
-        self as usize
+        match self {
+            ActionType::MoveAhead => 0,
+            ActionType::RotateLeft => 1,
+            ActionType::RotateRight => 2,
+            ActionType::LookUp => 3,
+            ActionType::LookDown => 4,
+            ActionType::Pickup => 5,
+            ActionType::Put => 6,
+            ActionType::Open => 7,
+            ActionType::Close => 8,
+            ActionType::ToggleOn => 9,
+            ActionType::ToggleOff => 10,
+            ActionType::Slice => 11,
+            ActionType::Own(place) => ActionType::COUNT + usize::from(place),
+        }
     }
 
     /// The kind at that position of the action head.
@@ -53,7 +70,7 @@ impl ActionType {
 
     /// Whether it acts on an object.
     pub fn is_interaction(self) -> bool {
-        self.index() >= ActionType::Pickup.index()
+        !matches!(self, ActionType::Own(_)) && self.index() >= ActionType::Pickup.index()
     }
 
     /// The name as the screens show it.
@@ -71,6 +88,8 @@ impl ActionType {
             ActionType::ToggleOn => "ToggleOn",
             ActionType::ToggleOff => "ToggleOff",
             ActionType::Slice => "Slice",
+            // Its name stands in the environment's action space.
+            ActionType::Own(_) => "own action",
         }
     }
 }
@@ -97,6 +116,20 @@ impl Action {
     /// An action without a target.
     pub fn navigate(kind: ActionType) -> Action {
         Action { kind, target: None }
+    }
+
+    /// An action of an environment's own: its place in the action space, and the place of its argument where it takes one.
+    pub(crate) fn own(place: u16, argument: Option<u16>) -> Action {
+        Action { kind: ActionType::Own(place), target: argument.map(Instance::Object) }
+    }
+
+    /// The places of an action of an environment's own, and of its argument.
+    pub(crate) fn as_own(self) -> Option<(u16, Option<u16>)> {
+        let ActionType::Own(place) = self.kind else { return None };
+        let argument = self.target.map(|target| match target {
+            Instance::Object(at) | Instance::Fixture(at) => at,
+        });
+        Some((place, argument))
     }
 
     /// An interaction with `target`.

@@ -2,6 +2,7 @@
 
 pub(crate) mod action;
 pub(crate) mod class;
+pub mod environment_name;
 pub(crate) mod place;
 pub mod scene;
 pub(crate) mod skill;
@@ -11,6 +12,7 @@ pub mod world;
 
 pub use action::{Action, ActionType};
 pub use class::Class;
+pub use environment_name::EnvironmentName;
 pub use place::{Cell, Heading, Point, Pose};
 pub use scene::{Fixture, Room, Scene};
 pub use skill::{Goal, Role, SkillKind, Subtask};

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
+use super::own_view::OwnView;
 use crate::domain::{Action, Class, Instance, Pose};
 use crate::house::grading::Grader;
 use crate::house::view::{Candidate, Frame};
@@ -15,6 +16,8 @@ pub(crate) struct Transition {
     pub(crate) outcome: Outcome,
     /// The grader credited a subtask with it; never without grading.
     pub(crate) completed_subtask: bool,
+    /// What it earned, where the environment tells.
+    pub(crate) reward: Option<f64>,
 }
 
 /// House behind the seam, for what is about House: its map, its expert, its scenes and worlds.
@@ -110,6 +113,11 @@ pub(crate) trait Environment: Send {
     fn house(&mut self) -> Option<HouseAccess<'_>> {
         None
     }
+
+    /// What it shows and lets an agent do, where its actions are its own in place of ALFRED's 12.
+    fn own(&self) -> Option<OwnView<'_>> {
+        None
+    }
 }
 
 impl<E: Environment + ?Sized> Environment for Box<E> {
@@ -159,5 +167,9 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
 
     fn house(&mut self) -> Option<HouseAccess<'_>> {
         (**self).house()
+    }
+
+    fn own(&self) -> Option<OwnView<'_>> {
+        (**self).own()
     }
 }

@@ -63,7 +63,7 @@ impl Environment for HouseEnvironment {
             Some(grader) => grader.observe(self.house.scene(), self.house.world(), action, outcome),
             None => false,
         };
-        Ok(Transition { outcome, completed_subtask })
+        Ok(Transition { outcome, completed_subtask, reward: None })
     }
 
     fn class_of(&self, instance: Instance) -> Option<Class> {

@@ -161,6 +161,7 @@ pub(crate) mod tests {
         let trace: Vec<TraceStep> = kinds
             .into_iter()
             .map(|kind| TraceStep {
+                own: None,
                 kind,
                 target: None,
                 class: None,

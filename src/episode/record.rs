@@ -37,6 +37,9 @@ pub(crate) struct Episode {
     pub(crate) success: bool,
     /// How many actions the agent took.
     pub(crate) steps: u32,
+    /// The sum of what its steps earned, where the environment tells.
+    #[serde(rename = "return", default, skip_serializing_if = "Option::is_none")]
+    pub(crate) earned: Option<f64>,
     /// Why it ended before its time, if it did: what the policy or the environment reported.
     pub(crate) error: Option<String>,
     /// What kept it from success, where it ended in its time.
@@ -152,8 +155,11 @@ fn once() -> u32 {
 #[serde(deny_unknown_fields)]
 pub(crate) struct TraceStep {
     /// The action that was taken.
-    #[serde(rename = "action")]
+    #[serde(rename = "action", default = "own", skip_serializing_if = "is_own")]
     pub(crate) kind: ActionType,
+    /// The action that was taken, where the environment's actions are its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) own: Option<OwnStep>,
     /// The thing that it was done to, by its position in the scene or world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) target: Option<Instance>,
@@ -171,6 +177,32 @@ pub(crate) struct TraceStep {
     /// Who chose from this step on, where that changed; without any, the run's policy did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) author: Option<Author>,
+}
+
+/// A step in an environment whose actions are its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct OwnStep {
+    /// The action's name.
+    pub(crate) action: String,
+    /// Its argument, where it takes one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) argument: Option<serde_json::Value>,
+    /// What it earned, where the environment tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) reward: Option<f64>,
+    /// Tells what was seen after it from anything else.
+    pub(crate) seen: String,
+}
+
+/// The kind of an action that stands in [`OwnStep`].
+fn own() -> ActionType {
+    ActionType::Own(0)
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_own(kind: &ActionType) -> bool {
+    matches!(kind, ActionType::Own(_))
 }
 
 /// Who chose a step of an explored episode.
@@ -205,9 +237,44 @@ impl Author {
 }
 
 impl TraceStep {
-    /// What was done, as an action that can be taken again.
+    /// What was done, as an action that can be taken again in this environment.
+    ///
+    /// # Errors
+    /// When its actions are its own, and it has this one no longer.
+    pub(crate) fn action_in<E: Environment + ?Sized>(&self, environment: &E) -> anyhow::Result<Action> {
+        match (&self.own, environment.own()) {
+            (Some(step), Some(view)) => view.space.find(&step.action, step.argument.as_ref()),
+            (Some(step), None) => anyhow::bail!("{} has no action {:?}", environment.name(), step.action),
+            (None, Some(_)) => anyhow::bail!("{} has no action {}", environment.name(), self.kind),
+            (None, None) => Ok(self.action()),
+        }
+    }
+
+    /// What was done in House, as an action that can be taken again.
     pub(crate) fn action(&self) -> Action {
         Action { kind: self.kind, target: self.target }
+    }
+
+    /// How many subtasks these steps completed. Where an environment's actions are its own, one step may complete several.
+    pub(crate) fn completed(steps: &[TraceStep]) -> u32 {
+        let is_elsewhere = steps.iter().any(|step| step.own.is_some());
+        let mut completing = steps.iter().filter_map(|step| step.subtask);
+        if is_elsewhere { completing.max().map_or(0, |last| last + 1) } else { completing.by_ref().count() as u32 }
+    }
+
+    /// Whether the same was done, whatever came of it.
+    pub(crate) fn is_same_action(&self, other: &TraceStep) -> bool {
+        let named = |step: &TraceStep| step.own.as_ref().map(|own| (own.action.clone(), own.argument.clone()));
+        (self.kind, self.target) == (other.kind, other.target) && named(self) == named(other)
+    }
+
+    /// What was done, in words, for whoever compares records.
+    pub(crate) fn action_in_words(&self) -> String {
+        match &self.own {
+            None => format!("{:?}", self.action()),
+            Some(OwnStep { action, argument: None, .. }) => action.clone(),
+            Some(OwnStep { action, argument: Some(argument), .. }) => format!("{action} {argument}"),
+        }
     }
 
     /// The record of a step that `rollout` just took.
@@ -215,8 +282,14 @@ impl TraceStep {
         let action = tick.decision.action;
         let completed = rollout.env.grading().map_or(0, |(completed, _)| completed as u32);
         TraceStep {
-            kind: action.kind,
-            target: action.target,
+            // The name says which; the place is this process's own.
+            kind: if is_own(&action.kind) { own() } else { action.kind },
+            own: rollout.env.own().and_then(|view| {
+                let (name, argument) = view.space.parts(action)?;
+                let seen = view.observation.digest.clone();
+                Some(OwnStep { action: name.to_owned(), argument, reward: tick.reward, seen })
+            }),
+            target: action.target.filter(|_| !is_own(&action.kind)),
             class: action.target.and_then(|target| rollout.env.class_of(target)),
             outcome: tick.outcome,
             subtask: tick.completed_one.then(|| completed.saturating_sub(1)),

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::agent::{Decision, Decisions, Observation, Policy, Values};
 use crate::domain::Action;
+use crate::env::environment::Transition;
 use crate::env::{Environment, HouseEnvironment};
 use crate::house::grading::Grader;
 use crate::house::{House, Outcome};
@@ -37,6 +38,8 @@ pub(crate) struct Tick {
     pub(crate) outcome: Outcome,
     /// A subtask was completed by it.
     pub(crate) completed_one: bool,
+    /// What it earned, where the environment tells.
+    pub(crate) reward: Option<f64>,
 }
 
 /// Why an episode is over.
@@ -47,6 +50,8 @@ pub(crate) enum End {
     Success,
     /// The horizon is reached.
     Timeout,
+    /// The environment ended it by itself.
+    Environment,
 }
 
 /// Whose word ends an episode before its time.
@@ -158,6 +163,9 @@ impl<E: Environment> Rollout<E> {
         if self.ended_by.is_grader() && self.env.grading().is_some_and(|(completed, of)| completed == of) {
             return Some(End::Success);
         }
+        if self.env.own().is_some_and(|own| own.observation.done) {
+            return Some(End::Environment);
+        }
         self.horizon.is_some_and(|horizon| self.steps >= horizon).then_some(End::Timeout)
     }
 
@@ -195,7 +203,8 @@ impl<E: Environment> Rollout<E> {
         self.steps += 1;
         self.last = Some(action);
         let completed_one = transition.completed_subtask;
-        Ok(Tick { step: self.steps, decision, outcome: transition.outcome, completed_one })
+        let Transition { outcome, reward, .. } = transition;
+        Ok(Tick { step: self.steps, decision, outcome, completed_one, reward })
     }
 
     /// Lets a policy act until the episode is over or `observer` ends it.

@@ -52,6 +52,7 @@ impl Scenes {
                 Ok((Arc::new(scene), Some(world)))
             }
             SceneRef::Named(name) => Ok((self.named(name)?, None)),
+            SceneRef::Elsewhere => bail!("the task plays in another environment than House"),
         }
     }
 
@@ -93,6 +94,12 @@ impl Scenes {
         let mut digest = Sha256::new();
         let mut seen = BTreeSet::new();
         for (i, task) in tasks.iter().enumerate() {
+            if let Some((env, _)) = task.played_elsewhere() {
+                if seen.insert(env.to_string()) {
+                    digest.update(env.to_string());
+                }
+                continue;
+            }
             let setting = self.setting(task).map_err(|error| anyhow!("tasks[{i}].{error:#} (task {:?})", task.id))?;
             if seen.insert(setting.scene.name.clone()) {
                 digest.update(serde_json::to_vec(&*setting.scene)?);

@@ -11,6 +11,7 @@ use super::worker_pool;
 use crate::agent::policy_source::MakePolicy;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
+use crate::env::remote::Elsewhere;
 use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::{Scenes, Setting};
@@ -88,8 +89,20 @@ impl Evaluation {
             shard: options.shard,
         };
         manifest.check()?;
-        let plan = EvaluationPlan { tasks: tasks.into(), scenes: Arc::new(scenes), options, read: Arc::new(read) };
+        let plan = EvaluationPlan {
+            tasks: tasks.into(),
+            scenes: Arc::new(scenes),
+            options,
+            elsewhere: Elsewhere::default(),
+            read: Arc::new(read),
+        };
         Ok(Evaluation { plan, manifest })
+    }
+
+    /// The same, with environments in other processes reached like this.
+    pub(crate) fn reaching(mut self, elsewhere: Elsewhere) -> Evaluation {
+        self.plan.elsewhere = elsewhere;
+        self
     }
 
     /// What identifies this run.
@@ -137,7 +150,7 @@ impl Evaluation {
 /// Gives the tasks that only say an instruction the subtasks as which it is read; what was read, by the tasks' places.
 fn read_untold(tasks: &mut [Task], scenes: &Scenes) -> anyhow::Result<BTreeMap<usize, Wish>> {
     let mut found = BTreeMap::new();
-    for (i, task) in tasks.iter_mut().enumerate().filter(|(_, task)| task.subtasks.is_empty()) {
+    for (i, task) in tasks.iter_mut().enumerate().filter(|(_, task)| task.subtasks.is_empty() && task.env.is_none()) {
         let setting = scenes.setting(task)?;
         let wish =
             read_instruction(task, &setting).map_err(|problem| anyhow::anyhow!("tasks[{i}].subtasks: {problem}"))?;
@@ -167,6 +180,11 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
         && let Some(i) = tasks.iter().position(|task| task.sentences.is_empty())
     {
         anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
+    }
+    if let Some(i) = tasks.iter().position(|task| task.env.is_some())
+        && options.every_start
+    {
+        anyhow::bail!("tasks[{i}].env: only the expert of House can lead to a later subtask; leave out --from-subtask");
     }
     if options.grading == Grading::Strict {
         let is_unrecorded = |task: &&Task| task.subtasks.iter().any(|subtask| subtask.literal.is_none());
@@ -347,6 +365,8 @@ pub(crate) mod tests {
             horizon: 30,
             goal: None,
             source: None,
+            env: None,
+            seed: None,
             reworded: false,
         };
         let names: BTreeSet<&str> = world.objects.iter().map(|object| object.class.name()).collect();

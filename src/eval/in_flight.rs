@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::plan::EvaluationPlan;
 use crate::episode::failure::Failure;
-use crate::episode::record::Episode;
+use crate::episode::record::{Episode, TraceStep};
 use crate::episode::wish::{Wish, WishVerdict};
 use crate::episode::{diagnosis, instruction_variant};
 use crate::run_dir::episode_spec::EpisodeSpec;
@@ -66,10 +66,16 @@ impl InFlight {
         let episode = &mut self.episode;
         let own = &episode.trace[(episode.prefix_steps as usize).min(episode.trace.len())..];
         episode.steps = own.len() as u32;
-        episode.completed = own.iter().filter(|step| step.subtask.is_some()).count() as u32;
+        episode.completed = TraceStep::completed(own);
         let end = evaluation.options.end;
+        let is_elsewhere = evaluation.tasks[self.spec.task].env.is_some();
+        if is_elsewhere {
+            episode.of = episode.of.max(episode.completed);
+            let mut rewards = own.iter().filter_map(|step| step.own.as_ref()?.reward).peekable();
+            episode.earned = rewards.peek().is_some().then(|| rewards.sum());
+        }
         episode.success = episode.is_success(end);
-        if !episode.success && episode.error.is_none() {
+        if !episode.success && episode.error.is_none() && !is_elsewhere {
             let task = &evaluation.tasks[self.spec.task];
             // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
             let class = guarded(|| {

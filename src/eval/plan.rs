@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::options::Options;
 use crate::domain::Task;
+use crate::env::remote::Elsewhere;
 use crate::episode::scenes::Scenes;
 use crate::episode::wish::Wish;
 
@@ -14,6 +15,8 @@ pub(crate) struct EvaluationPlan {
     pub(crate) tasks: Arc<[Task]>,
     pub(crate) scenes: Arc<Scenes>,
     pub(crate) options: Options,
+    /// How environments in other processes are reached.
+    pub(crate) elsewhere: Elsewhere,
     /// What tasks without subtasks were read as, by their places.
     pub(crate) read: Arc<BTreeMap<usize, Wish>>,
 }

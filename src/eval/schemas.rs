@@ -55,6 +55,7 @@ mod tests {
         let (tasks, episodes) = sample();
         let all = RunManifest { instruction_variants: true, all_start_subtasks: true, ..manifest() };
         let step = TraceStep {
+            own: None,
             kind: ActionType::Pickup,
             target: Some(Instance::Object(3)),
             class: Class::named("Mug"),

@@ -9,6 +9,7 @@ use anyhow::Context;
 use super::executor::{Executor, Message};
 use super::in_flight::{InFlight, Watchdog, guarded};
 use crate::agent::{Decision, ExpertPolicy, Policy};
+use crate::env::remote::{RemoteEnvironment, Sessions};
 use crate::env::{Environment, HouseEnvironment};
 use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::{AfterEach, Rollout, decide_all};
@@ -24,6 +25,8 @@ pub(crate) struct Worker {
     watchdog: Arc<Watchdog>,
     policy: Option<Box<dyn Policy>>,
     rollouts: Vec<Option<AnyRollout>>,
+    /// Environments in other processes, a session a slot.
+    sessions: Sessions,
     /// The one episode under way is to be played with no other beside it.
     is_alone: bool,
 }
@@ -35,7 +38,8 @@ impl Worker {
     pub(crate) fn new(executor: Arc<Executor>, watchdog: Arc<Watchdog>, policy: Option<Box<dyn Policy>>) -> Worker {
         let slots = watchdog.lock().slots.len();
         let rollouts = (0..slots).map(|_| None).collect();
-        Worker { executor, watchdog, policy, rollouts, is_alone: false }
+        let sessions = Sessions::new(executor.evaluation.elsewhere.clone());
+        Worker { executor, watchdog, policy, rollouts, sessions, is_alone: false }
     }
 
     /// Plays what is wanted until there is nothing left, or nobody waits for it any more.
@@ -126,7 +130,7 @@ impl Worker {
         self.record(|slots| slots[slot] = Some(in_flight))?;
         self.rollouts[slot] = None;
         let ready = guarded(|| {
-            self.rollouts[slot] = Some(start(&executor, spec, &mut episode)?);
+            self.rollouts[slot] = Some(start(&executor, &mut self.sessions, slot, spec, &mut episode)?);
             self.policy()?.reset(slot, policy_seed(spec.task, spec.seed));
             Ok(())
         });
@@ -227,9 +231,27 @@ impl Worker {
 }
 
 /// Sets an episode to its start.
-fn start(executor: &Executor, spec: EpisodeSpec, episode: &mut Episode) -> anyhow::Result<AnyRollout> {
+fn start(
+    executor: &Executor,
+    sessions: &mut Sessions,
+    slot: usize,
+    spec: EpisodeSpec,
+    episode: &mut Episode,
+) -> anyhow::Result<AnyRollout> {
     let evaluation = &executor.evaluation;
     let task = &evaluation.tasks[spec.task];
+    if let Some((name, seed)) = task.played_elsewhere() {
+        let env = RemoteEnvironment::begin(sessions.get(slot, name)?, seed)?;
+        episode.start_hash = env.fingerprint().unwrap_or_default();
+        episode.of = env.grading().map_or(0, |(_, of)| of as u32);
+        if let (true, Some(view)) = (task.instruction.is_empty(), env.own()) {
+            episode.instruction = view.mission();
+        }
+        let mut rollout =
+            Rollout::new(Box::new(env) as Box<dyn Environment>, episode.instruction.clone(), Some(task.horizon));
+        rollout.ended_by = evaluation.options.end;
+        return Ok(rollout);
+    }
     let setting = evaluation.scenes.setting(task)?;
     let house = House::new(setting.scene, setting.world);
     let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));

@@ -181,7 +181,9 @@ const BACK: &str = "reset goes back to its start, sprint explore opens other hou
 fn generated(start: &EpisodeStart) -> anyhow::Result<(Room, u64)> {
     match start.reference {
         SceneRef::Generated { room, seed } => Ok((room, seed)),
-        SceneRef::Named(_) => anyhow::bail!("a session that was taken up has no next one in this floor plan; {BACK}"),
+        SceneRef::Named(_) | SceneRef::Elsewhere => {
+            anyhow::bail!("a session that was taken up has no next one in this floor plan; {BACK}")
+        }
     }
 }
 
@@ -201,6 +203,8 @@ fn task_of(trajectory: &Trajectory) -> Task {
         horizon: 2 * steps,
         goal: trajectory.goal.clone(),
         source: Some((trajectory.id.clone(), 0)),
+        env: None,
+        seed: None,
         reworded: false,
     }
 }

@@ -4,6 +4,7 @@
 pub(crate) mod breakpoints;
 pub(crate) mod chain_report;
 pub(crate) mod choices;
+pub(crate) mod elsewhere;
 pub mod episode_source;
 pub mod exploration;
 pub(crate) mod example_wishes;

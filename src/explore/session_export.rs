@@ -97,6 +97,8 @@ pub(crate) fn ungraded(scene: SceneRef) -> Task {
         horizon: 0,
         goal: None,
         source: None,
+        env: None,
+        seed: None,
         reworded: false,
     }
 }

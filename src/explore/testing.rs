@@ -108,6 +108,7 @@ pub(crate) fn decided(now: &SessionSnapshot) -> SessionEvent {
     let action = now.candidates[0].action();
     SessionEvent::Decided(
         Decision {
+            own: None,
             action,
             distribution: Some(ActionDistribution { actions, objects, choices, entropy: 1.13, greedy: action }),
             values: None,

@@ -20,6 +20,6 @@ pub(crate) mod testing;
 pub mod validate;
 pub mod view;
 
-pub(crate) use outcome::Outcome;
+pub(crate) use outcome::{Outcome, Reason};
 pub(crate) use replay::Replay;
 pub use session::House;

@@ -37,6 +37,8 @@ impl std::fmt::Display for Outcome {
 pub enum Reason {
     #[error("something is in the way")]
     Blocked,
+    #[error("the environment refused it")]
+    Refused,
     #[error("the camera cannot look further up")]
     HighestLook,
     #[error("the camera cannot look further down")]

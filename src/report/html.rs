@@ -121,7 +121,8 @@ pub(crate) fn in_script(value: &impl serde::Serialize) -> anyhow::Result<String>
 
 /// Frames of an episode: the start, what each completed subtask left, the end; each with the step it follows, as a PNG.
 fn frames_of(run: &RecordedRun, task: &Task, episode: &Episode, most: usize) -> anyhow::Result<Vec<serde_json::Value>> {
-    if most == 0 || episode.start_hash.is_empty() {
+    // An environment in another process would have to be there; a page is of what lies on the disk.
+    if most == 0 || episode.start_hash.is_empty() || task.env.is_some() {
         return Ok(Vec::new());
     }
     let done = episode.trace.iter().enumerate().filter(|(_, step)| step.subtask.is_some()).map(|(i, _)| i + 1);
@@ -167,6 +168,7 @@ mod tests {
     #[test]
     fn a_wish_that_two_branches_share_counts_once() {
         let step = |kind| TraceStep {
+            own: None,
             kind,
             target: None,
             class: None,

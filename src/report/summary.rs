@@ -56,6 +56,9 @@ pub struct RunSummary {
     pub(crate) success: f64,
     /// The 95 % Wilson interval of `success`, lower end first.
     pub(crate) success_interval: Interval,
+    /// What an episode's steps earned together, where the environment tells.
+    #[serde(rename = "return", default, skip_serializing_if = "Option::is_none")]
+    pub(crate) earned: Option<Mean>,
     /// Completed subtasks of an episode.
     pub(crate) completed_subtasks: Mean,
     /// Completed subtasks of an episode as a share of its subtasks.
@@ -127,6 +130,7 @@ impl RunSummary {
             errors: every.iter().iter().filter(|(_, episode)| episode.error.is_some()).count(),
             success: stats::mean(all.iter().map(|(_, episode)| episode.succeeded())),
             success_interval: stats::wilson_of_groups(&plain.values(Episode::succeeded)),
+            earned: earned(&plain),
             completed_subtasks: Mean::of(&plain.values(|episode| f64::from(episode.completed)), [0.0, longest]),
             progress: Mean::of(&plain.values(Episode::progress), [0.0, 1.0]),
             progress_by_length: by_length(Episode::progress),
@@ -163,6 +167,15 @@ impl RunSummary {
             },
         }
     }
+}
+
+/// The mean return of the episodes that have one.
+fn earned(plain: &EpisodesByTask<'_>) -> Option<Mean> {
+    let told = plain.filter(|episode| episode.earned.is_some());
+    let values = told.values(|episode| episode.earned.unwrap_or_default());
+    let all = || values.iter().flatten().copied();
+    let bounds = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
+    all().next().is_some().then(|| Mean::of(&values, bounds))
 }
 
 #[cfg(test)]

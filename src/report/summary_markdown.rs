@@ -77,8 +77,14 @@ impl RunSummary {
             ["completed subtasks".into(), format!("{:.2}", completed.mean), format!("{low:.2} to {high:.2}")],
             ["progress".into(), percent(self.progress.mean), between(self.progress.interval)],
             ["steps".into(), format!("{:.1}", self.steps_mean), String::new()],
-            ["steps of the expert".into(), format!("{:.1}", self.expert_steps_mean), String::new()],
         ];
+        if let Some(earned) = self.earned {
+            let [low, high] = earned.interval;
+            whole.push(["return".into(), format!("{:.3}", earned.mean), format!("{low:.3} to {high:.3}")]);
+        }
+        if self.earned.is_none() || self.expert_steps_mean > 0.0 {
+            whole.push(["steps of the expert".into(), format!("{:.1}", self.expert_steps_mean), String::new()]);
+        }
         if let Some(ratio) = self.steps_over_expert {
             let [low, high] = ratio.interval;
             let name = "steps of successes / expert's".into();

@@ -93,6 +93,15 @@ impl RecordedRun {
         Ok(all)
     }
 
+    /// The task of an episode.
+    ///
+    /// # Errors
+    /// When the set has no such task.
+    pub(crate) fn task(&self, episode: &Episode) -> anyhow::Result<&Task> {
+        let found = self.set.tasks.iter().find(|task| task.id == episode.task);
+        found.with_context(|| format!("the tasks hold no {:?}", episode.task))
+    }
+
     /// The task of an episode, with its position in the set, and where it starts.
     ///
     /// # Errors
@@ -150,7 +159,8 @@ fn tasks_of(run: &Path, manifest: &RunManifest, file: Option<&Path>) -> anyhow::
         manifest.task_set
     );
     let path = file.unwrap_or(&own);
-    let Document { value: mut set, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    let Document { value, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    let mut set = value.filled();
     if file.is_some() {
         ensure!(
             digest == manifest.task_set_hash,

@@ -6,6 +6,7 @@
 pub mod app;
 mod capabilities;
 mod completion;
+pub(crate) mod elsewhere;
 pub mod config;
 pub(crate) mod editor;
 pub mod graphics;

@@ -95,7 +95,7 @@ pub(super) fn pick<W: Write>(
                 display.swap_buffers();
                 is_stopped = false;
             }
-            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Ready => {}
+            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Elsewhere(_) | Msg::Ready => {}
         }
     }
 }

@@ -39,6 +39,7 @@ pub(crate) fn watch(tell: SyncSender<Msg>) -> io::Result<()> {
                     let left = insist(&Msg::Signal(number));
                     std::thread::sleep(left);
                     terminal::give_back();
+                    crate::env::remote::end_children();
                     std::process::exit(128 + number);
                 }
             }

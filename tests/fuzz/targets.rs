@@ -174,7 +174,7 @@ fn finished(at: &Path) -> anyhow::Result<()> {
     run.episode_specs();
     Comparison::of(&[RecordedRun::open_evaluated(&path)?, run])?.0.markdown();
     let recorded = RecordedRun::open(&path, None)?;
-    verify(&recorded, &mut |_| Ok(None), 1, &mut |_| ())?;
+    verify(&recorded, &mut |_| Ok(None), 1, &Default::default(), &mut |_| ())?;
     RunWriter::open(&path, &recorded.manifest).map(drop)
 }
 

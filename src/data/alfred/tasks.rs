@@ -216,6 +216,8 @@ pub(crate) fn span_task(
         horizon: 2 * expert_steps,
         goal: trajectory.goal.clone(),
         source: Some((trajectory.id.clone(), span.start as u8)),
+        env: None,
+        seed: None,
         reworded: false,
     })
 }

@@ -283,6 +283,7 @@ mod tests {
 
     fn taken(kind: ActionType, told: &str) -> TakenStep {
         let step = TraceStep {
+            own: None,
             kind,
             target: None,
             class: None,

@@ -90,6 +90,8 @@ fn as_task(grader: &Grader, scene: &Arc<Scene>, world: &World) -> (Task, Setting
         horizon: 1,
         goal: None,
         source: None,
+        env: None,
+        seed: None,
         reworded: false,
     };
     (task, Setting { scene: scene.clone(), world: world.clone() })

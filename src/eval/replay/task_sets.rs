@@ -31,7 +31,9 @@ pub(super) fn scene_of<'a>(
 ) -> anyhow::Result<&'a Arc<Scene>> {
     match reference {
         SceneRef::Named(name) => scenes.get(name).with_context(|| format!("no scene {name:?}")),
-        SceneRef::Generated { .. } => anyhow::bail!("generated scenes hold no recordings to replay"),
+        SceneRef::Generated { .. } | SceneRef::Elsewhere => {
+            anyhow::bail!("generated scenes hold no recordings to replay")
+        }
     }
 }
 

@@ -105,7 +105,7 @@ fn meaning(path: &Path, document: &Value, found: &mut Vec<(String, String)>) {
             }
             Ok(task) => {
                 let misfits = taskset::misfits_told(&task);
-                match misfits.is_empty().then(|| scenes.setting(&task)) {
+                match (misfits.is_empty() && task.env.is_none()).then(|| scenes.setting(&task)) {
                     Some(Err(error)) => {
                         let text = format!("{error:#}");
                         let (field, problem) = text.split_once(": ").unwrap_or(("scene", &text));

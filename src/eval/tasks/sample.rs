@@ -170,6 +170,7 @@ pub(crate) fn sample_dataset(
     let fits = |trajectory: &Trajectory| match &trajectory.scene {
         SceneRef::Named(name) => scenes.get(name).is_some_and(|scene| spec.rooms.contains(&scene.room)),
         SceneRef::Generated { room, .. } => spec.rooms.contains(room),
+        SceneRef::Elsewhere => false,
     };
     let mut spans: Vec<(u32, usize)> = Vec::new();
     for (number, trajectory) in (0..).zip(dataset.trajectories()?) {
@@ -202,6 +203,7 @@ pub(crate) fn sample_dataset(
             let span = first..first + spec.length;
             let id = format!("{}-{first}-{place}", trajectory.id);
             let scene = match &trajectory.scene {
+                SceneRef::Elsewhere => None,
                 SceneRef::Named(name) => scenes.get(name).cloned(),
                 SceneRef::Generated { room, seed } => Some(generate::house(*room, *seed).0.into()),
             };

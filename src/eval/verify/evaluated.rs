@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::verdict::{Agreement, Mismatch};
 use crate::agent::policy_source::PolicySource;
+use crate::env::remote::Elsewhere;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::rollout::EndedBy;
 use crate::eval::options::Options;
@@ -24,6 +25,7 @@ pub(super) fn play_again(
     specs: &[EpisodeSpec],
     source: &PolicySource,
     jobs: usize,
+    elsewhere: &Elsewhere,
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<BTreeMap<EpisodeKey, Agreement>> {
     let recorded: BTreeMap<EpisodeKey, &Episode> =
@@ -31,6 +33,7 @@ pub(super) fn play_again(
     let plan = EvaluationPlan {
         tasks: run.set.tasks.clone().into(),
         scenes: Arc::new(run.scenes.clone()),
+        elsewhere: elsewhere.clone(),
         read: Arc::default(),
         options: Options {
             jobs,
@@ -69,12 +72,12 @@ fn first_mismatch(recorded: &Episode, found: &Episode, end: EndedBy, agreed: &mu
     }
     for (number, step) in (1..).zip(&recorded.trace) {
         let is_choice = number > recorded.prefix_steps;
-        let choice = |found: String| Some(Mismatch::at(number, "choice", format!("{:?}", step.action()), found));
+        let choice = |found: String| Some(Mismatch::at(number, "choice", step.action_in_words(), found));
         let Some(again) = found.trace.get(number as usize - 1) else {
             return choice(found.error.clone().unwrap_or_else(|| "the episode is over".into()));
         };
-        if is_choice && again.action() != step.action() {
-            return choice(format!("{:?}", again.action()));
+        if is_choice && !again.is_same_action(step) {
+            return choice(again.action_in_words());
         }
         agreed.choices += usize::from(is_choice);
         if let Some(mismatch) = Mismatch::of_step(number, step, again) {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::episode::record::{Episode, TraceStep};
+use crate::episode::record::{Episode, OwnStep, TraceStep};
 use crate::episode::rollout::EndedBy;
 use crate::language::count::counted;
 
@@ -74,6 +74,9 @@ impl Mismatch {
         let what = match () {
             () if found.outcome != recorded.outcome => "outcome",
             () if found.subtask != recorded.subtask || found.class != recorded.class => "subtask",
+            () if found.own != recorded.own => {
+                return Some(Mismatch::at(step, "what is seen", seen(recorded), seen(found)));
+            }
             () => return None,
         };
         let text = |step: &TraceStep| format!("{}, subtask {:?}, class {:?}", step.outcome, step.subtask, step.class);
@@ -83,7 +86,7 @@ impl Mismatch {
     /// The difference between what an episode says that it came to and what its own steps come to.
     pub(super) fn of_counts(episode: &Episode, ended_by: EndedBy) -> Option<Mismatch> {
         let own = episode.trace.get(episode.prefix_steps as usize..).unwrap_or_default();
-        let completed = episode.own_steps().iter().filter(|step| step.subtask.is_some()).count() as u32;
+        let completed = TraceStep::completed(episode.own_steps());
         let mut counted = Episode { completed, steps: own.len() as u32, trace: Vec::new(), ..episode.clone() };
         counted.success = counted.is_success(ended_by);
         let (recorded, found) = (counts(episode), counts(&counted));
@@ -95,6 +98,12 @@ impl Mismatch {
         let (recorded, found) = (counts(recorded), counts(found));
         (recorded != found).then(|| Mismatch::at(0, "result", recorded, found))
     }
+}
+
+/// What an environment with actions of its own showed after a step, in words.
+fn seen(step: &TraceStep) -> String {
+    let earned = |own: &OwnStep| own.reward.map_or(String::new(), |reward| format!(", reward {reward}"));
+    step.own.as_ref().map_or_else(|| "nothing".into(), |own| format!("{}{}", own.seen, earned(own)))
 }
 
 fn counts(episode: &Episode) -> String {

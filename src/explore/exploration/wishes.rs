@@ -227,7 +227,7 @@ impl Exploration {
     fn judge_by_grader(&mut self) {
         let verdict = match self.rollout.end() {
             Some(End::Success) => WishVerdict::Done,
-            Some(End::Timeout) => WishVerdict::OutOfTime,
+            Some(End::Timeout | End::Environment) => WishVerdict::OutOfTime,
             None => return,
         };
         if let Some(wish) = self.wishes.last_mut() {

@@ -56,6 +56,8 @@ pub fn task(scene: &Scene, world: &World, reference: SceneRef, length: usize, rn
             horizon: 2 * steps,
             goal: None,
             source: None,
+            env: None,
+            seed: None,
             reworded: false,
         })
     })

@@ -16,6 +16,7 @@ use ratatui::layout::Size;
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::Verb;
 use crate::tui::app::App;
+use crate::tui::elsewhere::OwnEvent;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
@@ -49,6 +50,8 @@ pub enum Msg {
     Signal(i32),
     /// The worker stopped.
     WorkerGone,
+    /// An exploration of an environment with actions of its own tells something.
+    Elsewhere(Box<OwnEvent>),
 }
 
 /// Changes the state by one message.
@@ -116,6 +119,8 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         }
         Msg::Signal(number) => vec![Effect::Quit(ExitReason::Signal(number))],
         Msg::WorkerGone => vec![Effect::Quit(ExitReason::WorkerGone)],
+        // It has a screen of its own.
+        Msg::Elsewhere(_) => vec![],
     }
 }
 

@@ -14,7 +14,7 @@ mod map;
 mod meaning;
 mod mind;
 mod palette;
-mod panel;
+pub(crate) mod panel;
 mod picture;
 mod reach;
 pub(super) mod start;

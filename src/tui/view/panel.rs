@@ -10,7 +10,7 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use crate::tui::theme::THEME;
 
 /// Draws a panel's title over a rule, with something quiet at its right; returns the rest of the panel.
-pub(super) fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
+pub(crate) fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
     let width = usize::from(area.width);
     let right = fit(right, width.saturating_sub(title.width() + 4));
     let rule = width.saturating_sub(title.width() + 1 + if right.is_empty() { 0 } else { right.width() + 1 });
@@ -24,7 +24,7 @@ pub(super) fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> R
 }
 
 /// Text cut to `width` columns, the cut marked.
-pub(super) fn fit(text: &str, width: usize) -> String {
+pub(crate) fn fit(text: &str, width: usize) -> String {
     if text.width() <= width {
         return text.to_string();
     }
@@ -42,7 +42,7 @@ pub(super) fn fit(text: &str, width: usize) -> String {
 }
 
 /// Lines of at most `width` columns, broken at spaces; later lines start with `indent`.
-pub(super) fn wrap(text: &str, width: usize, indent: &str) -> Vec<String> {
+pub(crate) fn wrap(text: &str, width: usize, indent: &str) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         let fresh = lines.len() > 1;
@@ -61,7 +61,7 @@ pub(super) fn wrap(text: &str, width: usize, indent: &str) -> Vec<String> {
 }
 
 /// A bar of `share` (0 to 1) of `width` columns, in eighths of a column.
-pub(super) fn bar(share: f32, width: usize) -> String {
+pub(crate) fn bar(share: f32, width: usize) -> String {
     const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
     let eighths = (share.clamp(0.0, 1.0) * 8.0 * width as f32).round() as usize;
     let mut bar = "█".repeat(eighths / 8);
@@ -72,17 +72,17 @@ pub(super) fn bar(share: f32, width: usize) -> String {
 }
 
 /// A probability in three columns: `.07`, `1.0`.
-pub(super) fn share(p: f32) -> String {
+pub(crate) fn share(p: f32) -> String {
     if p >= 0.995 { "1.0".into() } else { format!("{p:.2}").trim_start_matches('0').to_string() }
 }
 
 /// A number without the sign of a zero: what rounds to 0.00 is not below it.
-pub(super) fn unsigned_zero(x: f32) -> f32 {
+pub(crate) fn unsigned_zero(x: f32) -> f32 {
     if x.abs() < 0.005 { 0.0 } else { x }
 }
 
 /// A line of text at a row of an area.
-pub(super) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String>, style: Style) {
+pub(crate) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String>, style: Style) {
     if row < area.height {
         let line = Rect { y: area.y + row, height: 1, ..area };
         Line::styled(fit(&text.into(), usize::from(area.width)), style).render(line, buf);

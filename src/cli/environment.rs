@@ -1,0 +1,33 @@
+//! Which environment, from the command line.
+
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::domain::EnvironmentName;
+use crate::env::remote::{Elsewhere, Patience};
+
+/// Where it happens.
+#[derive(Args, Clone)]
+pub(crate) struct EnvironmentChoice {
+    /// The environment: house, gym:ID (a Gymnasium environment in a child process), or openenv:URL (a server that speaks
+    /// `OpenEnv`). With tasks of another environment than House: where that is found now [default: house, or the tasks' own]
+    #[arg(long, value_name = "house|gym:ID|openenv:URL")]
+    env: Option<EnvironmentName>,
+    /// How long an environment in another process may take for each answer
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    env_timeout: u64,
+}
+
+impl EnvironmentChoice {
+    /// The environment that was named, where that is not House.
+    pub(crate) fn elsewhere(&self) -> Option<&EnvironmentName> {
+        self.env.as_ref().filter(|name| **name != EnvironmentName::House)
+    }
+
+    /// How environments in other processes are reached.
+    pub(crate) fn reach(&self) -> Elsewhere {
+        let answer = Duration::from_secs(self.env_timeout);
+        Elsewhere { patience: Patience { answer, ..Patience::USUAL }, found_at: self.elsewhere().cloned() }
+    }
+}

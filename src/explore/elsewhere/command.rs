@@ -1,0 +1,110 @@
+//! What a person can ask of an exploration in an environment with actions of its own: typed, or by a key.
+
+use std::path::PathBuf;
+
+use super::breakpoint::OwnCondition;
+
+/// Something that is asked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum OwnCommand {
+    /// Take so many steps, or follow what was tried.
+    Step(u32),
+    /// Go on until something stops it.
+    Run,
+    /// Stop going on.
+    Pause,
+    /// Go so many steps back or forth on the branch in hand.
+    Move(i64),
+    /// Go to that step of the branch in hand.
+    Goto(u32),
+    /// Do that.
+    Act(String),
+    /// Tell the agent that; nothing brings back what the environment asks.
+    Instruct(String),
+    /// Compare what is told with that.
+    Compare(String),
+    /// Let chance act.
+    Chance,
+    /// Let the policy of the command line act.
+    Agent,
+    /// Begin the episode of that seed.
+    Begin(u64),
+    /// Begin the episode of the next seed.
+    Next,
+    /// Go to the start.
+    Reset,
+    /// Take that branch in hand, from 1.
+    Branch(usize),
+    /// Stop there, or where it is set already, no longer.
+    Break(OwnCondition),
+    /// Write a run.
+    Save(Option<PathBuf>),
+    /// Show what is seen, what can be done, and how likely each is.
+    Look,
+    /// List the branches.
+    Branches,
+    /// End.
+    Quit,
+}
+
+/// What there is, for whoever asks.
+pub(crate) const HELP: &str = "step [N], run, back [N], forward [N], goto N, act NAME [ARGUMENT], instruct [TEXT], \
+    compare TEXT, chance, agent, begin SEED, next, reset, branch N, branches, break CONDITION, save [FOLDER], look, quit";
+
+impl OwnCommand {
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// Says what there is.
+    pub(crate) fn parse(line: &str) -> Result<OwnCommand, String> {
+        let line = line.trim();
+        let (word, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(word, rest)| (word, rest.trim()));
+        let number = |missing: u32| match rest {
+            "" => Ok(missing),
+            text => text.parse::<u32>().map_err(|_| format!("{word}: {text:?} is not a number")),
+        };
+        let needed = || rest.parse::<u64>().map_err(|_| format!("{word}: {rest:?} is not a number"));
+        let text = || if rest.is_empty() { Err(format!("{word} needs words after it")) } else { Ok(rest.to_owned()) };
+        match word {
+            "step" | "n" => Ok(OwnCommand::Step(number(1)?)),
+            "run" => Ok(OwnCommand::Run),
+            "back" | "h" => Ok(OwnCommand::Move(-i64::from(number(1)?))),
+            "forward" | "l" => Ok(OwnCommand::Move(i64::from(number(1)?))),
+            "goto" => Ok(OwnCommand::Goto(needed()?.min(u64::from(u32::MAX)) as u32)),
+            "act" => Ok(OwnCommand::Act(text()?)),
+            "instruct" | "i" => Ok(OwnCommand::Instruct(rest.to_owned())),
+            "compare" => Ok(OwnCommand::Compare(text()?)),
+            "chance" => Ok(OwnCommand::Chance),
+            "agent" => Ok(OwnCommand::Agent),
+            "begin" => Ok(OwnCommand::Begin(needed()?)),
+            "next" => Ok(OwnCommand::Next),
+            "reset" => Ok(OwnCommand::Reset),
+            "branch" => Ok(OwnCommand::Branch(needed()? as usize)),
+            "branches" => Ok(OwnCommand::Branches),
+            "break" => Ok(OwnCommand::Break(OwnCondition::parse(rest)?)),
+            "save" => Ok(OwnCommand::Save((!rest.is_empty()).then(|| rest.into()))),
+            "look" => Ok(OwnCommand::Look),
+            "quit" | "q" => Ok(OwnCommand::Quit),
+            _ => Err(format!("{word:?} is none of: {HELP}")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_reads_as_what_is_asked_and_others_say_what_there_is() {
+        assert_eq!(OwnCommand::parse(" step 3 "), Ok(OwnCommand::Step(3)));
+        assert_eq!(OwnCommand::parse("back"), Ok(OwnCommand::Move(-1)));
+        assert_eq!(OwnCommand::parse("act open red door"), Ok(OwnCommand::Act("open red door".into())));
+        assert_eq!(OwnCommand::parse("instruct"), Ok(OwnCommand::Instruct(String::new())));
+        assert_eq!(OwnCommand::parse("break reward"), Ok(OwnCommand::Break(OwnCondition::Reward)));
+        for (line, told) in
+            [("dance", "none of: step"), ("goto x", "not a number"), ("act", "needs words"), ("break it", "sees NAME")]
+        {
+            assert!(OwnCommand::parse(line).unwrap_err().contains(told), "{line}");
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The same without a screen: a line in, plain lines out.
+
+use std::io::{BufRead, Write};
+
+use super::command::OwnCommand;
+use super::exploration::{OwnExploration, OwnStepTaken};
+use super::view::OwnChoice;
+use crate::agent::policy_source::PolicySource;
+use crate::data::text_file;
+
+/// The most steps of a run that nothing stops.
+const MOST: u32 = 100_000;
+
+/// Obeys lines until `quit` or the end of the input; says whether all of them could be obeyed.
+///
+/// # Errors
+/// When reading or writing fails.
+pub(crate) fn run(
+    mut exploration: OwnExploration,
+    agent: &PolicySource,
+    input: impl BufRead,
+    mut out: impl Write,
+) -> anyhow::Result<bool> {
+    let mut obeyed = true;
+    writeln!(out, "{}, seed {}", exploration.name(), exploration.seed())?;
+    writeln!(out, "told: {}", exploration.instruction())?;
+    for line in input.lines() {
+        let line = line?;
+        let line = text_file::line(&line).trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let done = match OwnCommand::parse(line) {
+            Ok(OwnCommand::Quit) => break,
+            Ok(command) => obey(&mut exploration, agent, command, &mut out),
+            Err(complaint) => Err(anyhow::anyhow!(complaint)),
+        };
+        if let Err(error) = done {
+            obeyed = false;
+            writeln!(out, "error: {error:#}")?;
+        }
+        out.flush()?;
+    }
+    Ok(obeyed)
+}
+
+fn obey(
+    exploration: &mut OwnExploration,
+    agent: &PolicySource,
+    command: OwnCommand,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let exact_before = exploration.exactness();
+    match command {
+        OwnCommand::Step(count) => steps(exploration, count, out)?,
+        OwnCommand::Run => steps(exploration, MOST, out)?,
+        OwnCommand::Pause | OwnCommand::Quit => {}
+        OwnCommand::Move(by) => {
+            let step = i64::from(exploration.tree().present().step) + by;
+            exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
+            at(exploration, out)?;
+        }
+        OwnCommand::Goto(step) => {
+            exploration.seek(step);
+            at(exploration, out)?;
+        }
+        OwnCommand::Act(text) => {
+            let action = exploration.action(&text)?;
+            let taken = exploration.act(action)?;
+            told(exploration, &taken, out)?;
+        }
+        OwnCommand::Instruct(text) => {
+            exploration.instruct(&text)?;
+            writeln!(out, "told: {}", exploration.instruction())?;
+        }
+        OwnCommand::Compare(text) => {
+            for (told, choices) in exploration.compared(&text)? {
+                writeln!(out, "told: {told}")?;
+                list(&choices, out)?;
+            }
+        }
+        OwnCommand::Chance => {
+            exploration.choose(PolicySource::random())?;
+            writeln!(out, "{} acts", exploration.policy())?;
+        }
+        OwnCommand::Agent => {
+            exploration.choose(agent.clone())?;
+            writeln!(out, "{} acts", exploration.policy())?;
+        }
+        OwnCommand::Begin(seed) => begin(exploration, seed, out)?,
+        OwnCommand::Next => begin(exploration, exploration.seed().wrapping_add(1), out)?,
+        OwnCommand::Reset => {
+            exploration.seek(0);
+            at(exploration, out)?;
+        }
+        OwnCommand::Branch(number) => {
+            exploration.switch(number.wrapping_sub(1))?;
+            at(exploration, out)?;
+        }
+        OwnCommand::Branches => {
+            let tree = exploration.tree();
+            for (place, branch) in (1..).zip(tree.branches()) {
+                let mark = if place == tree.branch() + 1 { "*" } else { " " };
+                writeln!(out, "{mark} {place} {}: {} steps, {}", branch.name, tree.state(branch.tip).step, branch.why)?;
+            }
+        }
+        OwnCommand::Break(condition) => {
+            let set = exploration.conditions.iter().position(|known| *known == condition);
+            match set {
+                Some(at) => drop(exploration.conditions.remove(at)),
+                None => exploration.conditions.push(condition),
+            }
+            let all: Vec<String> = exploration.conditions.iter().map(ToString::to_string).collect();
+            writeln!(out, "stops at: {}", if all.is_empty() { "nothing".into() } else { all.join(", ") })?;
+        }
+        OwnCommand::Save(path) => {
+            let wrote = exploration.save(path)?;
+            writeln!(out, "{wrote}")?;
+        }
+        OwnCommand::Look => look(exploration, out)?,
+    }
+    let exact = exploration.exactness();
+    if exact != exact_before {
+        writeln!(out, "going back: {exact}")?;
+    }
+    Ok(())
+}
+
+fn begin(exploration: &mut OwnExploration, seed: u64, out: &mut impl Write) -> anyhow::Result<()> {
+    exploration.begin(seed)?;
+    writeln!(out, "seed {seed}; told: {}", exploration.instruction())?;
+    Ok(())
+}
+
+fn steps(exploration: &mut OwnExploration, count: u32, out: &mut impl Write) -> anyhow::Result<()> {
+    for _ in 0..count {
+        let taken = exploration.step()?;
+        told(exploration, &taken, out)?;
+        if exploration.end().is_some() {
+            break;
+        }
+        if let Some(condition) = exploration.stopped_by() {
+            writeln!(out, "stopped at: {condition}")?;
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn told(exploration: &OwnExploration, taken: &OwnStepTaken, out: &mut impl Write) -> anyhow::Result<()> {
+    write!(out, "step {}: {}: {}", taken.step, taken.action, taken.outcome)?;
+    if let Some(reward) = taken.reward.filter(|reward| *reward != 0.0) {
+        write!(out, ", reward {reward}")?;
+    }
+    if taken.completed {
+        write!(out, ", part done")?;
+    }
+    if let Some(branch) = &taken.forked {
+        write!(out, "; branch {branch} begins")?;
+    }
+    writeln!(out)?;
+    if let Some(end) = exploration.end() {
+        writeln!(out, "over: {end}")?;
+    }
+    Ok(())
+}
+
+fn at(exploration: &OwnExploration, out: &mut impl Write) -> anyhow::Result<()> {
+    let tree = exploration.tree();
+    let branch = &tree.branches()[tree.branch()];
+    writeln!(out, "at step {} of {}, branch {}", tree.present().step, tree.length(), branch.name)?;
+    Ok(())
+}
+
+fn look(exploration: &mut OwnExploration, out: &mut impl Write) -> anyhow::Result<()> {
+    let shown = exploration.picture();
+    at(exploration, out)?;
+    if let Some(text) = &shown.observation.text {
+        writeln!(out, "{}", text.trim_end())?;
+    }
+    if let Some(picture) = &shown.observation.picture {
+        writeln!(out, "picture: {} x {}", picture.width, picture.height)?;
+    }
+    for thing in &shown.observation.things {
+        writeln!(out, "in view: {}", thing.name)?;
+    }
+    for subtask in &shown.observation.subtasks {
+        writeln!(out, "{} {}", if subtask.is_done { "done:" } else { "to do:" }, subtask.text)?;
+    }
+    list(&shown.choices, out)?;
+    if let Some(problem) = &shown.undecided {
+        writeln!(out, "{} cannot decide: {problem}", shown.policy)?;
+    }
+    writeln!(out, "earned {}; going back: {}", shown.earned, shown.exactness)?;
+    Ok(())
+}
+
+fn list(choices: &[OwnChoice], out: &mut impl Write) -> anyhow::Result<()> {
+    for choice in choices.iter().take(40) {
+        let share = choice.probability.map_or("     ".into(), |share| format!("{share:.3}"));
+        writeln!(out, "  {share} {}{}", choice.words, if choice.is_chosen { "  <" } else { "" })?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::env::remote::Elsewhere;
+    use crate::env::remote::testing::{Fault, serve};
+    use crate::eval::verify::verify;
+    use crate::run_dir::reader::RecordedRun;
+
+    fn told(fault: Fault, lines: &str) -> (bool, String) {
+        let agent = PolicySource::random();
+        let exploration = OwnExploration::new(&serve(fault), Elsewhere::default(), agent.clone(), 2, None).unwrap();
+        let mut out = Vec::new();
+        let obeyed = run(exploration, &agent, lines.as_bytes(), &mut out).unwrap();
+        (obeyed, String::from_utf8(out).unwrap())
+    }
+
+    #[test]
+    fn an_episode_is_acted_in_gone_back_in_and_forked() {
+        let (obeyed, told) =
+            told(Fault::None, "act right\nact right\nback\nact left\nbranches\nbranch 1\ngoto 9\nlook\n");
+        assert!(obeyed, "{told}");
+        for wanted in [
+            "told: go to the right end",
+            "step 2: right: ok",
+            "at step 1 of 2, branch 1",
+            "step 2: left: ok; branch 2 begins",
+            "* 2 2: 2 steps, left (you)",
+            "at step 2 of 2, branch 1",
+            "picture: 4 x 3",
+            "0.500 left",
+            "going back: exact: by snapshots",
+        ] {
+            assert!(told.contains(wanted), "{wanted}: {told}");
+        }
+    }
+
+    #[test]
+    fn without_snapshots_the_same_actions_are_taken_again_and_said_to_be_the_same_or_not() {
+        let lines = "act right\nact right\nact right\nact right\nback 1\nact left\n";
+        let (_, same) = told(Fault::Foreign, lines);
+        assert!(same.contains("branch 2 begins") && same.contains("going back: exact so far"), "{same}");
+        let (_, other) = told(Fault::Chance, lines);
+        assert!(other.contains("going back: not exact: taken again, step 3 showed something else"), "{other}");
+    }
+
+    #[test]
+    fn what_cannot_be_obeyed_is_told_and_the_rest_goes_on() {
+        let (obeyed, told) = told(
+            Fault::None,
+            "act jump\nfly\nbreak reward\nact right\nact right\nact right\nact right\nact right\nact right\n",
+        );
+        assert!(!obeyed);
+        for wanted in [
+            "error: there is no action \"jump\"; there are: left, right",
+            "error: \"fly\" is none of",
+            "stops at: reward",
+            "reward 1, part done",
+            "over: done",
+            "error: the episode is over (done)",
+        ] {
+            assert!(told.contains(wanted), "{wanted}: {told}");
+        }
+    }
+
+    #[test]
+    fn what_was_explored_is_a_run_that_verifies_and_opens_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let (name, agent) = (serve(Fault::None), PolicySource::random());
+        let mut exploration = OwnExploration::new(&name, Elsewhere::default(), agent.clone(), 2, None).unwrap();
+        for _ in 0..3 {
+            exploration.step().unwrap();
+        }
+        exploration.seek(1);
+        let right = exploration.action("right").unwrap();
+        exploration.instruct("go home").unwrap();
+        exploration.act(right).unwrap();
+        exploration.save(Some(path.clone())).unwrap();
+        let run = RecordedRun::open(&path, None).unwrap();
+        assert_eq!(run.episodes.len(), 2);
+        let verdict = verify(&run, &mut |_| Ok(None), 1, &Elsewhere::default(), &mut |_| ()).unwrap();
+        assert!(verdict.is_equal(), "{verdict:?}");
+        let (task, author) = (run.task(&run.episodes[1]).unwrap(), run.author(0, &run.episodes[1]));
+        let opened = OwnExploration::open(task, &run.episodes[1], &author, Elsewhere::default(), agent, 2).unwrap();
+        assert_eq!((opened.tree().present().step, opened.instruction()), (2, "Go home."));
+        assert_eq!(opened.exactness(), "exact: by snapshots");
+    }
+}

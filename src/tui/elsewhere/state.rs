@@ -1,0 +1,188 @@
+//! What the screen knows.
+
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::Instant;
+
+use ratatui::layout::{Rect, Size};
+
+use super::layout;
+use super::worker::{OwnEvent, Told};
+use crate::explore::elsewhere::command::OwnCommand;
+use crate::explore::elsewhere::view::{OwnChoice, OwnPicture};
+use crate::house::view::Frame;
+use crate::tui::app::Graphics;
+use crate::tui::graphics::letters::Letters;
+use crate::tui::graphics::overlay::Overlay;
+use crate::tui::graphics::{Job, Picture, Protocol};
+use crate::tui::theme::{Ability, Scheme};
+
+/// What the keyboard is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum OwnMode {
+    /// Keys command.
+    Watch,
+    /// A choice is made among what can be done.
+    Choosing,
+    /// Something is typed; what becomes of it.
+    Typing(Typed),
+    /// The keys are listed.
+    Help,
+}
+
+/// What becomes of what is typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Typed {
+    /// The agent is told it.
+    Instruction,
+    /// It is compared with what is told.
+    Comparison,
+    /// It is a condition to stop at.
+    Condition,
+    /// It is a command.
+    Command,
+}
+
+/// The state of the screen.
+pub(crate) struct OwnApp {
+    pub(super) size: Size,
+    pub(super) graphics: Graphics,
+    pub(super) ability: Ability,
+    pub(super) scheme: Scheme,
+    commands: Sender<OwnCommand>,
+    pub(super) shown: Option<Box<OwnPicture>>,
+    /// The picture, encoded for the terminal; nothing where there is none.
+    pub(super) picture: Option<Picture>,
+    pub(super) is_running: bool,
+    pub(super) said: Option<(bool, String)>,
+    pub(super) compared: Option<Vec<(String, Vec<OwnChoice>)>>,
+    pub(super) mode: OwnMode,
+    pub(super) typed: String,
+    /// Which choice is marked.
+    pub(super) marked: usize,
+    /// Since when the environment is waited for, and for how many commands.
+    pub(super) waiting: Option<(Instant, usize)>,
+    pub(super) is_stopped: bool,
+    runs: bool,
+}
+
+impl OwnApp {
+    pub(super) fn new(
+        size: Size,
+        graphics: Graphics,
+        ability: Ability,
+        scheme: Scheme,
+        commands: Sender<OwnCommand>,
+    ) -> OwnApp {
+        OwnApp {
+            size,
+            graphics,
+            ability,
+            scheme,
+            commands,
+            shown: None,
+            picture: None,
+            is_running: false,
+            said: None,
+            compared: None,
+            mode: OwnMode::Watch,
+            typed: String::new(),
+            marked: 0,
+            waiting: Some((Instant::now(), 1)),
+            is_stopped: false,
+            runs: false,
+        }
+    }
+
+    /// The policy acts as soon as the environment is there.
+    pub(super) fn run_when_open(&mut self) {
+        self.runs = true;
+    }
+
+    /// Whether the environment is waited for.
+    pub(super) fn is_waiting(&self) -> bool {
+        self.waiting.is_some()
+    }
+
+    /// Asks for something.
+    pub(super) fn ask(&mut self, command: OwnCommand) {
+        // A worker that is gone has said why.
+        let _ = self.commands.send(command);
+        let (since, many) = self.waiting.unwrap_or_else(|| (Instant::now(), 0));
+        self.waiting = Some((since, many + 1));
+        self.compared = None;
+    }
+
+    /// Takes in what the worker tells.
+    pub(super) fn on_event(&mut self, event: OwnEvent) -> anyhow::Result<()> {
+        self.waiting = match self.waiting {
+            Some((_, many)) if many > 1 => Some((Instant::now(), many - 1)),
+            _ => None,
+        };
+        match event.0 {
+            Told::Failed(problem) => anyhow::bail!(problem),
+            Told::Compared(both) => self.compared = Some(both),
+            Told::Shown(shown, is_running, said) => {
+                // What was said stays until there is something else to say, or something was done.
+                let moved = self.shown.as_ref().is_none_or(|before| before.step != shown.step);
+                if said.is_some() || moved {
+                    self.said = said;
+                }
+                self.is_running = is_running;
+                self.marked = self.marked.min(shown.choices.len().saturating_sub(1));
+                self.shown = Some(shown);
+                self.encode();
+                if std::mem::take(&mut self.runs) {
+                    self.ask(OwnCommand::Run);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn resize(&mut self, size: Size) {
+        self.size = size;
+        self.encode();
+    }
+
+    /// Encodes the picture for the place that it has.
+    fn encode(&mut self) {
+        self.picture = None;
+        let Some(seen) = self.shown.as_ref().and_then(|shown| shown.observation.picture.as_ref()) else { return };
+        let area = layout::picture_area(Rect::new(0, 0, self.size.width, self.size.height));
+        let cells = fitting(area, (seen.width, seen.height), self.graphics.cell_pixels);
+        if cells.width == 0 || cells.height == 0 {
+            return;
+        }
+        let (width, height, rgb) = (seen.width, seen.height, seen.rgb.clone());
+        let frame = Arc::new(Frame { width, height, rgb, depth: Vec::new(), ids: Vec::new() });
+        // Letters stand for House's classes; elsewhere they are shades.
+        if self.graphics.protocol == Protocol::Ascii {
+            self.picture = Some(layout::shaded(&frame, cells));
+            return;
+        }
+        self.picture = Some(Picture::encode(&Job {
+            frame,
+            overlay: Overlay::Colour,
+            coarseness: 0,
+            in_tmux: self.graphics.in_tmux,
+            recent: Vec::new(),
+            letters: Arc::new(Letters::default()),
+            classes: Arc::default(),
+            labels: Vec::new(),
+            protocol: self.graphics.protocol,
+            cells,
+            cell_pixels: self.graphics.cell_pixels,
+        }));
+    }
+}
+
+/// The most cells of an area that keep a picture's shape.
+fn fitting(area: Rect, (width, height): (usize, usize), (across, down): (u16, u16)) -> Size {
+    let (across, down) = (f64::from(across.max(1)), f64::from(down.max(1)));
+    let shape = width as f64 / height.max(1) as f64;
+    let (most_wide, most_high) = (f64::from(area.width) * across, f64::from(area.height) * down);
+    let high = most_high.min(most_wide / shape);
+    let cells = |pixels: f64, cell: f64, most: u16| ((pixels / cell).round() as u16).clamp(u16::from(most > 0), most);
+    Size { width: cells(high * shape, across, area.width), height: cells(high, down, area.height) }
+}
