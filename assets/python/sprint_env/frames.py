@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from typing import Any
 
 from .environment import Frame
 
@@ -21,11 +20,11 @@ def formats_of(size: tuple[int, int] | None) -> list[str]:
     return ["png", "raw"]
 
 
-def encode(frame: Frame, encoding: str) -> dict[str, Any]:
-    """A frame as the protocol has it."""
+def encode(frame: Frame, encoding: str) -> str:
+    """A frame as the protocol has it, as JSON."""
     data = png(frame) if encoding == "png" else frame.rgb
     text = base64.b64encode(data).decode("ascii")
-    return {"encoding": encoding, "width": frame.width, "height": frame.height, "data": text}
+    return f'{{"encoding": "{encoding}", "width": {frame.width}, "height": {frame.height}, "data": "{text}"}}'
 
 
 def png(frame: Frame) -> bytes:

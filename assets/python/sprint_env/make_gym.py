@@ -17,10 +17,7 @@ def make(name: str, tile: int, options: dict[str, Any]) -> Environment:
     """The environment `name`, or `module:name` where importing a module registers it."""
     is_minigrid = name.startswith(MINIGRID_NAMES)
     if is_minigrid:
-        try:
-            import minigrid  # noqa: F401
-        except ImportError as missing:
-            raise CannotDo(f"{name} needs the package minigrid: pip install minigrid") from missing
+        import minigrid  # noqa: F401
     env = _make(name, options)
     if is_minigrid:
         from .minigrid_environment import MinigridEnvironment

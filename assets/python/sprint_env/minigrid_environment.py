@@ -16,11 +16,28 @@ from .gym_environment import GymEnvironment, frame_of
 BACKGROUND = ("wall", "floor")
 
 
+class RememberedView:
+    """Stands in a level's own place for working out the agent's view, which is half of a step's time, and keeps it for drawing.
+
+    A copy of the level has a copy of this, which belongs to it.
+    """
+
+    def __init__(self, level: MiniGridEnv):
+        self.level = level
+        self.cells: tuple[Any, Any] | None = None
+
+    def __call__(self, agent_view_size: int | None = None) -> tuple[Any, Any]:
+        """The cells before the agent, and which of them it sees."""
+        self.cells = type(self.level).gen_obs_grid(self.level, agent_view_size)
+        return self.cells
+
+
 class MinigridEnvironment(GymEnvironment):
     """A level of Minigrid, seen by its agent: what lies before it, drawn with tiles of so many pixels."""
 
     def __init__(self, env: gymnasium.Env, name: str, tile: int = 8):
         super().__init__(env, name)
+        self.level.gen_obs_grid = RememberedView(self.level)
         self.tile = tile
         self.is_seen = self.is_rendered = False
         self.solved: bool | None = None
@@ -63,7 +80,7 @@ class MinigridEnvironment(GymEnvironment):
         return self._look(self.level.gen_obs(), Observation())
 
     def _look(self, seen: dict[str, Any], over: Observation) -> Observation:
-        grid, visible = self.level.gen_obs_grid()
+        grid, visible = self.level.gen_obs_grid.cells
         at = (grid.width // 2, grid.height - 1)
         over.frame = frame_of(grid.render(self.tile, agent_pos=at, agent_dir=3, highlight_mask=visible))
         over.things = [

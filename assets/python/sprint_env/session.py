@@ -38,7 +38,7 @@ class Session:
         self.steps = 0
         self.snapshots: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self.taken = 0
-        self.requests: dict[str, Callable[[Any], dict[str, Any]]] = {
+        self.requests: dict[str, Callable[[dict[str, Any]], str]] = {
             "reset": self._reset,
             "step": self._step,
             "state": self._state,
@@ -56,7 +56,7 @@ class Session:
                 return None
             if kind not in self.requests:
                 raise Refused("UNKNOWN_TYPE", f"Unknown message type: {kind}")
-            return json.dumps(self.requests[kind](data), allow_nan=False)
+            return self.requests[kind](data)
         except Refused as refused:
             return error(str(refused), refused.code)
         except CannotDo as refused:
@@ -65,7 +65,7 @@ class Session:
             traceback.print_exc(file=sys.stderr)
             return error(f"{type(problem).__name__}: {problem}", "EXECUTION_ERROR")
 
-    def _reset(self, data: Any) -> dict[str, Any]:
+    def _reset(self, data: dict[str, Any]) -> str:
         seed, episode = data.get("seed"), data.get("episode_id", data.get("episode"))
         if not (seed is None or (isinstance(seed, int) and not isinstance(seed, bool) and seed >= 0)):
             raise Refused("VALIDATION_ERROR", f"seed: {seed!r} is not a whole number from 0 on")
@@ -75,7 +75,7 @@ class Session:
         self.episode, self.steps = episode, 0
         return self._observed()
 
-    def _step(self, data: Any) -> dict[str, Any]:
+    def _step(self, data: dict[str, Any]) -> str:
         if self.observation is None:
             raise CannotDo("no episode has begun: send reset first")
         if self.observation.done:
@@ -101,31 +101,31 @@ class Session:
         if values is not None and argument not in values:
             raise Refused("VALIDATION_ERROR", f"argument: {argument!r} is no {named}")
 
-    def _state(self, _data: Any) -> dict[str, Any]:
-        return {"type": "state", "data": {"episode_id": self.episode, "step_count": self.steps}}
+    def _state(self, _data: dict[str, Any]) -> str:
+        return _message("state", {"episode_id": self.episode, "step_count": self.steps})
 
-    def _capabilities(self, _data: Any) -> dict[str, Any]:
+    def _capabilities(self, _data: dict[str, Any]) -> str:
         told = asdict(self.capabilities)
         told["formats"] = frames.formats_of(self.capabilities.frame)
-        return {"type": "capabilities", "data": told}
+        return _message("capabilities", told)
 
-    def _format(self, data: Any) -> dict[str, Any]:
+    def _format(self, data: dict[str, Any]) -> str:
         wanted = data.get("format")
         if wanted not in frames.FORMATS:
             raise Refused("VALIDATION_ERROR", f"format: there is no {wanted!r}, only {', '.join(frames.FORMATS)}")
         self.format = wanted
         return self._observed()
 
-    def _snapshot(self, _data: Any) -> dict[str, Any]:
+    def _snapshot(self, _data: dict[str, Any]) -> str:
         state = self.environment.snapshot()
         self.taken += 1
         name = str(self.taken)
         self.snapshots[name] = (state, self.steps)
         if len(self.snapshots) > SNAPSHOTS_KEPT:
             self.snapshots.popitem(last=False)
-        return {"type": "snapshot", "data": {"id": name}}
+        return _message("snapshot", {"id": name})
 
-    def _restore(self, data: Any) -> dict[str, Any]:
+    def _restore(self, data: dict[str, Any]) -> str:
         name = data.get("id")
         if name not in self.snapshots:
             raise Refused("VALIDATION_ERROR", f"id: no snapshot {name!r} is kept (the newest {SNAPSHOTS_KEPT} are)")
@@ -134,11 +134,9 @@ class Session:
         self.steps = steps
         return self._observed()
 
-    def _observed(self) -> dict[str, Any]:
+    def _observed(self) -> str:
         seen = self.observation or Observation()
         told: dict[str, Any] = {"success": seen.success, "terminated": seen.terminated, "truncated": seen.truncated}
-        if seen.frame is not None:
-            told["frame"] = frames.encode(seen.frame, self.format)
         for name in ("text", "mission", "legal"):
             if (value := getattr(seen, name)) is not None:
                 told[name] = value
@@ -146,13 +144,22 @@ class Session:
             told["subtasks"] = [{"text": subtask.text, "done": subtask.done} for subtask in seen.subtasks]
         if seen.things is not None:
             told["things"] = [{"name": thing.name, "box": thing.box} for thing in seen.things]
+        text = json.dumps(told, allow_nan=False)
+        if seen.frame is not None:
+            # The frame is most of it, and written without looking for what has to be escaped.
+            text = f'{{"frame": {frames.encode(seen.frame, self.format)}, {text[1:]}'
         reward = seen.reward if seen.reward is None or math.isfinite(seen.reward) else None
-        return {"type": "observation", "data": {"observation": told, "reward": reward, "done": seen.done}}
+        end = json.dumps({"reward": reward, "done": seen.done})
+        return f'{{"type": "observation", "data": {{"observation": {text}, {end[1:]}}}'
+
+
+def _message(kind: str, data: dict[str, Any]) -> str:
+    return json.dumps({"type": kind, "data": data}, allow_nan=False)
 
 
 def error(message: str, code: str) -> str:
     """An error's message."""
-    return json.dumps({"type": "error", "data": {"message": message, "code": code}})
+    return _message("error", {"message": message, "code": code})
 
 
 def _parse(text: str | bytes) -> tuple[str, dict[str, Any]]:
