@@ -5,6 +5,7 @@ from __future__ import annotations
 import http
 import json
 import os
+import signal
 import socket
 import sys
 import threading
@@ -16,7 +17,7 @@ from websockets.http11 import Request
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-from .environment import Capabilities, Environment
+from .environment import Environment
 from .schemas import schemas
 from .session import Session, error
 
@@ -31,9 +32,11 @@ CLOSING_TIME = 5.0
 class Server:
     """Listens from the moment it is made; `serve` takes connections."""
 
-    def __init__(self, make: Callable[[], Environment], capabilities: Capabilities, host: str, port: int):
+    def __init__(self, make: Callable[[], Environment], first: Environment, host: str, port: int):
         self.make = make
-        self.capabilities = capabilities
+        self.capabilities = first.capabilities()
+        #: For whoever connects first.
+        self.spare = [first]
         self.listener = socket.create_server((host, port))
         self.environments: set[Environment] = set()
         self.lock = threading.Lock()
@@ -53,7 +56,8 @@ class Server:
         """Takes no more connections, and closes every environment."""
         self.listener.close()
         with self.lock:
-            environments = list(self.environments)
+            environments = [*self.environments, *self.spare]
+            self.spare.clear()
         for environment in environments:
             environment.close()
 
@@ -74,11 +78,12 @@ class Server:
             return
         with self.lock:
             is_full = len(self.environments) >= SESSIONS
+            spare = self.spare.pop() if self.spare else None
         if is_full:
             wire.send(error(f"{SESSIONS} sessions are open already", "CAPACITY_REACHED"))
             return wire.close()
         try:
-            environment = self.make()
+            environment = spare or self.make()
         except Exception as problem:
             wire.send(error(f"{type(problem).__name__}: {problem}", "FACTORY_ERROR"))
             return wire.close()
@@ -188,6 +193,7 @@ def own_stdout() -> TextIO:
 
 def serve_until_stdin_closes(server: Server, out: TextIO, keeps_serving: bool) -> None:
     """Prints where the server listens, then serves. Whoever started it is gone when standard input closes: then it ends."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     out.write(json.dumps({"url": server.url, "protocol": "openenv", "version": 1}) + "\n")
     out.flush()
     serving = threading.Thread(target=server.serve, daemon=True)
@@ -201,7 +207,7 @@ def serve_until_stdin_closes(server: Server, out: TextIO, keeps_serving: bool) -
     except KeyboardInterrupt:
         pass
     # An environment that hangs does not keep the process.
-    closing = threading.Thread(target=server.close, daemon=True)
-    closing.start()
-    closing.join(CLOSING_TIME)
-    os._exit(0)
+    last = threading.Timer(CLOSING_TIME, os._exit, (0,))
+    last.daemon = True
+    last.start()
+    server.close()
