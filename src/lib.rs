@@ -18,6 +18,7 @@
 //! | [`eval`] | evaluation on workers, task sets, verification, replay |
 //! | [`train`] | presets, data, batches, the trainer; relabelling, collection, pretraining |
 //! | [`analysis`] | chains link by link, two instructions in one state, the value of every cell; benchmarks |
+//! | `serve` | House for programs in other languages |
 //! | [`explore`] | an explorer session without a screen, and the plain mode |
 //! | [`tui`] | the explorer's screen |
 //! | [`cli`] | the command line |
@@ -36,6 +37,7 @@ pub mod report;
 pub mod eval;
 pub mod train;
 pub mod analysis;
+mod serve;
 pub mod explore;
 pub mod tui;
 pub mod cli;

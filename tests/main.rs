@@ -22,6 +22,7 @@ mod environments;
 mod evaluator;
 mod faults;
 mod scenarios;
+mod serve;
 mod training;
 mod start;
 mod terminal;

@@ -36,6 +36,7 @@ mod relabel;
 mod replay;
 mod report;
 mod schema;
+mod serve;
 mod shell;
 mod stop;
 mod streams;
@@ -77,6 +78,8 @@ enum Command {
     Verify(verify::Verify),
     /// Write a recorded episode as a picture, a film, a strip, a transcript, or a page
     Export(export::Export),
+    /// Serve House to programs in other languages, over OpenEnv's protocol and a local socket
+    Serve(serve::Serve),
     /// Sample, check and show task sets
     Tasks(tasks::Tasks),
     /// Make a dataset folder of ALFRED's published files
@@ -140,6 +143,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Open(open) => open.run(),
         Command::Verify(verify) => verify.run(),
         Command::Export(export) => export.run(),
+        Command::Serve(serve) => serve.run(),
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),

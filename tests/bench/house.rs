@@ -99,6 +99,21 @@ fn steps(criterion: &mut Criterion) {
             BatchSize::SmallInput,
         );
     });
+    // What `sprint serve` does for a step, without telling anybody: compare `assets/python/bench_house.py`.
+    let moves: Vec<Action> = (0..STEPS).map(|_| Action::navigate(ActionType::ALL[rng.random_range(0..5)])).collect();
+    let mut house = House::new(Arc::new(scene), world.clone());
+    for size in [128, House::FRAME] {
+        let mut renderer = Renderer::new(size);
+        group.bench_function(format!("moves, drawn at {size} pixels"), |bencher| {
+            bencher.iter(|| {
+                house.restore(world.clone());
+                for &action in &moves {
+                    house.step(action);
+                    black_box(renderer.draw(house.scene(), house.world()));
+                }
+            });
+        });
+    }
     group.finish();
 }
 
@@ -124,6 +139,8 @@ fn main() -> anyhow::Result<()> {
         "frames/draw",
         "frames/draw and view",
         "steps/random, not drawn",
+        "steps/moves, drawn at 128 pixels",
+        "steps/moves, drawn at 300 pixels",
         "resets/restore",
         "resets/new house",
     ])
