@@ -18,10 +18,10 @@ test: setup ## set up, and run all tests
 	python3 -B -m unittest -q tests/setup_test.py
 	OMP_NUM_THREADS=1 cargo test --release --locked
 
-# Its packages are not needed by `make test`.
+# Its packages (700 MB) are not needed by `make test`. House is tested with the program, where that is built.
 PYTHON_TESTS := target/python
 test-python: $(PYTHON_TESTS)/installed ## install environments in Python, and test sprint_env with them
-	cd assets/python && $(CURDIR)/$(PYTHON_TESTS)/bin/python -B -m unittest -q
+	cd assets/python && SPRINT=$(wildcard $(CURDIR)/target/release/sprint) $(CURDIR)/$(PYTHON_TESTS)/bin/python -B -m unittest -q
 
 $(PYTHON_TESTS)/installed: assets/python/tests/requirements.txt
 	python3 -m venv $(PYTHON_TESTS)
