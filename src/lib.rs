@@ -9,6 +9,7 @@
 //! | [`house`] | the simulator: rules, sight, rendering, graders, the expert, generated houses |
 //! | [`mod@env`] | the trait `Environment`, and House as the first one |
 //! | [`data`] | dataset folders, the ALFRED importer, task files, training items, labels, feature files |
+//! | [`mod@control`] | steering what runs from another terminal, over a socket of its user's own |
 //! | [`nets`] | visual encoders, policy and critic, sentence encoders, strict weights files |
 //! | [`algo`] | behaviour cloning, IQL, chaining; the update, optimiser, learner |
 //! | [`agent`] | what decides the next action: trained, expert, chance |
@@ -28,6 +29,7 @@ pub mod language;
 pub mod house;
 mod env;
 pub mod data;
+mod control;
 pub mod nets;
 pub mod algo;
 pub mod agent;

@@ -6,9 +6,9 @@ use std::path::Path;
 use super::imports::{Source, sources};
 
 /// Ground floor first.
-const FLOORS: [&str; 18] = [
-    "domain", "language", "house", "env", "data", "nets", "algo", "agent", "episode", "run_dir", "report", "eval",
-    "train", "analysis", "serve", "explore", "tui", "cli",
+const FLOORS: [&str; 19] = [
+    "domain", "language", "house", "env", "data", "control", "nets", "algo", "agent", "episode", "run_dir", "report",
+    "eval", "train", "analysis", "serve", "explore", "tui", "cli",
 ];
 
 /// Libraries, and the floors that may use them.

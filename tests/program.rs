@@ -43,6 +43,7 @@ impl Sprint {
     pub(crate) fn run(&self, line: &str) -> Ended {
         let mut command = Command::cargo_bin("sprint").unwrap();
         let command = command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
+        let command = command.env("XDG_RUNTIME_DIR", self.folder.path());
         let output = command.args(line.split_whitespace()).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
@@ -59,6 +60,7 @@ impl Sprint {
     pub(crate) fn command(&self, line: &str) -> std::process::Command {
         let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("sprint"));
         command.current_dir(self.folder.path()).env("SPRINT_HOME", self.path("home"));
+        command.env("XDG_RUNTIME_DIR", self.folder.path());
         command.args(line.split_whitespace());
         command
     }

@@ -57,6 +57,7 @@ impl Session {
         line.env("LANG", "en_US.UTF-8");
         line.env("XDG_STATE_HOME", state);
         line.env("XDG_CONFIG_HOME", state);
+        line.env("XDG_RUNTIME_DIR", state);
         if let Some(home) = encoder_home() {
             line.env("SPRINT_HOME", home);
         }

@@ -17,6 +17,7 @@ pub mod policy_source;
 pub(crate) mod random;
 pub mod registry;
 pub(crate) mod select;
+pub(crate) mod served;
 pub(crate) mod value_estimates;
 
 pub(crate) use decision::{ActionDistribution, Decision};

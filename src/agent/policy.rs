@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::decision::Decision;
 use super::frame_history::FrameHistory;
 use super::memory_agent::Recollection;
+use super::served::ServedState;
 use super::value_estimates::Values;
 use crate::domain::Action;
 use crate::env::Environment;
@@ -60,6 +61,8 @@ pub enum PolicyState {
     Frames(Box<FrameHistory>),
     /// All that it remembers.
     Recollection(Box<Recollection>),
+    /// What a policy server carries, as far as it says.
+    Served(Box<ServedState>),
 }
 
 /// Something that acts: a trained agent, the expert, chance. It acts in several episodes at once, each in a slot of its own;

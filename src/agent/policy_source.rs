@@ -52,6 +52,11 @@ impl PolicySource {
         PolicySource { name: name.into(), checkpoint_hash: None, make, folder: None }
     }
 
+    /// The same, with the hash of its weights.
+    pub(crate) fn with_hash(self, checkpoint_hash: Option<String>) -> PolicySource {
+        PolicySource { checkpoint_hash, ..self }
+    }
+
     fn plain(name: &str, make: fn() -> Box<dyn Policy>) -> PolicySource {
         PolicySource::of(name, Arc::new(move || Ok(make())))
     }
@@ -175,20 +180,25 @@ pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
     });
     let agent = |folder: PathBuf| {
         let name = folder.file_name().map_or_else(|| "agent".into(), |name| name.to_string_lossy().into_owned());
-        let loaded = OnceCell::new();
-        let load = move || -> anyhow::Result<Loaded> {
-            let chosen = match loaded.get() {
-                Some(chosen) => chosen,
-                None => {
-                    let chosen = PolicySource::checkpoint(folder.clone(), false)?;
-                    loaded.get_or_init(|| chosen)
-                }
-            };
-            Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
-        };
-        NamedAgent { name, load: Box::new(load) }
+        agent_of(name, move || PolicySource::checkpoint(folder.clone(), false))
     };
     folders.into_iter().map(agent).collect()
+}
+
+/// An agent of that name which `open` opens, once.
+pub(crate) fn agent_of(name: String, open: impl Fn() -> anyhow::Result<PolicySource> + 'static) -> NamedAgent {
+    let opened = OnceCell::new();
+    let load = move || -> anyhow::Result<Loaded> {
+        let chosen = match opened.get() {
+            Some(chosen) => chosen,
+            None => {
+                let chosen: PolicySource = open()?;
+                opened.get_or_init(|| chosen)
+            }
+        };
+        Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
+    };
+    NamedAgent { name, load: Box::new(load) }
 }
 
 /// The agent that acts when none is named.

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
@@ -9,6 +10,7 @@ use clap::{Args, ValueEnum};
 use sha2::{Digest, Sha256};
 
 use super::environment::EnvironmentChoice;
+use super::controlled::ControlledRun;
 use super::exit_status::ExitStatus;
 use super::policies::PolicyChoice;
 use super::streams::say;
@@ -17,6 +19,8 @@ use crate::data::json::Document;
 use crate::data::{json, taskset};
 use crate::domain::{Task, TaskSet};
 use crate::env::remote::Sessions;
+use crate::control::{Kind, Progress as Place, RunControl};
+use crate::data::taskset;
 use crate::episode::rollout::EndedBy;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
@@ -118,10 +122,13 @@ impl Eval {
         let mut run = RunWriter::open(&path, evaluation.manifest())?;
         run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &file, &path)?)?;
         let stop = stop::on_signals()?;
-        let mut meter = Meter::new(self.json);
+        let run_control = ControlledRun::listen(Kind::Eval, &path, &stop, evaluation.clock());
+        let mut meter = Meter::new(self.json, run_control.control.clone());
         let summary = crate::eval::evaluation::evaluate(&evaluation, &chosen.make, &mut run, &stop, &mut |progress| {
             meter.show(progress)
-        })?;
+        });
+        // What goes on from here is the same command with this folder.
+        let summary = summary.with_context(|| format!("{}: the run is not whole", path.display()))?;
         meter.finish();
         print(&summary, self.json)?;
         say(&format!("wrote {}", path.display()));
@@ -202,26 +209,28 @@ pub(crate) fn print(summary: &RunSummary, json: bool) -> anyhow::Result<()> {
 struct Meter {
     display: Option<progress::Progress>,
     started: Instant,
+    control: Arc<RunControl>,
 }
 
 impl Meter {
-    fn new(json: bool) -> Meter {
-        Meter { display: (!json).then(progress::Progress::new), started: Instant::now() }
+    fn new(json: bool, control: Arc<RunControl>) -> Meter {
+        Meter { display: (!json).then(progress::Progress::new), started: Instant::now(), control }
     }
 
     fn show(&mut self, progress: EvaluationProgress) {
-        let Some(display) = &mut self.display else {
-            let seconds = self.started.elapsed().as_secs_f64();
-            let event = ProgressEvent::Progress { progress, seconds };
-            say(&serde_json::to_string(&event).unwrap_or_default());
-            return;
-        };
+        let event = ProgressEvent::Progress { progress, seconds: self.started.elapsed().as_secs_f64() };
+        let event = serde_json::to_string(&event).unwrap_or_default();
         let EvaluationProgress { done, of, successes, errors } = progress;
         let message = match errors {
             0 => format!("{successes} succeeded"),
             _ => format!("{successes} succeeded, {errors} errored"),
         };
-        display.show("episodes", done as u64, of as u64, &message);
+        let (stage, done, of) = ("episodes", done as u64, of as u64);
+        match &mut self.display {
+            Some(display) => display.show(stage, done, of, &message),
+            None => say(&event),
+        }
+        self.control.note(Place { stage: stage.into(), done, of: Some(of), message }, Some(event));
     }
 
     fn finish(&self) {

@@ -11,6 +11,7 @@ use etcetera::BaseStrategy;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::logging;
+use super::policy_name::{Elsewhere, ElsewhereOptions, PolicyName, PolicyNameParser};
 use super::recorded::recorded;
 use super::streams::Printable;
 use super::value_names;
@@ -40,8 +41,10 @@ pub(crate) struct Explore {
     #[command(flatten)]
     display: Display,
     /// Who acts at first [default: agent]
-    #[arg(long, value_enum)]
+    #[arg(long, value_name = "POLICY", value_parser = PolicyNameParser::EXPLORER)]
     policy: Option<PolicyName>,
+    #[command(flatten)]
+    elsewhere: ElsewhereOptions,
     /// Print a file of settings with a comment on each, and end
     #[arg(long)]
     print_config: bool,
@@ -76,6 +79,9 @@ struct Origin {
     /// The seed of the house and of chance [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// A policy from elsewhere, which acts as the agent.
+    #[arg(skip)]
+    elsewhere: Option<(Elsewhere, ElsewhereOptions)>,
 }
 
 /// How the explorer is shown.
@@ -211,14 +217,6 @@ impl From<ExpectName> for Expect {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum PolicyName {
-    Agent,
-    Expert,
-    Random,
-    Manual,
-}
-
 /// Demonstrations of one scene that are kept at hand.
 const DEMONSTRATIONS: usize = 20;
 
@@ -234,7 +232,7 @@ impl Explore {
         }
         let manual = matches!(self.policy, Some(PolicyName::Manual));
         let kind = match self.policy {
-            None | Some(PolicyName::Agent | PolicyName::Manual) => PolicyKind::Agent,
+            None | Some(PolicyName::Agent | PolicyName::Manual | PolicyName::Elsewhere(_)) => PolicyKind::Agent,
             Some(PolicyName::Expert) => PolicyKind::Expert,
             Some(PolicyName::Random) => PolicyKind::Random,
         };
@@ -243,12 +241,19 @@ impl Explore {
             return self.display.show_elsewhere(manual || self.policy.is_none(), open, agent);
         }
         let is_named = self.policy.is_some() || self.from.is_named();
-        let Explore { display, from, .. } = self;
+        let Explore { display, mut from, policy, elsewhere, .. } = self;
+        if let Some(PolicyName::Elsewhere(named)) = policy {
+            if from.checkpoint.is_some() {
+                bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
+            }
+            from.elsewhere = Some((named, elsewhere));
+        }
         if !is_named && !display.plain {
             return display.show_screen(kind, manual, move || from.list());
         }
         // The screen shows what is wrong with an agent; a script is told by the exit code.
-        let needed = display.plain && from.checkpoint.is_some() && kind == PolicyKind::Agent;
+        let is_chosen = from.checkpoint.is_some() || from.elsewhere.is_some();
+        let needed = display.plain && is_chosen && kind == PolicyKind::Agent;
         display.show(kind, manual, move || {
             let mut exploration = from.exploration(kind)?;
             if needed {
@@ -345,7 +350,8 @@ impl Origin {
     fn exploration(&self, kind: PolicyKind) -> anyhow::Result<Exploration> {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
-        let policies = Policies::new(policy_source::agents(self.checkpoint.as_deref()));
+        let elsewhere = self.elsewhere.iter().map(|(named, options)| named.agent(*options));
+        let policies = Policies::new(elsewhere.chain(policy_source::agents(self.checkpoint.as_deref())).collect());
         Exploration::new(source, policies, kind, None)?.expecting(self.expect.into(), self.instruction.as_deref())
     }
 

@@ -11,6 +11,8 @@ mod bench;
 mod chains;
 mod collect;
 mod compare;
+mod controlled;
+mod ctl;
 mod doctor;
 mod embed;
 mod encode;
@@ -28,6 +30,7 @@ mod plot;
 mod merge;
 mod open;
 mod policies;
+mod policy_name;
 mod pretrain;
 mod progress;
 mod read;
@@ -106,6 +109,8 @@ enum Command {
     Embed(embed::EmbedArgs),
     /// Read wishes: a sentence a line in, its subtasks as a JSON object a line out
     Read(read::ReadArgs),
+    /// Watch and steer what runs here, from another terminal
+    Ctl(ctl::Ctl),
     /// Print a completion script for a shell
     Completions(shell::Completions),
     /// Print the manual page (roff)
@@ -157,6 +162,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),
         Command::Read(read) => read.run(),
+        Command::Ctl(ctl) => ctl.run(),
         Command::Completions(completions) => completions.run(Cli::command()),
         Command::Man => shell::man(Cli::command()),
     }

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
 use crate::agent::policy_source::{self, PolicySource};
 
 /// Which policy acts.
@@ -13,37 +14,29 @@ pub(crate) struct PolicyChoice {
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// Who acts
-    #[arg(long, value_enum, default_value = "agent")]
-    policy: Kind,
-}
-
-/// Who acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Kind {
-    /// The trained agent
-    Agent,
-    /// Shortest paths and interactions, knowing everything
-    Expert,
-    /// A possible action by chance
-    Random,
+    #[arg(long, value_name = "POLICY", value_parser = PolicyNameParser::HEADLESS, default_value = "agent")]
+    policy: PolicyName,
+    #[command(flatten)]
+    elsewhere: ElsewhereOptions,
 }
 
 impl PolicyChoice {
     /// Opens what was chosen.
     ///
     /// # Errors
-    /// When the checkpoint or its sentence encoder cannot be used.
+    /// When the checkpoint or its sentence encoder cannot be used, or a policy from elsewhere.
     pub(crate) fn open(&self, sampling: bool) -> anyhow::Result<PolicySource> {
-        if self.policy != Kind::Agent && self.checkpoint.is_some() {
+        if self.policy != PolicyName::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
         }
-        if sampling && self.policy != Kind::Agent {
-            anyhow::bail!("--sample draws the actions of a trained agent; leave it out with --policy expert or random");
+        if sampling && self.policy != PolicyName::Agent {
+            anyhow::bail!("--sample draws the actions of a trained agent; leave it out with another --policy");
         }
-        match self.policy {
-            Kind::Expert => Ok(PolicySource::expert()),
-            Kind::Random => Ok(PolicySource::random()),
-            Kind::Agent => {
+        match &self.policy {
+            PolicyName::Expert => Ok(PolicySource::expert()),
+            PolicyName::Random => Ok(PolicySource::random()),
+            PolicyName::Elsewhere(elsewhere) => elsewhere.open(self.elsewhere),
+            PolicyName::Agent | PolicyName::Manual => {
                 let folder = match &self.checkpoint {
                     Some(named) => policy_source::folder_of(named),
                     None => policy_source::shipped()?,

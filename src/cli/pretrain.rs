@@ -5,12 +5,14 @@ use std::sync::{Arc, Mutex};
 
 use clap::Args;
 
+use super::controlled::{ControlledProgress, ControlledRun};
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use super::validate::{name, validate};
 use crate::agent::learned::SharedEmbedder;
+use crate::control::Kind;
 use crate::nets::device::best_device;
 use crate::nets::embedding_cache::Embedder;
 use crate::nets::sentence::default_folder;
@@ -106,7 +108,9 @@ impl Pretrain {
         };
         let stop = stop::on_signals()?;
         let mut progress = Progress::new();
-        if pretraining.run(&mut progress, &stop)? == Trained::Stopped {
+        let run = ControlledRun::listen(Kind::Pretrain, &pretraining.out, &stop, &Arc::default());
+        let mut logger = ControlledProgress { inner: &mut progress, control: &run.control };
+        if pretraining.run(&mut logger, &stop)? == Trained::Stopped {
             progress.end();
             say("stopped; --resume goes on from here");
             return Ok(ExitStatus::Interrupted);
@@ -140,7 +144,9 @@ impl Pretrain {
         };
         let stop = stop::on_signals()?;
         let mut progress = Progress::new();
-        if training.run(&mut progress, &stop)? == Trained::Stopped {
+        let run = ControlledRun::listen(Kind::Pretrain, &training.out, &stop, &Arc::default());
+        let mut logger = ControlledProgress { inner: &mut progress, control: &run.control };
+        if training.run(&mut logger, &stop)? == Trained::Stopped {
             progress.end();
             say("stopped; --resume goes on from here");
             return Ok(ExitStatus::Interrupted);

@@ -9,6 +9,7 @@ use super::options::Options;
 use super::plan::EvaluationPlan;
 use super::worker_pool;
 use crate::agent::policy_source::MakePolicy;
+use crate::control::RunningClock;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
 use crate::env::remote::Elsewhere;
@@ -95,6 +96,7 @@ impl Evaluation {
             options,
             elsewhere: Elsewhere::default(),
             read: Arc::new(read),
+            clock: Arc::default(),
         };
         Ok(Evaluation { plan, manifest })
     }
@@ -108,6 +110,11 @@ impl Evaluation {
     /// What identifies this run.
     pub fn manifest(&self) -> &RunManifest {
         &self.manifest
+    }
+
+    /// Its time, by which it can be paused.
+    pub(crate) fn clock(&self) -> &Arc<RunningClock> {
+        &self.plan.clock
     }
 
     /// The tasks that are played.

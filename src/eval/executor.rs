@@ -1,12 +1,13 @@
 //! What all workers of an evaluation share.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::plan::EvaluationPlan;
 use super::work_queue::WorkQueue;
 use crate::agent::policy_source::MakePolicy;
+use crate::agent::served::ServerGone;
 use crate::episode::record::Episode;
 
 /// What is played, by whom, and whom to tell.
@@ -17,7 +18,7 @@ pub(crate) struct Executor {
     pub(crate) stop: Arc<AtomicBool>,
     /// Set when nobody takes the episodes any more.
     pub(crate) give_up: AtomicBool,
-    /// Why the policy cannot be evaluated like this at all: the first decision shows it.
+    /// Why the policy cannot be evaluated like this at all: a decision shows it.
     pub(crate) refusal: OnceLock<String>,
     pub(crate) queue: WorkQueue,
     pub(crate) sender: Mutex<Sender<Message>>,
@@ -32,6 +33,19 @@ pub(crate) enum Message {
 }
 
 impl Executor {
+    /// Ends the run, with nothing recorded of what is under way: the policy cannot be evaluated like this, or any longer.
+    pub(crate) fn refuse(&self, problem: String) {
+        self.refusal.get_or_init(|| problem);
+        self.give_up.store(true, Ordering::Relaxed);
+    }
+
+    /// The same, where it is an error that no other episode is spared.
+    pub(crate) fn refuse_if_gone(&self, error: &anyhow::Error) {
+        if error.is::<ServerGone>() {
+            self.refuse(error.to_string());
+        }
+    }
+
     /// Tells the thread that waits; false when nobody waits any more.
     pub(crate) fn send(&self, message: Message) -> bool {
         self.sender.lock().unwrap_or_else(PoisonError::into_inner).send(message).is_ok()

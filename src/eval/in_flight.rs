@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::plan::EvaluationPlan;
 use crate::episode::failure::Failure;
@@ -18,8 +18,8 @@ pub(crate) struct InFlight {
     pub(crate) at: usize,
     /// Which one it is.
     pub(crate) spec: EpisodeSpec,
-    /// Since when it is played.
-    pub(crate) began: Instant,
+    /// Since when it is played, by the run's clock.
+    pub(crate) began: Duration,
     /// What was recorded so far.
     pub(crate) episode: Episode,
 }
@@ -46,7 +46,7 @@ impl InFlight {
             attempts: spec.attempts + 1,
             ..Episode::default()
         };
-        InFlight { at, spec, began: Instant::now(), episode }
+        InFlight { at, spec, began: evaluation.clock.now(), episode }
     }
 
     /// Ends it with an error, unless it has one.
@@ -146,10 +146,12 @@ impl Watchdog {
 
     /// Takes a worker's episodes away from it when one has taken so much longer than `limit` that the worker must hang within
     /// one step: between two steps it looks at the time itself.
-    pub(crate) fn abandon_if_hanging(&self, limit: Duration) -> Option<Vec<InFlight>> {
+    pub(crate) fn abandon_if_hanging(&self, now: Duration, limit: Duration) -> Option<Vec<InFlight>> {
         let patience = limit + (limit / 10).max(Duration::from_secs(1));
         let mut state = self.lock();
-        if state.is_abandoned || !state.slots.iter().flatten().any(|in_flight| in_flight.began.elapsed() >= patience) {
+        if state.is_abandoned
+            || !state.slots.iter().flatten().any(|in_flight| now.saturating_sub(in_flight.began) >= patience)
+        {
             return None;
         }
         state.is_abandoned = true;

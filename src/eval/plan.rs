@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::options::Options;
+use crate::control::RunningClock;
 use crate::domain::Task;
 use crate::env::remote::Elsewhere;
 use crate::episode::scenes::Scenes;
@@ -17,6 +18,8 @@ pub(crate) struct EvaluationPlan {
     pub(crate) options: Options,
     /// How environments in other processes are reached.
     pub(crate) elsewhere: Elsewhere,
+    /// The time that it takes, which stands still while it is paused.
+    pub(crate) clock: Arc<RunningClock>,
     /// What tasks without subtasks were read as, by their places.
     pub(crate) read: Arc<BTreeMap<usize, Wish>>,
 }

@@ -49,6 +49,7 @@ impl Worker {
 
     /// Whether there is more to play.
     fn round(&mut self) -> Result<bool, Abandoned> {
+        self.executor.evaluation.clock.wait(&self.executor.stop);
         if self.executor.stop.load(Ordering::Relaxed) || self.executor.give_up.load(Ordering::Relaxed) {
             return Ok(false);
         }
@@ -80,7 +81,9 @@ impl Worker {
     /// Reads or writes what is recorded, unless nobody waits for it any more.
     fn record<T>(&self, change: impl FnOnce(&mut Vec<Option<InFlight>>) -> T) -> Result<T, Abandoned> {
         let mut state = self.watchdog.lock();
-        if state.is_abandoned { Err(Abandoned) } else { Ok(change(&mut state.slots)) }
+        // What a refusal cut short is played again another time.
+        let is_void = state.is_abandoned || self.executor.refusal.get().is_some();
+        if is_void { Err(Abandoned) } else { Ok(change(&mut state.slots)) }
     }
 
     fn is_idle(&self) -> Result<bool, Abandoned> {
@@ -146,7 +149,10 @@ impl Worker {
     fn policy(&mut self) -> anyhow::Result<&mut dyn Policy> {
         let policy = match self.policy.take() {
             Some(policy) => policy,
-            None => (self.executor.make_policy)().context("the policy could not be made again")?,
+            None => {
+                let made = (self.executor.make_policy)().inspect_err(|error| self.executor.refuse_if_gone(error));
+                made.context("the policy could not be made again")?
+            }
         };
         Ok(&mut **self.policy.insert(policy))
     }
@@ -157,8 +163,11 @@ impl Worker {
             Ok(_) => self.policy.take(),
             Err(error) => return self.fail_all(&format!("{error:#}")),
         };
-        let rollouts = &mut self.rollouts;
-        let decided = guarded(|| decide_all(policy.as_deref_mut().context("there is no policy")?, rollouts));
+        let (rollouts, executor) = (&mut self.rollouts, &self.executor);
+        let decided = guarded(|| {
+            let decided = decide_all(policy.as_deref_mut().context("there is no policy")?, rollouts);
+            decided.inspect_err(|error| executor.refuse_if_gone(error))
+        });
         match decided {
             Ok(decisions) => {
                 self.policy = policy;
@@ -202,8 +211,7 @@ impl Worker {
                     // No episode of it can end so: that is said once, and none is recorded.
                     let problem =
                         "the policy has no end of its own, so its word cannot end an episode: use --end grader";
-                    self.executor.refusal.get_or_init(|| problem.into());
-                    self.executor.give_up.store(true, Ordering::Relaxed);
+                    self.executor.refuse(problem.into());
                     return Err(Abandoned);
                 }
             }
@@ -213,13 +221,14 @@ impl Worker {
             Ok(TraceStep::of(&tick, rollout))
         });
         let (limit, goes_on) = (self.executor.evaluation.options.timeout, rollout.end().is_none());
+        let now = self.executor.evaluation.clock.now();
         self.record(|slots| {
             let Some(in_flight) = &mut slots[slot] else { return };
             match taken {
                 Ok(step) => in_flight.episode.trace.push(step),
                 Err(problem) => in_flight.fail(&problem),
             }
-            if let Some(limit) = limit.filter(|&limit| goes_on && in_flight.began.elapsed() >= limit) {
+            if let Some(limit) = limit.filter(|&limit| goes_on && now.saturating_sub(in_flight.began) >= limit) {
                 in_flight.fail(&format!("timed out: it took longer than {} s", limit.as_secs_f64()));
             }
         })

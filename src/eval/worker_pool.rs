@@ -134,10 +134,11 @@ impl WorkerPool {
     /// Leaves workers behind that hang within a step, and starts others in their places. What a worker played by itself is over.
     fn abandon_hanging(&mut self) -> anyhow::Result<Vec<(usize, Episode)>> {
         let Some(limit) = self.executor.evaluation.options.timeout else { return Ok(Vec::new()) };
+        let now = self.executor.evaluation.clock.now();
         let mut over = Vec::new();
         for number in 0..self.workers.len() {
             let Some((watchdog, _)) = &self.workers[number] else { continue };
-            let Some(mut left) = watchdog.abandon_if_hanging(limit) else { continue };
+            let Some(mut left) = watchdog.abandon_if_hanging(now, limit) else { continue };
             self.workers[number] = None;
             if let [only] = &mut left[..] {
                 only.fail(&format!("timed out: a step went on after the {} s of the episode", limit.as_secs_f64()));

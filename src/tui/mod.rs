@@ -21,6 +21,7 @@ mod pacing;
 pub mod screen;
 mod signals;
 mod start_page;
+mod steering;
 pub mod terminal;
 mod terminal_input;
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
@@ -24,6 +25,7 @@ use super::opening::{Open, Opening, Picked, StartStyle, pick};
 use super::pacing::{self, Pacer};
 use super::signals::{self, PATIENCE};
 use super::start_page::StartPage;
+use super::steering::ExplorerControl;
 use super::terminal::{self, Counted};
 use super::update::{Effect, ExitReason, Msg, update};
 use super::worker;
@@ -79,7 +81,9 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
         Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
     keyboard.listen(tell.clone())?;
     let session = screen.session.clone();
-    let work = |open: Open| start_worker(open, session.clone(), &tell);
+    let control = ExplorerControl::new(tell.clone());
+    let listens = control.listen();
+    let work = |open: Open| start_worker(open, session.clone(), &tell, &control);
     let (commands, first, goes_on) = match opening {
         Opening::Named(open) => (work(open)?, Vec::new(), false),
         Opening::Picked(entries, open) => {
@@ -114,7 +118,8 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
         keep(path, None);
     }
 
-    let pictures = tell;
+    control.command(commands.clone());
+    let pictures = tell.clone();
     if screen.runs && !screen.manual && !goes_on && app.layout().is_some() {
         commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
     }
@@ -126,6 +131,8 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
         None => run_loop(shown, &messages),
     };
     drop(guard);
+    control.leave();
+    drop(listens);
     if !matches!(exit, Ok(ExitReason::WorkerGone)) {
         let_work_end(&messages, Instant::now() + PATIENCE / 2);
     }
@@ -136,11 +143,17 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
 }
 
 /// Starts the worker that opens an exploration, which is kept in that file as it goes on.
-fn start_worker(open: Open, session: Option<PathBuf>, tell: &SyncSender<Msg>) -> io::Result<Sender<SessionCommand>> {
-    let events = tell.clone();
+fn start_worker(
+    open: Open,
+    session: Option<PathBuf>,
+    tell: &SyncSender<Msg>,
+    control: &Arc<ExplorerControl>,
+) -> io::Result<Sender<SessionCommand>> {
+    let (events, control) = (tell.clone(), control.clone());
     let gone = Gone(tell.clone());
     let tell_event = move |event| {
         let _ = &gone;
+        control.hear(&event);
         // Whoever does not listen any more commands nothing any more either.
         drop(events.send(Msg::Session(event)));
     };

@@ -35,6 +35,7 @@ pub(super) fn play_again(
         scenes: Arc::new(run.scenes.clone()),
         elsewhere: elsewhere.clone(),
         read: Arc::default(),
+        clock: Arc::default(),
         options: Options {
             jobs,
             end: run.manifest.end,

@@ -1,0 +1,143 @@
+//! Who acts, as `--policy` names it.
+
+use std::ffi::OsStr;
+use std::time::Duration;
+
+use clap::builder::{PossibleValue, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command, Error};
+
+use crate::agent::policy_source::{self, PolicySource};
+use crate::agent::registry::NamedAgent;
+use crate::agent::served::{PolicyAddress, ServedPolicy};
+
+/// Who acts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum PolicyName {
+    /// The trained agent.
+    Agent,
+    /// Shortest paths and interactions, knowing everything.
+    Expert,
+    /// A possible action by chance.
+    Random,
+    /// A person, at first.
+    Manual,
+    /// A policy from elsewhere.
+    Elsewhere(Elsewhere),
+}
+
+/// A policy that is none of the program's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Elsewhere {
+    /// A policy server.
+    Server(PolicyAddress),
+}
+
+/// How a policy from elsewhere is dealt with.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct ElsewhereOptions {
+    /// How long a policy server may take for an answer
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400), default_value_t = 60)]
+    policy_timeout: u64,
+}
+
+impl Elsewhere {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// When it cannot be used; says what to do.
+    pub(crate) fn open(&self, options: ElsewhereOptions) -> anyhow::Result<PolicySource> {
+        match self {
+            Elsewhere::Server(address) => ServedPolicy::source(address, Duration::from_secs(options.policy_timeout)),
+        }
+    }
+
+    /// The same for an explorer, which opens it when it is to act.
+    pub(crate) fn agent(&self, options: ElsewhereOptions) -> NamedAgent {
+        let (name, own) = (self.to_string(), self.clone());
+        policy_source::agent_of(name, move || own.open(options))
+    }
+}
+
+impl std::fmt::Display for Elsewhere {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Elsewhere::Server(address) => address.fmt(f),
+        }
+    }
+}
+
+/// The names without anything behind them, with what help says of each.
+static NAMES: [(&str, &str, PolicyName); 4] = [
+    ("agent", "The trained agent", PolicyName::Agent),
+    ("expert", "Shortest paths and interactions, knowing everything", PolicyName::Expert),
+    ("random", "A possible action by chance", PolicyName::Random),
+    ("manual", "You, at first", PolicyName::Manual),
+];
+
+/// Reads `--policy`.
+#[derive(Clone, Copy)]
+pub(crate) struct PolicyNameParser {
+    /// Whether a person may act.
+    manual: bool,
+}
+
+impl PolicyNameParser {
+    /// Of a command in which nobody sits at the keys.
+    pub(crate) const HEADLESS: PolicyNameParser = PolicyNameParser { manual: false };
+    /// Of the explorer.
+    pub(crate) const EXPLORER: PolicyNameParser = PolicyNameParser { manual: true };
+
+    fn names(self) -> impl Iterator<Item = &'static (&'static str, &'static str, PolicyName)> {
+        NAMES.iter().filter(move |(_, _, name)| self.manual || *name != PolicyName::Manual)
+    }
+
+    fn read(self, text: &str) -> Result<PolicyName, String> {
+        if let Some((_, _, name)) = self.names().find(|(known, _, _)| *known == text) {
+            return Ok(name.clone());
+        }
+        if text.starts_with("ws:") || text.starts_with("wss:") {
+            return text.parse().map(|address| PolicyName::Elsewhere(Elsewhere::Server(address)));
+        }
+        let known: Vec<&str> = self.names().map(|(name, _, _)| *name).collect();
+        Err(format!("{text:?} is no policy: it is {}, or ws:HOST:PORT for a policy server", known.join(", ")))
+    }
+}
+
+impl TypedValueParser for PolicyNameParser {
+    type Value = PolicyName;
+
+    fn parse_ref(&self, command: &Command, _: Option<&Arg>, value: &OsStr) -> Result<PolicyName, Error> {
+        let fails =
+            |problem: String| Error::raw(ErrorKind::InvalidValue, format!("--policy: {problem}\n")).with_cmd(command);
+        let text = value.to_str().ok_or_else(|| fails("it is no text".into()))?;
+        self.read(text).map_err(fails)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let own = self.names().map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+        let elsewhere =
+            PossibleValue::new("ws:HOST:PORT").help("A policy server that speaks vla-eval's or openpi's protocol");
+        Some(Box::new(own.chain(std::iter::once(elsewhere))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_policies_are_named_and_others_by_where_they_are() {
+        let read = |text: &str| PolicyNameParser::HEADLESS.read(text);
+        assert_eq!(read("expert"), Ok(PolicyName::Expert));
+        assert!(matches!(read("ws:127.0.0.1:8000"), Ok(PolicyName::Elsewhere(Elsewhere::Server(_)))));
+        assert_eq!(PolicyNameParser::EXPLORER.read("manual"), Ok(PolicyName::Manual));
+    }
+
+    #[test]
+    fn what_is_no_policy_is_refused_with_what_there_is() {
+        let refusal = PolicyNameParser::HEADLESS.read("manual").unwrap_err();
+        assert!(refusal.contains("agent, expert, random, or ws:HOST:PORT"), "{refusal}");
+        assert!(PolicyNameParser::HEADLESS.read("wss:host:1").unwrap_err().contains("ssh -L"));
+    }
+}

@@ -1,0 +1,177 @@
+//! `sprint ctl` steers what runs beside it.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+
+use serde_json::Value;
+
+use crate::program::{Sprint, wait_for};
+use crate::terminal::Session;
+
+/// The program in a folder of its own, with a folder of its own for sockets.
+struct Steered {
+    sprint: Sprint,
+}
+
+impl Steered {
+    fn new() -> Steered {
+        let sprint = Sprint::new();
+        std::fs::create_dir(sprint.path("runtime")).unwrap();
+        Steered { sprint }
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = self.sprint.command(line);
+        command.env("XDG_RUNTIME_DIR", self.sprint.path("runtime"));
+        command
+    }
+
+    fn eval(&self, run: &str) -> Child {
+        let line = format!("eval --tasks tasks.json --policy random --seeds 40 --jobs 1 --json --out {run}");
+        self.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    fn ctl(&self, line: &str) -> Output {
+        self.command(&format!("ctl {line}")).output().unwrap()
+    }
+
+    fn text(&self, line: &str) -> String {
+        let ended = self.ctl(line);
+        assert!(ended.status.success(), "{line}: {}", String::from_utf8_lossy(&ended.stderr));
+        String::from_utf8(ended.stdout).unwrap()
+    }
+
+    fn refusal(&self, line: &str) -> String {
+        let ended = self.ctl(line);
+        assert_eq!(ended.status.code(), Some(1), "{line}");
+        String::from_utf8(ended.stderr).unwrap()
+    }
+
+    fn list(&self) -> Vec<Value> {
+        self.text("list --json").lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    fn sockets(&self) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.sprint.path("runtime/sprint")).into_iter().flatten();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    }
+}
+
+#[test]
+fn an_evaluation_that_was_paused_comes_to_the_same_bytes() {
+    let steered = Steered::new();
+    steered.sprint.sample("tasks.json", 1, 5);
+    assert!(steered.eval("whole").wait().unwrap().success());
+    let mut paused = steered.eval("paused");
+    wait_for(|| !steered.list().is_empty());
+    assert!(steered.text("pause").contains("paused"));
+    let status = || serde_json::from_str::<Value>(&steered.text("status --json --of paused")).unwrap();
+    assert_eq!(status()["state"], "paused");
+    let before = status()["progress"]["done"].clone();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let after = status()["progress"]["done"].clone();
+    assert!(
+        after.as_u64().unwrap() <= before.as_u64().unwrap() + 1,
+        "{before} {after}: no more than the step under way"
+    );
+    assert!(paused.try_wait().unwrap().is_none());
+    assert!(steered.refusal("instruct Hello").contains("its tasks'"));
+    steered.text("resume");
+    assert!(paused.wait().unwrap().success());
+    for file in ["episodes.jsonl", "manifest.json", "summary.json"] {
+        let read = |run: &str| steered.sprint.read(&format!("{run}/{file}"));
+        assert_eq!(read("paused"), read("whole"), "{file}");
+    }
+    assert!(steered.list().is_empty() && steered.sockets().is_empty());
+}
+
+#[test]
+fn two_of_a_kind_are_told_apart_one_is_stopped_and_what_a_killed_one_left_is_cleared_away() {
+    let steered = Steered::new();
+    steered.sprint.sample("tasks.json", 1, 5);
+    let (mut one, mut other) = (steered.eval("one"), steered.eval("other"));
+    wait_for(|| steered.list().len() == 2);
+    for which in ["one", "other"] {
+        steered.text(&format!("pause --of {which}"));
+    }
+    assert!(steered.refusal("status").contains("several run here"));
+    assert!(steered.refusal("status --of third").contains("nothing that runs here is called"));
+    let mut tail = steered.command("ctl tail --of one").stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(tail.stdout.take().unwrap()).lines();
+    let mut heard = vec![lines.next().unwrap().unwrap()];
+    steered.text(&format!("stop --of {}", one.id()));
+    assert_eq!(one.wait().unwrap().code(), Some(130), "as after Ctrl-C");
+    heard.extend(lines.map(Result::unwrap));
+    assert!(tail.wait().unwrap().success());
+    assert!(heard.iter().any(|line| line.contains("\"event\":\"progress\"")), "{heard:?}");
+    assert!(heard.iter().any(|line| line.contains("\"event\":\"stopping\"")), "{heard:?}");
+    let summary: Value = serde_json::from_str(&steered.sprint.read("one/summary.json")).unwrap();
+    assert_eq!(summary["partial"], true);
+    other.kill().unwrap();
+    other.wait().unwrap();
+    assert_eq!(steered.sockets().len(), 1);
+    assert!(steered.list().is_empty() && steered.sockets().is_empty());
+}
+
+#[test]
+fn only_the_user_himself_is_obeyed() {
+    let steered = Steered::new();
+    steered.sprint.sample("tasks.json", 1, 5);
+    let mut child = steered.eval("run");
+    wait_for(|| !steered.list().is_empty());
+    let socket = steered.sockets().pop().unwrap();
+    let folder = socket.parent().unwrap();
+    assert_eq!((folder.metadata().unwrap().mode() & 0o777, socket.metadata().unwrap().mode() & 0o777), (0o700, 0o600));
+    let as_other = |script: &str| {
+        let mut command = Command::new("setpriv");
+        command.args(["--reuid", "65534", "--clear-groups", "perl", "-MIO::Socket::UNIX", "-e", script]);
+        command.arg(&socket).output()
+    };
+    if as_other("exit 0").is_ok_and(|tried| tried.status.success()) {
+        // Even where every file permission lets him in.
+        for path in socket.ancestors().take_while(|path| *path != std::env::temp_dir() && path.parent().is_some()) {
+            std::fs::set_permissions(path, PermissionsExt::from_mode(0o777)).unwrap();
+        }
+        let ask = r#"$s = IO::Socket::UNIX->new(Peer => $ARGV[0]) or die $!; print $s qq({"ask":"do","order":"stop"}\n);
+                     print <$s>"#;
+        let said = String::from_utf8(as_other(ask).unwrap().stdout).unwrap();
+        assert!(said.contains("it is another user's"), "{said}");
+        assert!(steered.refusal("list").contains("a folder of your own"), "and the folder is trusted no more");
+        std::fs::set_permissions(folder, PermissionsExt::from_mode(0o700)).unwrap();
+    } else {
+        eprintln!("skipped: no process of another user can be started here");
+    }
+    assert!(child.try_wait().unwrap().is_none(), "it goes on");
+    steered.text("stop");
+    child.wait().unwrap();
+}
+
+#[test]
+fn an_explorer_is_told_run_paused_and_ended_from_another_terminal() {
+    let state = tempfile::tempdir().unwrap();
+    let arguments = ["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"];
+    let mut session = Session::open(state.path(), (120, 36), "explore", &arguments);
+    session.see("step 0");
+    let ctl = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
+        let ended = command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path()).output().unwrap();
+        assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
+        String::from_utf8(ended.stdout).unwrap()
+    };
+    ctl(&["instruct", "pick up the quince"]);
+    session.see("told: Pick up the quince.");
+    session.see("Instruction > Pick up the quince.");
+    ctl(&["resume", "--of", "explore"]);
+    session.miss("step 0");
+    ctl(&["pause"]);
+    let status = || serde_json::from_str::<Value>(&ctl(&["status", "--json"])).unwrap();
+    wait_for(|| status()["state"] == "paused");
+    let told = status();
+    assert_eq!((&told["kind"], &told["instruction"]), (&"explore".into(), &"Pick up the quince.".into()));
+    assert!(told["progress"]["done"].as_u64().unwrap() > 0);
+    ctl(&["stop"]);
+    assert_eq!(session.end(), 130, "as after a signal");
+    assert_eq!(ctl(&["list", "--json"]), "");
+}
