@@ -21,7 +21,9 @@ pub(crate) struct Transitions {
     pub(crate) objects: Tensor,
     /// The classes that the policy's object head learns, by index [n]; 0 for none.
     pub(crate) object_target: Tensor,
-    /// 1 on the transition into the span's last state, [n] floats.
+    /// r, [n] floats: 1 on the transition into a demonstrated span's last state.
+    pub(crate) reward: Tensor,
+    /// 1 where nothing follows: on the transition into the span's last state, [n] floats.
     pub(crate) terminal: Tensor,
     /// 1 where the action was executed and led to s′, 0 where it is a correction of what was executed, [n] floats.
     pub(crate) executed: Tensor,
@@ -143,6 +145,7 @@ impl Batch {
             actions: own(|items| &items.actions),
             objects: own(|items| &items.objects),
             object_target: own(|items| &items.object_target),
+            reward: own(|items| &items.reward),
             terminal: cat(&|source| source.terminal.shallow_clone()),
             executed: own(|items| &items.executed),
         };

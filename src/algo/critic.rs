@@ -84,7 +84,7 @@ impl<'a> CriticLearner<'a> {
             let terminal = segment.of(&all.terminal);
             match (segment.name, &bootstrap) {
                 (CHAIN | AGG_A, Some(bootstrap)) => RewardDone::chained(&terminal, bootstrap),
-                _ => RewardDone::of_skill(&terminal),
+                _ => RewardDone { reward: segment.of(&all.reward), terminal },
             }
         };
         let (rewards, terminals): (Vec<Tensor>, Vec<Tensor>) =

@@ -264,6 +264,7 @@ mod tests {
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
             object_target: Tensor::from_slice(&vec![0i64; rows.len()]),
             actions: Tensor::from_slice(&actions),
+            reward: Tensor::from_slice(&rows.iter().map(|row| row.4).collect::<Vec<f32>>()),
             terminal: Tensor::from_slice(&rows.iter().map(|row| row.4).collect::<Vec<f32>>()),
             executed: Tensor::ones([rows.len() as i64], (Kind::Float, Device::Cpu)),
         }
@@ -417,6 +418,35 @@ mod tests {
         assert_eq!(loss, other);
         assert!(losses(1.0, 0.0)["q_loss"] != losses(1.0, 1.0)["q_loss"]);
         assert_eq!(loss["action_loss"], losses(1.0, 0.0)["action_loss"]);
+    }
+
+    #[test]
+    fn a_reward_need_not_end_anything_and_an_end_need_not_be_rewarded() {
+        let _chance = crate::nets::testing::chance();
+        let nets = nets();
+        // Half a reward on the way to state 1 and half at the end; the other action ends it for nothing.
+        let mut base = transitions(
+            &[(0, 0, 0, 1, 0.0), (0, 0, 1, 2, 1.0), (1, 0, 0, 2, 1.0), (1, 0, 1, 2, 1.0)]
+                .into_iter()
+                .cycle()
+                .take(64)
+                .collect::<Vec<_>>(),
+        );
+        base.reward = Tensor::from_slice(&[0.5f32, 0.0, 0.5, 0.0]).repeat([16]);
+        let batch = Batch { base, pairs: None };
+        let mut update = update(&nets, 600, IQL, None);
+        while !update.is_done() {
+            update.update(&batch, false).unwrap();
+        }
+        let at = |state, action: i64| {
+            let one = Tensor::from_slice(&[action]);
+            nets.target.0.min_q(&look(&[state]), &say(&[0]), &one, &Tensor::from_slice(&[0i64])).double_value(&[0])
+        };
+        let v = nets.online.0.value(&look(&[1]), &say(&[0])).double_value(&[0]);
+        assert!((v - 0.35).abs() < 0.02, "the 0.7-expectile of 0.5 and 0: {v}");
+        for (state, action, right) in [(0, 0, 0.5 + 0.9 * 0.35), (0, 1, 0.0), (1, 0, 0.5), (1, 1, 0.0)] {
+            assert!((at(state, action) - right).abs() < 0.03, "Q of {state}, {action}: {}", at(state, action));
+        }
     }
 
     #[test]

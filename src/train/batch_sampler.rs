@@ -157,6 +157,7 @@ impl<'a> BatchSampler<'a> {
             taken.push(flag(label.executed));
         }
         let terminal: Vec<f32> = items.iter().map(|item| flag(item.is_last())).collect();
+        let ended = crate::algo::chain::RewardDone::of_skill(&Tensor::from_slice(&terminal).to_device(self.device));
         // Both observations share all frames but two, which are gathered once.
         let last = u32::from(self.with_next);
         let stack = |item: &Item| Item { frame: item.frame + last, ..*item }.stack(self.history + last);
@@ -170,7 +171,8 @@ impl<'a> BatchSampler<'a> {
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
             object_target: Tensor::from_slice(&named).to_device(self.device),
-            terminal: Tensor::from_slice(&terminal).to_device(self.device),
+            reward: ended.reward,
+            terminal: ended.terminal,
             executed: Tensor::from_slice(&taken).to_device(self.device),
         })
     }
