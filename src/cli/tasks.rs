@@ -67,6 +67,9 @@ struct SampleArgs {
     /// The kinds of rooms to take [default: all]
     #[arg(long, value_parser = value_names::room(), value_delimiter = ',', value_name = "ROOM,...")]
     rooms: Vec<Room>,
+    /// Only these scenes of a dataset [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
+    only_scenes: Vec<String>,
     /// Whose words tell the agent what to do, in tasks from a dataset
     #[arg(long, value_parser = value_names::phrasing(), default_value = Phrasing::GRAMMAR)]
     phrasing: Phrasing,
@@ -145,8 +148,19 @@ impl SampleArgs {
         };
         let name = self.out.file_stem().map_or_else(|| "tasks".into(), |stem| stem.to_string_lossy().into_owned());
         let lengths = self.length.0.clone();
-        let spec = SampleSpec { name, length: lengths[0], count: self.count as usize, seed: self.seed, rooms };
+        let spec = SampleSpec {
+            name,
+            length: lengths[0],
+            count: self.count as usize,
+            seed: self.seed,
+            rooms,
+            only_scenes: self.only_scenes.clone(),
+        };
         let set = if scenes == Path::new("generated") {
+            ensure!(
+                spec.only_scenes.is_empty(),
+                "--only-scenes names scenes of a dataset, and generated houses have none"
+            );
             let counter = Counter::new("sampling", u64::from(self.count));
             let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| counter.add(1)));
             counter.end();

@@ -87,6 +87,21 @@ impl FrameStore {
         self.trajectories.iter().zip(places).map(kept).collect()
     }
 
+    /// The same, and besides every trajectory that plays in one of these scenes.
+    ///
+    /// # Errors
+    /// When no trajectory plays in one of them.
+    pub(crate) fn kept_apart_with(&self, hold_out: usize, withheld_scenes: &[String]) -> anyhow::Result<Vec<bool>> {
+        let plays_in = |trajectory: &Trajectory, name: &String| matches!(&trajectory.scene, SceneRef::Named(scene) if scene == name);
+        for name in withheld_scenes {
+            let is_there = self.trajectories.iter().any(|trajectory| plays_in(trajectory, name));
+            anyhow::ensure!(is_there, "withheld_scenes names {name:?}, and no trajectory plays there");
+        }
+        let withheld = |trajectory: &Trajectory| withheld_scenes.iter().any(|name| plays_in(trajectory, name));
+        let kept = self.kept_apart(hold_out).into_iter().zip(&self.trajectories);
+        Ok(kept.map(|(apart, trajectory)| apart || withheld(trajectory)).collect())
+    }
+
     /// The trajectory that a frame belongs to.
     pub(crate) fn trajectory_of(&self, frame: usize) -> usize {
         self.firsts.partition_point(|&first| first <= frame) - 1
@@ -168,7 +183,7 @@ fn named(datasets: &[Dataset], name: &str) -> anyhow::Result<Arc<Scene>> {
 
 #[cfg(test)]
 mod tests {
-    use super::FrameStore;
+    use super::{FrameStore, SceneRef};
     use crate::data::dataset;
     use crate::data::dataset::Dataset;
     use crate::domain::{Action, ActionType, Cell, Trajectory, trajectory};
@@ -184,6 +199,18 @@ mod tests {
         assert_eq!(frame_store.kept_apart(2), [false, false], "each dataset is counted for itself");
         frame_store.trajectories[0].split = "valid_seen".into();
         assert_eq!(frame_store.kept_apart(0), [true, false]);
+    }
+
+    #[test]
+    fn what_plays_in_a_withheld_scene_is_kept_apart_and_a_scene_that_nothing_plays_in_is_refused() {
+        let mut frame_store = frame_store();
+        let own = frame_store.trajectories[1].scene.clone();
+        frame_store.trajectories[0].scene = SceneRef::Named("elsewhere".into());
+        assert_eq!(frame_store.kept_apart_with(0, &["elsewhere".into()]).unwrap(), [true, false]);
+        assert_eq!(frame_store.kept_apart_with(0, &[]).unwrap(), [false, false]);
+        assert!(own != frame_store.trajectories[0].scene);
+        let error = frame_store.kept_apart_with(0, &["nowhere".into()]).unwrap_err().to_string();
+        assert!(error.contains("withheld_scenes names \"nowhere\""), "{error}");
     }
 
     #[test]

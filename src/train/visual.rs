@@ -43,7 +43,7 @@ pub(crate) fn train(
     if let Some((step, tensors)) = state.read()? {
         learner.restore_checked(state.path, step, &tensors)?;
     }
-    let apart = frame_store.kept_apart(preset.hold_out);
+    let apart = frame_store.kept_apart_with(preset.hold_out, &preset.withheld_scenes)?;
     ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
     let drawn = |step, count, held_out| {
         frames(frame_store, preset.seed, step, count, &|frame| apart[frame_store.trajectory_of(frame)] == held_out)

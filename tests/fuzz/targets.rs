@@ -85,7 +85,14 @@ fn shipped(file: &str) -> Vec<u8> {
 }
 
 fn sampled() -> TaskSet {
-    let wish = SampleSpec { name: "sampled".into(), length: 2, count: 2, seed: 5, rooms: vec![Room::Bathroom] };
+    let wish = SampleSpec {
+        name: "sampled".into(),
+        length: 2,
+        count: 2,
+        seed: 5,
+        rooms: vec![Room::Bathroom],
+        only_scenes: Vec::new(),
+    };
     sample::sample_generated(&wish, &|| ()).unwrap()
 }
 

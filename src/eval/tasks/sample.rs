@@ -66,6 +66,8 @@ pub struct SampleSpec {
     pub seed: u64,
     /// The kinds of rooms to take; they take turns in generated sets.
     pub rooms: Vec<Room>,
+    /// The dataset's scenes to take, by name; all where none is named.
+    pub only_scenes: Vec<String>,
 }
 
 impl SampleSpec {
@@ -167,9 +169,13 @@ pub(crate) fn sample_dataset(
         dataset.check_split(split)?;
     }
     let scenes = dataset.scenes()?;
+    for name in &spec.only_scenes {
+        ensure!(scenes.contains_key(name), "{} has no scene {name:?}", dataset.folder().display());
+    }
+    let wanted = |name: &String| spec.only_scenes.is_empty() || spec.only_scenes.contains(name);
     let fits = |trajectory: &Trajectory| match &trajectory.scene {
-        SceneRef::Named(name) => scenes.get(name).is_some_and(|scene| spec.rooms.contains(&scene.room)),
-        SceneRef::Generated { room, .. } => spec.rooms.contains(room),
+        SceneRef::Named(name) => wanted(name) && scenes.get(name).is_some_and(|scene| spec.rooms.contains(&scene.room)),
+        SceneRef::Generated { room, .. } => spec.only_scenes.is_empty() && spec.rooms.contains(room),
         SceneRef::Elsewhere => false,
     };
     let mut spans: Vec<(u32, usize)> = Vec::new();
@@ -281,7 +287,7 @@ mod tests {
     use crate::house::testing::kitchen_house;
 
     fn spec(length: usize, count: usize, seed: u64) -> SampleSpec {
-        SampleSpec { name: "sampled".into(), length, count, seed, rooms: Room::ALL.to_vec() }
+        SampleSpec { name: "sampled".into(), length, count, seed, rooms: Room::ALL.to_vec(), only_scenes: Vec::new() }
     }
 
     #[test]

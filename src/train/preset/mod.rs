@@ -26,6 +26,9 @@ pub struct Preset {
     pub seed: u64,
     /// One trajectory in that many is held out.
     pub(crate) hold_out: usize,
+    /// Scenes of which no trajectory is learned from: their tasks show what an agent makes of a floor plan it never saw.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) withheld_scenes: Vec<String>,
     /// Steps between two saved states.
     pub(crate) save_every: u64,
     /// Steps between two lines of training/progress.jsonl.

@@ -35,7 +35,7 @@ impl Demonstrations {
     pub(crate) fn items(&self, spec: &Pretraining) -> anyhow::Result<Items> {
         let source = ItemSource {
             trajectories: &self.frame_store.trajectories,
-            apart: &self.frame_store.kept_apart(spec.preset.hold_out),
+            apart: &self.frame_store.kept_apart_with(spec.preset.hold_out, &spec.preset.withheld_scenes)?,
             held_out: &self.frame_store.held_out,
             summaries: &summaries(spec)?,
         };
