@@ -8,6 +8,7 @@ use anyhow::Context;
 use super::drawing::{Anchor, Drawing};
 use super::line_chart::{COLOURS, INK, LineChart, Series};
 use crate::data::text_file;
+use crate::report::stats::Interval;
 
 /// The size of a panel.
 const PANEL: (f64, f64) = (380.0, 230.0);
@@ -65,6 +66,9 @@ pub fn draw(trainings: &[(String, Curves)], only: &[String]) -> anyhow::Result<D
         .collect();
     names.sort_unstable();
     names.dedup();
+    // The ends of an interval are drawn with what they are an interval of.
+    let all = names.clone();
+    names.retain(|name| interval_of(name).is_none_or(|whole| !all.contains(&whole)));
     anyhow::ensure!(!names.is_empty(), "there is nothing to draw: no training has such numbers");
     let columns = names.len().min(COLUMNS);
     let legend = LINE * (trainings.len() as f64 + 1.0);
@@ -79,12 +83,26 @@ pub fn draw(trainings: &[(String, Curves)], only: &[String]) -> anyhow::Result<D
         let corner = (PANEL.0 * (i % columns) as f64, legend + PANEL.1 * (i / columns) as f64);
         let line = |(_, curves): &(String, Curves)| {
             let points = curves.get(name).into_iter().flatten().map(|(&step, &value)| (step as f64, value));
-            Series { points: points.collect(), ..Series::default() }
+            Series { points: points.collect(), intervals: intervals(curves, name), ..Series::default() }
         };
         let series = trainings.iter().map(line).collect();
-        LineChart { title: name.to_owned(), series, ..LineChart::default() }.draw(&mut drawing, corner, PANEL);
+        let x_label = if name.starts_with("finetuning/") { "environment steps".into() } else { String::new() };
+        LineChart { title: name.to_owned(), x_label, series, y_range: None }.draw(&mut drawing, corner, PANEL);
     }
     Ok(drawing)
+}
+
+/// What a scalar is the end of an interval of, by its name.
+fn interval_of(name: &str) -> Option<&str> {
+    name.strip_suffix("_low").or_else(|| name.strip_suffix("_high"))
+}
+
+/// The interval at each step of a scalar; none where a step has none.
+fn intervals(curves: &Curves, name: &str) -> Vec<Interval> {
+    let [low, high] = ["low", "high"].map(|end| curves.get(&format!("{name}_{end}")));
+    let (Some(points), Some(low), Some(high)) = (curves.get(name), low, high) else { return Vec::new() };
+    let at = |step: &u64| Some([*low.get(step)?, *high.get(step)?]);
+    points.keys().map(at).collect::<Option<Vec<Interval>>>().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -103,6 +121,18 @@ mod tests {
         std::fs::write(folder.path().join("training/progress.jsonl"), lines.join("\n")).unwrap();
         let curves = read(folder.path()).unwrap();
         (folder, curves)
+    }
+
+    #[test]
+    fn the_ends_of_an_interval_are_drawn_at_its_mean_and_not_by_themselves() {
+        let curve = |values: [f64; 2]| [(0, values[0]), (100, values[1])].into();
+        let curves: Curves = [("", [0.2, 0.6]), ("_low", [0.1, 0.5]), ("_high", [0.3, 0.9])]
+            .map(|(end, values)| (format!("finetuning/return{end}"), curve(values)))
+            .into();
+        assert_eq!(intervals(&curves, "finetuning/return"), [[0.1, 0.3], [0.5, 0.9]]);
+        let svg = draw(&[("sprint".into(), curves)], &[]).unwrap().svg();
+        assert!(svg.contains("environment steps") && !svg.contains("return_low"), "{svg}");
+        assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
     }
 
     #[test]
