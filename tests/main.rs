@@ -23,6 +23,7 @@ mod program;
 mod environments;
 mod evaluator;
 mod faults;
+mod finetune;
 mod scenarios;
 mod serve;
 mod training;

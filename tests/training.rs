@@ -110,7 +110,7 @@ pub(crate) fn demonstrations() -> Option<Sprint> {
     Some(sprint)
 }
 
-fn done(sprint: &Sprint, line: &str) -> String {
+pub(crate) fn done(sprint: &Sprint, line: &str) -> String {
     let ended = sprint.run(line);
     assert_eq!(ended.code, Some(0), "{line}: {}", ended.stderr);
     ended.stdout

@@ -95,6 +95,21 @@ pub(crate) struct Provenance {
     /// How many checkpoints' policies it is the mean of, where it is one; seed, steps and trajectories are then the first one's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) averaged_checkpoints: Option<u64>,
+    /// The task that it was finetuned on, where it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) finetuned_on: Option<FinetunedOn>,
+}
+
+/// How a checkpoint was finetuned; all else in its provenance is of the pre-training.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FinetunedOn {
+    /// The task's id.
+    pub(crate) task: String,
+    /// Steps of the environment.
+    pub(crate) steps: u64,
+    /// Updates of policy and critic.
+    pub(crate) updates: u64,
 }
 
 /// A checkpoint's `config.json`.
@@ -339,6 +354,7 @@ pub(super) mod tests {
                 policy_initialised_from: None,
                 critic_initialised_from: None,
                 averaged_checkpoints: None,
+                finetuned_on: None,
             },
         }
     }

@@ -10,6 +10,7 @@ use tch::Tensor;
 use super::decision::Decision;
 use super::loop_guard::LoopGuard;
 use super::select::{self, Heads, Selection};
+use crate::domain::Action;
 use crate::house::view::Candidate;
 use crate::nets::embedding_cache::Embedder;
 
@@ -98,6 +99,16 @@ impl FrameHistory {
         let first = history - self.seen.len();
         let maps: Vec<&Tensor> = (0..history).map(|i| &self.seen[i.saturating_sub(first)]).collect();
         Tensor::cat(&maps, 1)
+    }
+
+    /// The map of the last frame that was observed.
+    pub(crate) fn latest(&self) -> Option<&Tensor> {
+        self.seen.back()
+    }
+
+    /// Remembers that another action was taken than the one that was decided.
+    pub(crate) fn overrule(&mut self, action: Action, candidates: &[Candidate]) {
+        self.loop_guard.chose(action, candidates);
     }
 
     /// What conditions the agent: asked of `condition` once an instruction.

@@ -7,6 +7,7 @@
 use std::path::Path;
 
 use anyhow::Context;
+use tch::nn::VarStore;
 use tch::{Device, Kind, Tensor};
 
 use super::checkpoint::Networks;
@@ -18,8 +19,11 @@ pub(crate) use super::frame_history::SharedEmbedder;
 use super::policy::{Decisions, Observation, Policy, PolicyState, Reading};
 use super::select::Heads;
 use super::value_estimates::Values;
+use crate::domain::Action;
+use crate::house::view::Candidate;
 use crate::nets::frozen::FrameEncoder;
 use crate::nets::visual::SIDE;
+use crate::nets::weights;
 
 /// A policy from a checkpoint.
 pub(crate) struct LearnedPolicy {
@@ -35,9 +39,9 @@ pub(crate) struct LearnedPolicy {
 }
 
 /// What the networks take of a slot: an observation [1, history x features, 7, 7], and what conditions it.
-struct PolicyInputs {
+pub(crate) struct PolicyInputs {
     observation: Tensor,
-    conditioning: Tensor,
+    pub(crate) conditioning: Tensor,
 }
 
 impl LearnedPolicy {
@@ -75,7 +79,41 @@ impl LearnedPolicy {
         Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
     }
 
-    fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<PolicyInputs> {
+    /// Decides from now on by the weights of networks of the same size that learn elsewhere.
+    ///
+    /// # Errors
+    /// When they are of another size.
+    pub(crate) fn take_weights(&mut self, learning: &Networks) -> anyhow::Result<()> {
+        let copy = |from: &VarStore, to: &VarStore| weights::copy(&from.variables().into_iter().collect(), "", to);
+        copy(&learning.policy_store, &self.networks.policy_store)?;
+        match (&learning.critic, &self.networks.critic) {
+            (Some(learning), Some(own)) => copy(&learning.online_store, &own.online_store),
+            (None, None) => Ok(()),
+            _ => anyhow::bail!("one of both agents has a critic, and the other none"),
+        }
+    }
+
+    /// The feature map [1, features, 7, 7] of the frame that a slot looked at last.
+    ///
+    /// # Errors
+    /// When it has looked at none.
+    pub(crate) fn latest_map(&self, slot: usize) -> anyhow::Result<Tensor> {
+        let latest = self.slots.get(slot).and_then(FrameHistory::latest);
+        latest.map(Tensor::shallow_clone).with_context(|| format!("slot {slot} has seen no frame"))
+    }
+
+    /// Another action than the one that was decided is taken in a slot.
+    pub(crate) fn overrule(&mut self, slot: usize, action: Action, candidates: &[Candidate]) {
+        if let Some(history) = self.slots.get_mut(slot) {
+            history.overrule(action, candidates);
+        }
+    }
+
+    /// Looks at a slot's observation without deciding.
+    ///
+    /// # Errors
+    /// When the frame cannot be drawn, or what conditions the agent not be had.
+    pub(crate) fn perceive(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<PolicyInputs> {
         let image = self.encoder.image(here.environment.frame()?);
         let slots = self.slots.len();
         let history = self.slots.get_mut(slot).with_context(|| format!("there are {slots} slots, not {slot}"))?;

@@ -6,6 +6,7 @@ pub(crate) mod conditioning;
 pub mod config;
 pub(crate) mod decision;
 pub(crate) mod experts;
+pub(crate) mod epsilon_greedy;
 pub(crate) mod frame_history;
 pub(crate) mod learned;
 pub(crate) mod logit_adjustment;

@@ -23,6 +23,9 @@ use crate::nets::sentence::default_folder;
 /// Makes a policy; whoever acts on a thread of his own has one of his own.
 pub(crate) type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync;
 
+/// How often a checkpoint is read that is replaced meanwhile.
+const TRIES: usize = 5;
+
 /// A policy that can be made, and what identifies it in a run.
 #[derive(Clone)]
 pub struct PolicySource {
@@ -69,11 +72,10 @@ impl PolicySource {
     pub(crate) fn checkpoint(folder: PathBuf, sampling: bool) -> anyhow::Result<PolicySource> {
         // More threads than one would make sums depend on how many there are, and workers get in each other's way.
         device::set_threads(1);
-        let checkpoint_hash = hash(&folder)?;
         let computes = device::best_device();
         let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), computes)?));
-        let load = {
-            let (folder, chosen) = (folder.clone(), checkpoint_hash.clone());
+        let loading = |chosen: String| {
+            let (folder, sentences) = (folder.clone(), sentences.clone());
             move || -> anyhow::Result<Box<dyn Policy>> {
                 let mut agent = load_agent(&folder, sentences.clone(), computes)?;
                 // What was loaded is what the run's manifest names.
@@ -82,7 +84,18 @@ impl PolicySource {
                 Ok(agent)
             }
         };
-        let name = load()?.name().to_owned();
+        // A training may be about to keep a newer one.
+        let mut tries = 0;
+        let (checkpoint_hash, load, name) = loop {
+            let checkpoint_hash = hash(&folder)?;
+            let load = loading(checkpoint_hash.clone());
+            tries += 1;
+            match load() {
+                Ok(agent) => break (checkpoint_hash, load, agent.name().to_owned()),
+                Err(error) if tries == TRIES || hash(&folder)? == checkpoint_hash => return Err(error),
+                Err(_) => {}
+            }
+        };
         Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make: Arc::new(load), folder: Some(folder) })
     }
 
@@ -108,7 +121,10 @@ fn check_hash(folder: &Path, chosen: &str) -> anyhow::Result<()> {
 }
 
 /// SHA-256 over a checkpoint's configuration and weights.
-fn hash(folder: &Path) -> anyhow::Result<String> {
+///
+/// # Errors
+/// When there is no checkpoint, or it cannot be read.
+pub(crate) fn hash(folder: &Path) -> anyhow::Result<String> {
     CheckpointConfig::check_there(folder)?;
     let mut digest = Sha256::new();
     for file in ["config.json", "model.safetensors"] {

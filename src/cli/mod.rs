@@ -21,6 +21,7 @@ mod explore;
 mod eval;
 mod exit_status;
 mod export;
+mod finetune;
 mod import;
 mod jobs;
 mod labels;
@@ -99,6 +100,8 @@ enum Command {
     Encode(encode::Encode),
     /// Train an agent on a dataset
     Pretrain(pretrain::Pretrain),
+    /// Finetune an agent on tasks, by online reinforcement learning
+    Finetune(finetune::Finetune),
     /// Average the policies of checkpoints that were trained on from a common start
     Average(average::Average),
     /// Draw the curves of trainings to SVG and PNG
@@ -157,6 +160,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Chains(chains) => chains.run(),
         Command::Encode(encode) => encode.run(),
         Command::Pretrain(pretrain) => pretrain.run(),
+        Command::Finetune(finetune) => finetune.run(),
         Command::Average(average) => average.run(),
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),

@@ -159,7 +159,10 @@ fn maps(
 }
 
 /// Appends a tensor's numbers as 16-bit floats.
-fn add_half(tensor: &Tensor, bytes: &mut Vec<u8>) -> anyhow::Result<()> {
+///
+/// # Errors
+/// When they cannot be read.
+pub(super) fn add_half(tensor: &Tensor, bytes: &mut Vec<u8>) -> anyhow::Result<()> {
     let half = tensor.to_device(Device::Cpu).to_kind(Kind::Half).contiguous();
     let filled = bytes.len();
     bytes.resize(filled + half.numel() * 2, 0);

@@ -5,6 +5,7 @@ pub(crate) mod completion_server;
 pub mod collect;
 pub(crate) mod feature_cache;
 pub(crate) mod detection;
+pub(crate) mod finetune;
 pub(crate) mod frame_store;
 pub(crate) mod in_training_eval;
 pub(crate) mod memory_agent;

@@ -61,6 +61,7 @@ pub(super) fn checkpoint_config(
             policy_initialised_from: source_checkpoint(spec.policy_from.as_deref())?,
             critic_initialised_from: source_checkpoint(spec.critic_from.as_deref())?,
             averaged_checkpoints: None,
+            finetuned_on: None,
         },
     })
 }
