@@ -25,8 +25,8 @@ const LIBRARIES: [(&str, &[&str]); 10] = [
     ("ureq", &["train"]),
 ];
 
-/// The commands that use the explorer's screen: the one that opens it, and the one that says what the terminal can draw.
-const COMMANDS_WITH_A_SCREEN: [&str; 2] = ["cli::explore", "cli::doctor"];
+/// The commands that use a screen: those that open one, and the one that says what the terminal can draw.
+const COMMANDS_WITH_A_SCREEN: [&str; 3] = ["cli::annotate", "cli::explore", "cli::doctor"];
 
 fn rank(floor: &str) -> Option<usize> {
     FLOORS.iter().position(|&known| known == floor)
@@ -75,7 +75,7 @@ fn each_library_stays_on_its_floors() {
 }
 
 #[test]
-fn only_the_explorers_commands_use_its_screen() {
+fn only_the_commands_that_open_a_screen_use_one() {
     let uses_screen = |source: &Source| {
         let mut paths = source.named.iter().filter_map(|named| source.below_crate(&named.segments));
         paths.any(|path| path.first().is_some_and(|floor| floor == "tui"))

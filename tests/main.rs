@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)]
 
 mod alfred;
+mod annotation;
 mod circles;
 mod completions;
 mod explore;

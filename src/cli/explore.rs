@@ -157,14 +157,7 @@ impl Display {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             bail!("the explorer needs a terminal; with --plain it reads verbs from standard input instead");
         }
-        let protocol = match self.graphics {
-            GraphicsName::Auto => None,
-            GraphicsName::Kitty => Some(Protocol::Kitty),
-            GraphicsName::Iterm2 => Some(Protocol::Iterm2),
-            GraphicsName::Sixel => Some(Protocol::Sixel),
-            GraphicsName::Halfblocks => Some(Protocol::HalfBlocks),
-            GraphicsName::Ascii => Some(Protocol::Ascii),
-        };
+        let protocol = self.graphics.protocol();
         let log = logging::open().ok();
         let (config, memory) = (settings()?, Some(logging::path().with_file_name("terminals.json")));
         let history = Some(logging::path().with_file_name("history"));
@@ -182,7 +175,7 @@ impl Display {
 }
 
 /// What the person has set in `sprint/explorer.toml` of the configuration folder.
-fn settings() -> anyhow::Result<ExplorerConfig> {
+pub(super) fn settings() -> anyhow::Result<ExplorerConfig> {
     let Ok(base) = etcetera::choose_base_strategy() else { return Ok(ExplorerConfig::default()) };
     let path = base.config_dir().join("sprint").join("explorer.toml");
     match text_file::read(&path) {
@@ -193,13 +186,27 @@ fn settings() -> anyhow::Result<ExplorerConfig> {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum GraphicsName {
+pub(super) enum GraphicsName {
     Auto,
     Kitty,
     Iterm2,
     Sixel,
     Halfblocks,
     Ascii,
+}
+
+impl GraphicsName {
+    /// The way to show pictures; nothing where it has to be found out.
+    pub(super) fn protocol(self) -> Option<Protocol> {
+        match self {
+            GraphicsName::Auto => None,
+            GraphicsName::Kitty => Some(Protocol::Kitty),
+            GraphicsName::Iterm2 => Some(Protocol::Iterm2),
+            GraphicsName::Sixel => Some(Protocol::Sixel),
+            GraphicsName::Halfblocks => Some(Protocol::HalfBlocks),
+            GraphicsName::Ascii => Some(Protocol::Ascii),
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]

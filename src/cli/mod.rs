@@ -6,6 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use exit_status::ExitStatus;
 
+mod annotate;
 mod average;
 mod bench;
 mod chains;
@@ -90,6 +91,8 @@ enum Command {
     Import(import::Import),
     /// Collect demonstrations in generated houses
     Collect(collect::Collect),
+    /// Let people say in a sentence what is done in a dataset's runs of skills
+    Annotate(annotate::Annotate),
     /// Label a dataset's runs of skills, to learn from them
     Relabel(relabel::Relabel),
     /// Look at a dataset's labels
@@ -155,6 +158,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Tasks(tasks) => tasks.run(),
         Command::Import(import) => import.run(),
         Command::Collect(collect) => collect.run(),
+        Command::Annotate(annotate) => annotate.run(),
         Command::Relabel(relabel) => relabel.run(),
         Command::Labels(labels) => labels.run(),
         Command::Chains(chains) => chains.run(),

@@ -83,7 +83,7 @@ struct SampleArgs {
 
 /// Lengths of tasks, as ranges or listed.
 #[derive(Clone)]
-struct TaskLengths(Vec<usize>);
+pub(super) struct TaskLengths(pub(super) Vec<usize>);
 
 impl std::str::FromStr for TaskLengths {
     type Err = String;

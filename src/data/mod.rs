@@ -1,5 +1,6 @@
 //! Data: task files, dataset folders, the importer that makes one of ALFRED's published files, and what is derived for training.
 
+pub(crate) mod annotations;
 pub(crate) mod ensure_free;
 pub(crate) mod atomic_file;
 pub(crate) mod json_positions;

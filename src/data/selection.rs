@@ -59,7 +59,8 @@ pub enum ObjectTarget {
 pub struct DataSelection {
     /// Spans of two or more skills.
     pub(crate) composites: Composites,
-    /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`.
+    /// Whose summaries, when there are several sources' in `labels.jsonl`, e.g. `rules`; of several (`people,rules`) the first that
+    /// has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) label_source: Option<String>,
     /// Whether the policy learns too what would have been right where chance or a learner did something else.

@@ -33,6 +33,9 @@ pub struct SpanSummary {
     /// The model that wrote it, where one did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub maker: Option<Maker>,
+    /// The person who wrote it, where one did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub person: Option<String>,
     /// What the model said where that holds no summary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub malformed: Option<String>,
@@ -92,8 +95,9 @@ pub struct Summaries {
 }
 
 impl Summaries {
-    /// Reads the labels of some datasets' folders: those of one source, which has to be named when a file has several. The last
-    /// line counts where one source labelled the same twice.
+    /// Reads the labels of some datasets' folders: those of one source, which has to be named when a file has several. Of several
+    /// that are named (`people,rules`) the first that has a label counts. The last line counts where one source labelled the same
+    /// twice; under one without a text nothing is learned.
     ///
     /// # Errors
     /// When a file cannot be read, or it is not clear whose labels are meant.
@@ -102,22 +106,36 @@ impl Summaries {
         for folder in folders {
             let path = folder.join(NAME);
             let lines = read(folder)?.0;
-            let sources: BTreeSet<&str> = lines.iter().map(|line| line.source.as_str()).collect();
-            let listed = || sources.iter().copied().collect::<Vec<_>>().join(", ");
-            let wanted = match (source, sources.first()) {
+            let sources: BTreeSet<String> = lines.iter().map(|line| line.source.clone()).collect();
+            let listed = || sources.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let wanted: Vec<&str> = match (source, sources.first()) {
                 // Single skills need none; a run of skills that lacks its own is named where it is looked up.
                 (_, None) => continue,
-                (Some(source), _) if !sources.contains(source) => {
-                    bail!("{} has labels of {}, none of {source}", path.display(), listed())
+                (Some(named), _) => {
+                    let named: Vec<&str> = named.split(',').map(str::trim).collect();
+                    if !named.iter().any(|name| sources.contains(*name)) {
+                        bail!("{} has labels of {}, none of {}", path.display(), listed(), named.join(", "));
+                    }
+                    named
                 }
-                (Some(source), _) => source,
-                (None, Some(only)) if sources.len() == 1 => only,
+                (None, Some(only)) if sources.len() == 1 => vec![only],
                 (None, _) => {
                     bail!("{} has labels of {}: name one as data.label_source in the preset", path.display(), listed())
                 }
             };
-            let wanted = wanted.to_string();
-            by_input.extend(lines.into_iter().filter(|line| line.source == wanted).map(|line| (line.input, line.text)));
+            let mut of_source: HashMap<String, HashMap<String, String>> = HashMap::new();
+            for line in lines {
+                of_source.entry(line.source).or_default().insert(line.input, line.text);
+            }
+            for name in wanted.iter().rev() {
+                let labels = of_source.remove(*name).unwrap_or_default();
+                for (input, text) in labels {
+                    // Where one source has no text for a passage, the next one's counts.
+                    if !text.is_empty() || !by_input.contains_key(&input) {
+                        by_input.insert(input, text);
+                    }
+                }
+            }
         }
         Ok(Summaries { by_input })
     }
@@ -195,6 +213,7 @@ mod tests {
             version: 1,
             input: input.into(),
             maker: None,
+            person: None,
             malformed: None,
         }
     }
@@ -233,6 +252,11 @@ mod tests {
         assert!(error(Some("lm")).contains("none of lm"));
         let found = |source| Summaries::read(&[folder.path()], Some(source)).unwrap().by_input["a"].clone();
         assert_eq!([found("rules"), found("concat")], ["Uno.", "Eins."]);
+        assert_eq!([found("people, rules"), found("concat,rules")], ["Uno.", "Eins."]);
+        assert!(error(Some("lm,people")).contains("none of lm, people"));
+        let mut ledger = Ledger::open(folder.path()).unwrap().0;
+        ledger.append(&[summary("a", "", "concat")]).unwrap();
+        assert_eq!(found("concat,rules"), "Uno.", "a label that was taken back");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The explorer without a screen: a [`session::Session`] takes commands and tells events; the plain mode writes them as lines,
 //! and `tui` draws them.
 
+pub(crate) mod annotation;
 pub(crate) mod breakpoints;
 pub(crate) mod chain_report;
 pub(crate) mod choices;

@@ -1,4 +1,4 @@
-//! Two frames side by side, as one picture: every protocol shows it as it shows a frame.
+//! Frames side by side, as one picture: every protocol shows it as it shows a frame.
 
 use crate::house::view::Frame;
 
@@ -7,9 +7,15 @@ const GAP: usize = 15;
 
 /// Two frames of one size with a dark gap between them.
 pub(crate) fn beside(left: &Frame, right: &Frame) -> Frame {
-    let (height, gap) = (left.height.min(right.height), left.width / GAP);
-    let width = left.width + gap + right.width;
-    let mut both = Frame {
+    in_a_row(&[left, right])
+}
+
+/// Frames of one size in a row, with dark gaps between them.
+pub(crate) fn in_a_row(frames: &[&Frame]) -> Frame {
+    let height = frames.iter().map(|frame| frame.height).min().unwrap_or(0);
+    let gap = frames.first().map_or(0, |first| first.width / GAP);
+    let width = frames.iter().map(|frame| frame.width).sum::<usize>() + gap * frames.len().saturating_sub(1);
+    let mut all = Frame {
         width,
         height,
         rgb: Vec::with_capacity(3 * width * height),
@@ -17,19 +23,19 @@ pub(crate) fn beside(left: &Frame, right: &Frame) -> Frame {
         ids: Vec::with_capacity(width * height),
     };
     for y in 0..height {
-        let row = |frame: &Frame| y * frame.width..(y + 1) * frame.width;
-        let (one, other) = (row(left), row(right));
-        both.rgb.extend_from_slice(&left.rgb[3 * one.start..3 * one.end]);
-        both.rgb.extend(std::iter::repeat_n(0, 3 * gap));
-        both.rgb.extend_from_slice(&right.rgb[3 * other.start..3 * other.end]);
-        both.depth.extend_from_slice(&left.depth[one.clone()]);
-        both.depth.extend(std::iter::repeat_n(0.0, gap));
-        both.depth.extend_from_slice(&right.depth[other.clone()]);
-        both.ids.extend_from_slice(&left.ids[one]);
-        both.ids.extend(std::iter::repeat_n(0, gap));
-        both.ids.extend_from_slice(&right.ids[other]);
+        for (place, frame) in frames.iter().enumerate() {
+            if place > 0 {
+                all.rgb.extend(std::iter::repeat_n(0, 3 * gap));
+                all.depth.extend(std::iter::repeat_n(0.0, gap));
+                all.ids.extend(std::iter::repeat_n(0, gap));
+            }
+            let row = y * frame.width..(y + 1) * frame.width;
+            all.rgb.extend_from_slice(&frame.rgb[3 * row.start..3 * row.end]);
+            all.depth.extend_from_slice(&frame.depth[row.clone()]);
+            all.ids.extend_from_slice(&frame.ids[row]);
+        }
     }
-    both
+    all
 }
 
 #[cfg(test)]

@@ -264,6 +264,7 @@ mod tests {
                 input: passage.digest(),
                 maker: None,
                 malformed,
+                person: None,
             }
         };
         let lines = [

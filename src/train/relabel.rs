@@ -182,6 +182,7 @@ impl CompositeSpan<'_> {
             input: passage.digest.clone(),
             maker: summarizer.maker().cloned(),
             malformed,
+            person: None,
         }
     }
 }

@@ -150,12 +150,7 @@ impl ScreenLayout {
     pub(crate) fn picture(&self, protocol: Protocol, cell_pixels: (u16, u16)) -> Rect {
         let legend = if protocol == Protocol::Ascii && self.sees.height > 2 * LEGEND { LEGEND } else { 0 };
         let inner = Rect { y: self.sees.y + 1, height: self.sees.height.saturating_sub(1 + legend), ..self.sees };
-        let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
-        let widest = u32::from(inner.height) * down / across;
-        let width = widest.min(u32::from(inner.width));
-        let height = (width * across).div_ceil(down).min(u32::from(inner.height));
-        let (width, height) = (width as u16, height as u16);
-        Rect { x: inner.x + (inner.width - width) / 2, y: inner.y, width, height }
+        pictured(inner, 1, cell_pixels)
     }
 
     /// The parts of the page of branches: the list of so many branches, so many wishes, the steps side by side, and two square
@@ -186,6 +181,16 @@ impl ScreenLayout {
         let columns = if self.reach.width >= 60 { 2 } else { 1 };
         (rows * columns).min(9)
     }
+}
+
+/// The cells in the middle of an area's top that so many square pictures in a row fill.
+pub(crate) fn pictured(area: Rect, many: u32, cell_pixels: (u16, u16)) -> Rect {
+    let (across, down) = (u32::from(cell_pixels.0.max(1)), u32::from(cell_pixels.1.max(1)));
+    let many = many.max(1);
+    let width = (many * u32::from(area.height) * down / across).min(u32::from(area.width));
+    let height = (width * across).div_ceil(down * many).min(u32::from(area.height));
+    let (width, height) = (width as u16, height as u16);
+    Rect { x: area.x + (area.width - width) / 2, y: area.y, width, height }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! A [`update::Msg`] changes the [`app::App`] by [`update::update`], which is pure and returns effects; `screen` performs them. One
 //! worker thread owns house and policy; a second one encodes pictures. [`view`] draws the state and nothing else.
 
+pub(crate) mod annotate;
 pub mod app;
 mod capabilities;
 mod completion;
@@ -17,11 +18,13 @@ pub(crate) mod keys;
 pub mod layout;
 pub(crate) mod log;
 pub(crate) mod opening;
+mod paced_display;
 mod pacing;
 pub mod screen;
 mod signals;
 mod start_page;
 mod steering;
+mod taken_terminal;
 pub mod terminal;
 mod terminal_input;
 #[cfg(test)]

@@ -2,14 +2,11 @@
 
 use std::io::{self, Write};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 
 use anyhow::Context;
-use crossterm::queue;
-use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
-use ratatui::Terminal;
-use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 
+use super::paced_display::PacedDisplay;
 use super::start_page::{StartAnswer, StartPage};
 use super::terminal;
 use super::theme::{Ability, Scheme};
@@ -54,17 +51,30 @@ pub(super) struct StartStyle {
 pub(super) fn pick<W: Write>(
     mut page: StartPage,
     style: StartStyle,
-    display: &mut Terminal<CrosstermBackend<W>>,
+    display: &mut PacedDisplay<W>,
     messages: &Receiver<Msg>,
     mut start_worker: impl FnMut(&Start) -> io::Result<Sender<SessionCommand>>,
 ) -> anyhow::Result<Picked> {
     let mut under_way: Option<(Sender<SessionCommand>, Start)> = None;
-    let mut is_stopped = false;
+    let StartStyle { scheme, ability } = style;
+    // Something changed that is not drawn yet.
+    let mut is_stale = true;
     loop {
-        if !is_stopped {
-            draw(&page, style, display)?;
+        let mut wait = None;
+        if is_stale {
+            wait = display.show_when_ready(StartView { page: &page, scheme, ability })?;
+            is_stale = wait.is_some();
         }
-        match messages.recv().context("all threads are gone")? {
+        let msg = match wait {
+            None => messages.recv().context("all threads are gone")?,
+            Some(wait) => match messages.recv_timeout(wait) {
+                Ok(msg) => msg,
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => anyhow::bail!("all threads are gone"),
+            },
+        };
+        is_stale |= !matches!(msg, Msg::Ready);
+        match msg {
             Msg::Key(key) => match page.on_key(key) {
                 StartAnswer::Stay => {}
                 StartAnswer::Open(start) => under_way = Some((start_worker(&start)?, start)),
@@ -85,28 +95,10 @@ pub(super) fn pick<W: Write>(
                     return Ok(Picked::Started { commands, first: vec![event], start });
                 }
             }
-            Msg::StopAsked => {
-                is_stopped = true;
-                terminal::stop()?;
-            }
-            Msg::Continued => {
-                terminal::take_again()?;
-                display.backend_mut().clear_region(ClearType::All)?;
-                display.swap_buffers();
-                is_stopped = false;
-            }
-            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Elsewhere(_) | Msg::Ready => {}
+            Msg::StopAsked => display.stop()?,
+            Msg::Continued => display.go_on()?,
+            Msg::Ready => display.answered(),
+            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Elsewhere(_) => {}
         }
     }
-}
-
-fn draw<W: Write>(
-    page: &StartPage,
-    StartStyle { scheme, ability }: StartStyle,
-    display: &mut Terminal<CrosstermBackend<W>>,
-) -> io::Result<()> {
-    queue!(display.backend_mut(), BeginSynchronizedUpdate)?;
-    display.draw(|frame| frame.render_widget(StartView { page, scheme, ability }, frame.area()))?;
-    queue!(display.backend_mut(), EndSynchronizedUpdate)?;
-    Write::flush(display.backend_mut())
 }

@@ -1,32 +1,30 @@
 //! The loop of the explorer's screen: messages in, one `update`, effects out, one drawing for all that came.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use crossterm::clipboard::CopyToClipboard;
 use crossterm::queue;
-use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::Terminal;
-use ratatui::backend::{Backend, ClearType, CrosstermBackend};
+use ratatui::backend::CrosstermBackend;
 
 use super::app::App;
-use super::capabilities::{ability, first_answer, graphics};
 use super::config::ExplorerConfig;
 use super::graphics::encoder::PictureEncoder;
 use super::graphics::{Protocol, inline};
 use super::history;
-use super::keyboard::Keyboard;
 use super::opening::{Open, Opening, Picked, StartStyle, pick};
-use super::pacing::{self, Pacer};
-use super::signals::{self, PATIENCE};
+use super::paced_display::PacedDisplay;
+use super::signals::PATIENCE;
 use super::start_page::StartPage;
 use super::steering::ExplorerControl;
-use super::terminal::{self, Counted};
+use super::taken_terminal::{QUEUE, TakenTerminal, TerminalOptions};
+use super::terminal;
 use super::update::{Effect, ExitReason, Msg, update};
 use super::worker;
 use crate::agent::registry::PolicyKind;
@@ -57,8 +55,6 @@ pub(crate) struct ScreenOptions {
     pub(crate) log: Option<std::fs::File>,
 }
 
-/// Messages that may wait for the screen; beyond that their senders wait.
-const QUEUE: usize = 64;
 /// How long the meter of bytes a second counts.
 const METERED: Duration = Duration::from_secs(1);
 
@@ -67,19 +63,9 @@ const METERED: Duration = Duration::from_secs(1);
 /// # Errors
 /// When there is no terminal, or the worker stopped.
 pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<ExitReason> {
-    // The screen strips colours itself where there are none: kitty's placeholders carry a number in theirs.
-    crossterm::style::force_color_output(true);
-    let ability = ability();
-    terminal::catch_panics();
-    let (tell, messages) = sync_channel(QUEUE);
-    signals::watch(tell.clone())?;
-    let guard =
-        terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let mut keyboard = Keyboard::default();
-    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref(), &mut keyboard);
-    let mut display =
-        Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
-    keyboard.listen(tell.clone())?;
+    let memory = screen.memory.as_deref();
+    let options = TerminalOptions { protocol: screen.protocol, memory, log: screen.log.as_ref() };
+    let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
     let session = screen.session.clone();
     let control = ExplorerControl::new(tell.clone());
     let listens = control.listen();
@@ -124,7 +110,7 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
         commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
     }
     let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
-    let mut shown = ScreenLoop::new(app, display, commands, encoder, screen.history);
+    let mut shown = ScreenLoop::on(app, display, commands, encoder, screen.history);
     let early = shown.on_messages(first)?;
     let exit = match early {
         Some(exit) => Ok(exit),
@@ -195,7 +181,7 @@ impl Drop for Gone {
 /// The state, the display that shows it, and the threads that work for it.
 pub struct ScreenLoop<W: Write> {
     app: App,
-    display: Terminal<CrosstermBackend<W>>,
+    display: PacedDisplay<W>,
     commands: Sender<SessionCommand>,
     encoder: PictureEncoder,
     /// Where instructions are kept for later sessions.
@@ -204,9 +190,6 @@ pub struct ScreenLoop<W: Write> {
     metered: (u32, u64),
     /// When the meter of bytes a second began to count, and the bytes written until then.
     since: (Instant, u64),
-    pacer: Pacer,
-    /// The program was stopped, and has not been let go on yet: the terminal is another's.
-    is_stopped: bool,
 }
 
 impl<W: Write> ScreenLoop<W> {
@@ -218,9 +201,18 @@ impl<W: Write> ScreenLoop<W> {
         encoder: PictureEncoder,
         history: Option<PathBuf>,
     ) -> ScreenLoop<W> {
+        ScreenLoop::on(app, PacedDisplay::new(display), commands, encoder, history)
+    }
+
+    fn on(
+        app: App,
+        display: PacedDisplay<W>,
+        commands: Sender<SessionCommand>,
+        encoder: PictureEncoder,
+        history: Option<PathBuf>,
+    ) -> ScreenLoop<W> {
         let since = (Instant::now(), terminal::WRITTEN.load(Ordering::Relaxed));
-        let pacer = Pacer::new(first_answer());
-        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since, pacer, is_stopped: false }
+        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since }
     }
 
     /// Draws the state and sends it out whole.
@@ -228,43 +220,7 @@ impl<W: Write> ScreenLoop<W> {
     /// # Errors
     /// When the terminal cannot be written.
     pub fn show(&mut self) -> io::Result<()> {
-        queue!(self.display.backend_mut(), BeginSynchronizedUpdate)?;
-        draw(&mut self.display, &self.app)?;
-        queue!(self.display.backend_mut(), EndSynchronizedUpdate)?;
-        Write::flush(self.display.backend_mut())
-    }
-
-    /// Draws the state where the terminal has taken in what was drawn before, and asks it to say when it has taken in this.
-    /// Returns how long that has to wait otherwise.
-    fn show_when_ready(&mut self) -> io::Result<Option<Duration>> {
-        let now = Instant::now();
-        if self.is_stopped {
-            return Ok(None);
-        }
-        if let Some(left) = self.pacer.waits(now) {
-            return Ok(Some(left));
-        }
-        self.show()?;
-        if self.pacer.sends(now) {
-            self.display.backend_mut().write_all(pacing::QUESTION)?;
-            Write::flush(self.display.backend_mut())?;
-        }
-        Ok(None)
-    }
-
-    /// Gives the terminal back and stops, with all that was started together with it; whoever lets it go on says so by a signal.
-    fn stop(&mut self) -> io::Result<()> {
-        Write::flush(self.display.backend_mut())?;
-        self.is_stopped = true;
-        terminal::stop()
-    }
-
-    /// Takes the terminal again: whoever had it meanwhile left it as they like it.
-    fn go_on(&mut self) -> io::Result<()> {
-        terminal::take_again()?;
-        self.is_stopped = false;
-        self.pacer = Pacer::new(first_answer());
-        self.repaint()
+        self.display.show(&self.app)
     }
 
     /// Takes in messages; says when one of them ends it.
@@ -275,7 +231,7 @@ impl<W: Write> ScreenLoop<W> {
         let mut encode = false;
         for msg in messages {
             if matches!(msg, Msg::Ready) {
-                self.pacer.answered();
+                self.display.answered();
             }
             for effect in update(&mut self.app, msg) {
                 match effect {
@@ -283,18 +239,17 @@ impl<W: Write> ScreenLoop<W> {
                     Effect::Send(command) => drop(self.commands.send(command)),
                     Effect::Encode => encode = true,
                     Effect::Copy(text) => {
-                        queue!(self.display.backend_mut(), CopyToClipboard::to_clipboard_from(text))?;
+                        queue!(self.display.out(), CopyToClipboard::to_clipboard_from(text))?;
                     }
                     Effect::Remember(instruction) => {
                         if let Some(path) = &self.history {
                             keep(path, Some(&instruction));
                         }
                     }
-                    Effect::Mouse(on) => terminal::report_mouse(self.display.backend_mut(), on)?,
-                    Effect::Repaint if self.is_stopped => {}
-                    Effect::Repaint => self.repaint()?,
-                    Effect::Stop => self.stop()?,
-                    Effect::GoOn => self.go_on()?,
+                    Effect::Mouse(on) => terminal::report_mouse(self.display.out(), on)?,
+                    Effect::Repaint => self.display.repaint()?,
+                    Effect::Stop => self.display.stop()?,
+                    Effect::GoOn => self.display.go_on()?,
                     Effect::Quit(exit) => return Ok(Some(exit)),
                 }
             }
@@ -307,14 +262,6 @@ impl<W: Write> ScreenLoop<W> {
         }
         self.meter();
         Ok(None)
-    }
-
-    /// Clears the screen, so that the next drawing is a whole one. The display's own way would ask the terminal where its
-    /// cursor is, and its answer would be taken by whoever reads the keys.
-    fn repaint(&mut self) -> io::Result<()> {
-        self.display.backend_mut().clear_region(ClearType::All)?;
-        self.display.swap_buffers();
-        Ok(())
     }
 
     /// Takes in the terminal's size, should a message about it have been missed.
@@ -354,7 +301,7 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
         screen.measure()?;
         let mut wait = None;
         if is_stale {
-            wait = screen.show_when_ready()?;
+            wait = screen.display.show_when_ready(&screen.app)?;
             is_stale = wait.is_some();
         }
         let first = match wait {
@@ -375,18 +322,11 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
     }
 }
 
-/// Draws the state.
-///
-/// # Errors
-/// When the terminal cannot be written.
-pub(crate) fn draw<B: Backend>(display: &mut Terminal<B>, app: &App) -> Result<(), B::Error> {
-    display.draw(|frame| frame.render_widget(app, frame.area())).map(drop)
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
+    use std::sync::mpsc::sync_channel;
 
     use super::*;
 

@@ -37,7 +37,7 @@ pub(crate) fn screen(app: &mut App) -> String {
         update(app, Msg::Picture(Picture::encode(&job)));
     }
     let mut terminal = Terminal::new(TestBackend::new(app.terminal.size.width, app.terminal.size.height)).unwrap();
-    super::screen::draw(&mut terminal, app).unwrap();
+    terminal.draw(|frame| frame.render_widget(&*app, frame.area())).unwrap();
     terminal.backend().to_string()
 }
 

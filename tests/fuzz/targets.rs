@@ -241,6 +241,7 @@ fn labels(at: &Path) -> Vec<Vec<u8>> {
         version: 1,
         input: "00ff".into(),
         maker: None,
+        person: None,
         malformed: None,
     };
     Ledger::open(at).unwrap().0.append(&[label("a"), label("b"), label("c")]).unwrap();

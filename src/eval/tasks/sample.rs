@@ -254,7 +254,7 @@ pub(crate) fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &
 }
 
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
-fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
+pub(crate) fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
     let said = |steps: &[String]| {
         steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty())
     };
@@ -262,7 +262,7 @@ fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
 }
 
 /// How `folder` is written in a file that lies in `from`: relative, so that both can be moved together.
-fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
+pub(crate) fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
     let real = |path: &Path| path.canonicalize().with_context(|| format!("cannot read {}", path.display()));
     let (to, from) = (real(folder)?, real(from)?);
     let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();

@@ -5,10 +5,13 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use super::job::Job;
 use super::picture::Picture;
 
-/// A place for one job: a newer one replaces it.
+/// What has to be drawn before it can be encoded.
+type Drawing = Box<dyn FnOnce() -> Job + Send>;
+
+/// A place for one drawing: a newer one replaces it.
 #[derive(Default)]
 struct WaitingJob {
-    job: Option<Job>,
+    job: Option<Drawing>,
     closed: bool,
 }
 
@@ -27,7 +30,7 @@ impl PictureEncoder {
         let shared = slot.clone();
         std::thread::Builder::new().name("encoder".into()).spawn(move || {
             while let Some(job) = take(&shared) {
-                if !deliver(Picture::encode(&job)) {
+                if !deliver(Picture::encode(&job())) {
                     break;
                 }
             }
@@ -37,8 +40,13 @@ impl PictureEncoder {
 
     /// Leaves a frame to be encoded, in place of one that still waits.
     pub(crate) fn submit(&self, job: Job) {
+        self.submit_drawing(move || job);
+    }
+
+    /// The same of a frame that the thread has to draw first.
+    pub(crate) fn submit_drawing(&self, drawing: impl FnOnce() -> Job + Send + 'static) {
         let (slot, filled) = &*self.slot;
-        slot.lock().unwrap_or_else(PoisonError::into_inner).job = Some(job);
+        slot.lock().unwrap_or_else(PoisonError::into_inner).job = Some(Box::new(drawing));
         filled.notify_one();
     }
 }
@@ -52,7 +60,7 @@ impl Drop for PictureEncoder {
 }
 
 /// Waits for a job; `None` when no more will come.
-fn take(shared: &(Mutex<WaitingJob>, Condvar)) -> Option<Job> {
+fn take(shared: &(Mutex<WaitingJob>, Condvar)) -> Option<Drawing> {
     let (slot, filled) = shared;
     let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
     loop {

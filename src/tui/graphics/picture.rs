@@ -9,7 +9,8 @@ use ratatui::widgets::Widget;
 
 use super::job::Job;
 use super::protocol::Protocol;
-use super::{blocks, classes, coarse, inline, overlay, placeholder, sixel};
+use super::{blocks, classes, coarse, inline, letters, overlay, placeholder, sixel};
+use crate::domain::Class;
 
 /// An encoded frame.
 #[derive(Clone)]
@@ -20,6 +21,8 @@ pub struct Picture {
     pub(crate) cells: Size,
     /// What is put on the screen.
     pub(crate) content: Content,
+    /// What the letters in it mean, the largest things first; nothing where it has none.
+    pub(crate) legend: Vec<(char, Class)>,
 }
 
 /// What an encoded frame consists of.
@@ -55,7 +58,11 @@ impl Picture {
             Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),
             Protocol::Sixel => Content::Drawn(sixel::draw(job)),
         };
-        Picture { protocol: job.protocol, cells: job.cells, content }
+        let legend = match job.protocol {
+            Protocol::Ascii => letters::legend(&job.frame.ids, &job.classes, &job.letters),
+            _ => Vec::new(),
+        };
+        Picture { protocol: job.protocol, cells: job.cells, content, legend }
     }
 
     /// Whether it lies over the cells, whatever is written there: what is opened over it has to be left out of its area, from

@@ -377,7 +377,7 @@ mod tests {
         let app = app();
         for (width, height) in [(80, 24), (60, 50), (200, 60)] {
             let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(width, height)).unwrap();
-            crate::tui::screen::draw(&mut terminal, &app).unwrap();
+            terminal.draw(|frame| frame.render_widget(&app, frame.area())).unwrap();
         }
     }
 }

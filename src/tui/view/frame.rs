@@ -8,8 +8,9 @@ use unicode_width::UnicodeWidthStr;
 
 use super::panel::panel;
 use super::picture::picture;
+use crate::domain::Class;
 use crate::tui::app::App;
-use crate::tui::graphics::{Protocol, letters};
+use crate::tui::graphics::letters;
 use crate::tui::theme::THEME;
 
 /// The panel with the picture.
@@ -33,18 +34,18 @@ impl Widget for FramePanel<'_> {
         panel(buf, area, app.main.overlay.title(), &right);
         let Some(picture_area) = app.picture_area() else { return };
         picture(app, picture_area, buf);
-        if app.terminal.graphics.protocol == Protocol::Ascii {
+        if let Some(shown) = &app.frame.picture {
             let top = picture_area.bottom();
-            legend(app, Rect { y: top, height: area.bottom().saturating_sub(top), ..area }, buf);
+            legend(&shown.legend, Rect { y: top, height: area.bottom().saturating_sub(top), ..area }, buf);
         }
     }
 }
 
-fn legend(app: &App, area: Rect, buf: &mut Buffer) {
-    let Some(now) = &app.session.now else { return };
+/// What the letters of a picture mean, as far as there is room.
+pub(super) fn legend(letters: &[(char, Class)], area: Rect, buf: &mut Buffer) {
     let mut lines: Vec<Line> = vec![Line::default()];
     let mut used = 0;
-    for (letter, class) in letters::legend(&now.frame.ids, &app.frame.names, &app.frame.letters) {
+    for (letter, class) in letters {
         let word = class.spoken();
         let width = word.width() + 4;
         if used + width > usize::from(area.width) {
@@ -56,7 +57,7 @@ fn legend(app: &App, area: Rect, buf: &mut Buffer) {
         }
         used += width;
         if let Some(line) = lines.last_mut() {
-            line.push_span(Span::styled(letter.to_string(), THEME.key.fg(letters::tint(class))));
+            line.push_span(Span::styled(letter.to_string(), THEME.key.fg(letters::tint(*class))));
             line.push_span(Span::raw(format!(" {word}  ")));
         }
     }

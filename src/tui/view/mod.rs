@@ -1,6 +1,8 @@
 //! The screen: one widget a panel, drawn from the state alone.
 
 mod actions;
+pub(crate) mod annotate;
+pub(crate) mod annotate_layout;
 mod branches;
 mod chain;
 mod compare;
