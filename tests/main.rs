@@ -28,6 +28,7 @@ mod finetune;
 mod scenarios;
 mod serve;
 mod training;
+mod slow_link;
 mod start;
 mod terminal;
 mod terminal_habits;

@@ -108,6 +108,31 @@ fn after_a_kill_the_last_session_comes_first_and_has_every_step_and_branch() {
 }
 
 #[test]
+fn the_list_is_one_key_away_from_the_explorer_and_opens_another_house() {
+    let state = tempfile::tempdir().unwrap();
+    let arguments = ["--policy", "random", "--graphics", "ascii", "--seed", "3", "--paused"];
+    let mut session = Session::open(state.path(), (80, 24), "explore", &arguments);
+    session.see("Mind");
+    session.see("step 0");
+    session.press("n");
+    session.see("main 1/1");
+    session.press("H");
+    session.see("Where do you want to start?");
+    session.see("last session");
+    session.press("bthrm 4\r");
+    session.see("bathroom-4");
+    session.see("main 0/0");
+    session.press(":start\r");
+    session.see("Where do you want to start?");
+    session.press("kitchen 3\r");
+    session.see("kitchen-3");
+    session.press("n");
+    session.see("main 1/1");
+    session.leave();
+    session.is_restored();
+}
+
+#[test]
 fn a_wish_for_this_house_is_one_key_away() {
     let state = tempfile::tempdir().unwrap();
     let arguments = ["--policy", "expert", "--graphics", "ascii", "--seed", "7", "--paused"];

@@ -162,7 +162,7 @@ impl Annotate {
         let scenes = Scenes::in_folder(Some(self.data.join("scenes")));
         match annotate::run(screen, session, scenes)? {
             ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
-            ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
+            ExitReason::Asked | ExitReason::ToList | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
         }
     }
 }

@@ -7,6 +7,9 @@ use clap::Args;
 use crate::domain::EnvironmentName;
 use crate::env::remote::{Elsewhere, Patience};
 
+/// Seconds that an environment in another process may take for each answer, unless told otherwise.
+const PATIENCE: u64 = 60;
+
 /// Where it happens.
 #[derive(Args, Clone)]
 pub(crate) struct EnvironmentChoice {
@@ -15,8 +18,15 @@ pub(crate) struct EnvironmentChoice {
     #[arg(long, value_name = "house|gym:ID|openenv:URL")]
     env: Option<EnvironmentName>,
     /// How long an environment in another process may take for each answer
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    #[arg(long, value_name = "SECONDS", default_value_t = PATIENCE, value_parser = clap::value_parser!(u64).range(1..=86_400))]
     env_timeout: u64,
+}
+
+impl Default for EnvironmentChoice {
+    /// Nothing is named.
+    fn default() -> EnvironmentChoice {
+        EnvironmentChoice { env: None, env_timeout: PATIENCE }
+    }
 }
 
 impl EnvironmentChoice {

@@ -52,7 +52,7 @@ pub(crate) struct Explore {
 
 /// Where the explorer starts.
 #[derive(Args, Clone)]
-struct Origin {
+pub(crate) struct Origin {
     /// The agent's checkpoint: its folder, or its name among checkpoints/ [default: the shipped one]
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
@@ -63,7 +63,7 @@ struct Origin {
     #[arg(long, value_name = "FILE#N")]
     task: Option<String>,
     /// The dataset folder that --scene looks in
-    #[arg(long, value_name = "DIR", default_value = "data")]
+    #[arg(long, value_name = "DIR", default_value = DATA)]
     data: PathBuf,
     /// The kind of room of a generated house [default: kitchen]
     #[arg(long, value_parser = value_names::room(), conflicts_with_all = ["scene", "task"])]
@@ -110,6 +110,7 @@ impl Display {
         self,
         kind: PolicyKind,
         manual: bool,
+        from: &Origin,
         open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
@@ -118,7 +119,7 @@ impl Display {
             let obeyed = plain::run(open()?, input, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
-        self.show_screen(kind, manual, || Opening::Named(Box::new(open)))
+        self.show_screen(kind, manual, || Opening::Named(Box::new(open)), || from.list())
     }
 
     /// Explores an environment with actions of its own until the person leaves.
@@ -134,21 +135,25 @@ impl Display {
         let options = self.screen_options(PolicyKind::Random, manual)?;
         Ok(match crate::tui::elsewhere::run(options, open, agent)? {
             ExitReason::Signal(_) => ExitStatus::Interrupted,
-            ExitReason::Asked | ExitReason::WorkerGone => ExitStatus::Ok,
+            ExitReason::Asked | ExitReason::ToList | ExitReason::WorkerGone => ExitStatus::Ok,
         })
     }
 
     /// The same on the screen; `opening` says what is opened, once it is known that there is a screen.
+
+    /// The same on the screen; `opening` says what is opened, once it is known that there is a screen, and `list` what there is to
+    /// come back to.
     fn show_screen(
         self,
         kind: PolicyKind,
         manual: bool,
         opening: impl FnOnce() -> Opening,
+        list: impl Fn() -> Opening,
     ) -> anyhow::Result<ExitStatus> {
         let screen = self.screen_options(kind, manual)?;
-        match screen::run(screen, opening())? {
+        match screen::run(screen, opening(), list)? {
             ExitReason::Signal(_) => Ok(ExitStatus::Interrupted),
-            ExitReason::Asked | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
+            ExitReason::Asked | ExitReason::ToList | ExitReason::WorkerGone => Ok(ExitStatus::Ok),
         }
     }
 
@@ -224,6 +229,8 @@ impl From<ExpectName> for Expect {
     }
 }
 
+/// The dataset folder where none is named.
+const DATA: &str = "data";
 /// Demonstrations of one scene that are kept at hand.
 const DEMONSTRATIONS: usize = 20;
 
@@ -256,12 +263,13 @@ impl Explore {
             from.elsewhere = Some((named, elsewhere));
         }
         if !is_named && !display.plain {
-            return display.show_screen(kind, manual, move || from.list());
+            return display.show_screen(kind, manual, || from.list(), || from.list());
         }
         // The screen shows what is wrong with an agent; a script is told by the exit code.
         let is_chosen = from.checkpoint.is_some() || from.elsewhere.is_some();
         let needed = display.plain && is_chosen && kind == PolicyKind::Agent;
-        display.show(kind, manual, move || {
+        let list = from.clone().unnamed();
+        display.show(kind, manual, &list, move || {
             let mut exploration = from.exploration(kind)?;
             if needed {
                 exploration.choose(kind)?;
@@ -274,6 +282,24 @@ impl Explore {
 /// Where a session is kept as it goes on.
 fn kept_session() -> PathBuf {
     logging::path().with_file_name("session.json")
+}
+
+impl Default for Origin {
+    /// Nothing is named.
+    fn default() -> Origin {
+        Origin {
+            checkpoint: None,
+            scene: None,
+            task: None,
+            data: DATA.into(),
+            room: None,
+            environment: EnvironmentChoice::default(),
+            instruction: None,
+            expect: ExpectName::Read,
+            seed: None,
+            elsewhere: None,
+        }
+    }
 }
 
 impl Origin {
@@ -321,15 +347,21 @@ impl Origin {
             || self.environment.elsewhere().is_some()
     }
 
+    /// The same without what was named: where to look, and what is made of what is typed.
+    fn unnamed(self) -> Origin {
+        Origin { data: self.data, expect: self.expect, ..Origin::default() }
+    }
+
     /// Everything that there is to start with, and how it is opened.
-    fn list(self) -> Opening {
+    fn list(&self) -> Opening {
         let folders = StartFolders {
             session: kept_session(),
             data: self.data.clone(),
             here: ".".into(),
             checkpoints: policy_source::checkpoints(),
         };
-        Opening::Picked(start_list::list(&folders), Arc::new(move |start| self.open(start)))
+        let from = self.clone();
+        Opening::Picked(start_list::list(&folders), Arc::new(move |start| from.open(start)))
     }
 
     /// Opens what was picked from the list.

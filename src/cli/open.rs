@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
-use super::explore::Display;
+use super::explore::{Display, Origin};
 use super::recorded::{recorded, recorded_elsewhere};
 
 /// Which episode, and how to show it.
@@ -38,6 +38,6 @@ impl Open {
             return self.display.paused().show_elsewhere(true, open, agent);
         }
         let (kind, open) = recorded(&self.episode, self.tasks.as_deref(), self.checkpoint)?;
-        self.display.paused().show(kind, false, open)
+        self.display.paused().show(kind, false, &Origin::default(), open)
     }
 }

@@ -16,6 +16,7 @@ mod key_name;
 mod keyboard;
 pub(crate) mod keys;
 pub mod layout;
+mod link_speed;
 pub(crate) mod log;
 pub(crate) mod opening;
 mod paced_display;

@@ -2,6 +2,7 @@
 //! for a while and taken again.
 
 use std::io::{self, Write};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use crossterm::queue;
@@ -12,6 +13,7 @@ use ratatui::layout::Size;
 use ratatui::widgets::Widget;
 
 use super::capabilities::first_answer;
+use super::link_speed::LinkSpeed;
 use super::pacing::{self, Pacer};
 use super::terminal;
 
@@ -19,6 +21,11 @@ use super::terminal;
 pub(crate) struct PacedDisplay<W: Write> {
     display: Terminal<CrosstermBackend<W>>,
     pacer: Pacer,
+    link: LinkSpeed,
+    /// The frame that is on its way, and its bytes.
+    on_its_way: Option<(Instant, u64)>,
+    /// The bytes of the newest frame.
+    cost: u64,
     /// The program was stopped, and has not been let go on yet: the terminal is another's.
     is_stopped: bool,
 }
@@ -26,7 +33,14 @@ pub(crate) struct PacedDisplay<W: Write> {
 impl<W: Write> PacedDisplay<W> {
     /// Nothing is shown yet.
     pub(crate) fn new(display: Terminal<CrosstermBackend<W>>) -> PacedDisplay<W> {
-        PacedDisplay { display, pacer: Pacer::new(first_answer()), is_stopped: false }
+        PacedDisplay {
+            display,
+            pacer: Pacer::new(first_answer()),
+            link: LinkSpeed::default(),
+            on_its_way: None,
+            cost: 0,
+            is_stopped: false,
+        }
     }
 
     /// The terminal's size.
@@ -66,8 +80,12 @@ impl<W: Write> PacedDisplay<W> {
         if let Some(left) = self.pacer.waits(now) {
             return Ok(Some(left));
         }
+        let before = terminal::WRITTEN.load(Ordering::Relaxed);
         self.show(screen)?;
+        self.cost = terminal::WRITTEN.load(Ordering::Relaxed) - before;
+        self.on_its_way = None;
         if self.pacer.sends(now) {
+            self.on_its_way = Some((now, self.cost));
             self.display.backend_mut().write_all(pacing::QUESTION)?;
             Write::flush(self.display.backend_mut())?;
         }
@@ -77,6 +95,19 @@ impl<W: Write> PacedDisplay<W> {
     /// The terminal has taken in all that was sent.
     pub(crate) fn answered(&mut self) {
         self.pacer.answered();
+        if let Some((sent, bytes)) = self.on_its_way.take() {
+            self.link.observe(bytes, sent.elapsed());
+        }
+    }
+
+    /// The bytes of the newest frame.
+    pub(crate) fn cost(&self) -> u64 {
+        self.cost
+    }
+
+    /// The most bytes that a picture may cost so that keys are answered in time; nothing where the link is fast.
+    pub(crate) fn affords(&self) -> Option<u64> {
+        self.link.affords()
     }
 
     /// Clears the screen, so that the next drawing is a whole one. The display's own way would ask the terminal where its

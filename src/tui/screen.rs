@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -12,11 +12,12 @@ use crossterm::clipboard::CopyToClipboard;
 use crossterm::queue;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
+use ratatui::layout::Size;
 
-use super::app::App;
+use super::app::{App, Graphics};
 use super::config::ExplorerConfig;
 use super::graphics::encoder::PictureEncoder;
-use super::graphics::{Protocol, inline};
+use super::graphics::{Picture, Protocol, inline};
 use super::history;
 use super::opening::{Open, Opening, Picked, StartStyle, pick};
 use super::paced_display::PacedDisplay;
@@ -25,10 +26,11 @@ use super::start_page::StartPage;
 use super::steering::ExplorerControl;
 use super::taken_terminal::{QUEUE, TakenTerminal, TerminalOptions};
 use super::terminal;
+use super::theme::Ability;
 use super::update::{Effect, ExitReason, Msg, update};
 use super::worker;
 use crate::agent::registry::PolicyKind;
-use crate::explore::session::{RunMode, SessionCommand};
+use crate::explore::session::{RunMode, SessionCommand, SessionEvent};
 use crate::explore::start_list::Start;
 
 /// What the screen is started with.
@@ -58,63 +60,58 @@ pub(crate) struct ScreenOptions {
 /// How long the meter of bytes a second counts.
 const METERED: Duration = Duration::from_secs(1);
 
-/// Shows the explorer until it ends.
+/// Shows the explorer until it ends; `list` makes the list of what there is to start with, to come back to.
 ///
 /// # Errors
 /// When there is no terminal, or the worker stopped.
-pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<ExitReason> {
+pub(crate) fn run(
+    screen: ScreenOptions,
+    mut opening: Opening,
+    list: impl Fn() -> Opening,
+) -> anyhow::Result<ExitReason> {
     let memory = screen.memory.as_deref();
     let options = TerminalOptions { protocol: screen.protocol, memory, log: screen.log.as_ref() };
     let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
-    let session = screen.session.clone();
     let control = ExplorerControl::new(tell.clone());
     let listens = control.listen();
-    let work = |open: Open| start_worker(open, session.clone(), &tell, &control);
-    let (commands, first, goes_on) = match opening {
-        Opening::Named(open) => (work(open)?, Vec::new(), false),
-        Opening::Picked(entries, open) => {
-            let style = StartStyle { scheme: screen.config.scheme, ability };
-            let start = |start: &Start| {
-                let (open, start) = (open.clone(), start.clone());
-                work(Box::new(move || open(&start)))
-            };
-            match pick(StartPage::new(entries), style, &mut display, &messages, start)? {
-                Picked::Started { commands, first, start } => (commands, first, start.goes_on()),
-                Picked::Left { exit, is_opening } => {
-                    drop(guard);
-                    if is_opening {
-                        let_work_end(&messages, Instant::now() + PATIENCE / 2);
-                    }
-                    return Ok(exit);
+    let exit = loop {
+        let is_heard = Arc::new(AtomicBool::new(true));
+        let work = |open: Open| {
+            let told = Told { tell: tell.clone(), is_heard: is_heard.clone(), control: control.clone() };
+            start_worker(open, screen.session.clone(), told)
+        };
+        let style = StartStyle { scheme: screen.config.scheme, ability };
+        let Opened { commands, first, goes_on } = match open(opening, style, &mut display, &messages, work)? {
+            Ok(opened) => opened,
+            Err((exit, is_opening)) => {
+                drop(guard);
+                if is_opening {
+                    let_work_end(&messages, Instant::now() + PATIENCE / 2);
                 }
+                return Ok(exit);
             }
+        };
+        control.command(commands.clone());
+        let app = prepared(&screen, display.size()?, graphics.clone(), ability)?;
+        if screen.runs && !screen.manual && !goes_on && app.layout().is_some() {
+            commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
         }
-    };
-    let mut app = App::new(display.size()?, graphics, ability, screen.policy, screen.manual);
-    app.config = screen.config;
-    app.traffic.limit = screen.bandwidth;
-    app.terminal.mouse = app.config.mouse;
-    if app.terminal.mouse {
-        terminal::report_mouse(&mut io::stdout(), true)?;
-    }
-    if let Some(path) = &screen.history {
-        let remembered = history::read(path);
-        app.input.newcomer = remembered.is_first;
-        remembered.instructions.iter().for_each(|instruction| app.input.editor.remember(instruction));
-        keep(path, None);
-    }
-
-    control.command(commands.clone());
-    let pictures = tell.clone();
-    if screen.runs && !screen.manual && !goes_on && app.layout().is_some() {
-        commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;
-    }
-    let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
-    let mut shown = ScreenLoop::on(app, display, commands, encoder, screen.history);
-    let early = shown.on_messages(first)?;
-    let exit = match early {
-        Some(exit) => Ok(exit),
-        None => run_loop(shown, &messages),
+        let pictures = tell.clone();
+        let encoder = PictureEncoder::start(move |picture| pictures.send(Msg::Picture(picture)).is_ok())?;
+        let mut shown = ScreenLoop::on(app, display, commands, encoder, screen.history.clone());
+        let exit = match shown.on_messages(first)? {
+            Some(exit) => Ok(exit),
+            None => run_loop(&mut shown, &messages),
+        };
+        display = shown.display;
+        if !matches!(exit, Ok(ExitReason::ToList)) {
+            break exit;
+        }
+        is_heard.store(false, Ordering::Relaxed);
+        control.leave();
+        terminal::forget_pictures(display.out())?;
+        display.repaint()?;
+        opening = list();
     };
     drop(guard);
     control.leave();
@@ -128,20 +125,85 @@ pub(crate) fn run(screen: ScreenOptions, opening: Opening) -> anyhow::Result<Exi
     }
 }
 
+/// What was opened.
+struct Opened {
+    commands: Sender<SessionCommand>,
+    /// What came from the worker already.
+    first: Vec<Msg>,
+    /// It goes on where it was left, and does not run by itself.
+    goes_on: bool,
+}
+
+/// Opens what was named or is picked; where the person left instead, why, and whether something is still being opened.
+fn open<W: Write>(
+    opening: Opening,
+    style: StartStyle,
+    display: &mut PacedDisplay<W>,
+    messages: &Receiver<Msg>,
+    work: impl Fn(Open) -> io::Result<Sender<SessionCommand>>,
+) -> anyhow::Result<Result<Opened, (ExitReason, bool)>> {
+    match opening {
+        Opening::Named(open) => Ok(Ok(Opened { commands: work(open)?, first: Vec::new(), goes_on: false })),
+        Opening::Picked(entries, open) => {
+            let start = |start: &Start| {
+                let (open, start) = (open.clone(), start.clone());
+                work(Box::new(move || open(&start)))
+            };
+            Ok(match pick(StartPage::new(entries), style, display, messages, start)? {
+                Picked::Started { commands, first, start } => Ok(Opened { commands, first, goes_on: start.goes_on() }),
+                Picked::Left { exit, is_opening } => Err((exit, is_opening)),
+            })
+        }
+    }
+}
+
+/// The state before anything is seen, with what the person has set and typed before.
+fn prepared(screen: &ScreenOptions, size: Size, graphics: Graphics, ability: Ability) -> io::Result<App> {
+    let mut app = App::new(size, graphics, ability, screen.policy, screen.manual);
+    app.config = screen.config.clone();
+    app.traffic.limit = screen.bandwidth;
+    app.terminal.mouse = app.config.mouse;
+    if app.terminal.mouse {
+        terminal::report_mouse(&mut io::stdout(), true)?;
+    }
+    if let Some(path) = &screen.history {
+        let remembered = history::read(path);
+        app.input.newcomer = remembered.is_first;
+        remembered.instructions.iter().for_each(|instruction| app.input.editor.remember(instruction));
+        keep(path, None);
+    }
+    Ok(app)
+}
+
+/// Where a worker tells what happens, as long as anybody wants to know.
+struct Told {
+    tell: SyncSender<Msg>,
+    is_heard: Arc<AtomicBool>,
+    /// Those who steer from elsewhere hear it, too.
+    control: Arc<ExplorerControl>,
+}
+
+impl Told {
+    fn tell(&self, msg: Msg) {
+        if self.is_heard.load(Ordering::Relaxed) {
+            // Whoever does not listen any more commands nothing any more either.
+            drop(self.tell.send(msg));
+        }
+    }
+}
+
+/// Says that the worker and all that it set to work ended, however they did.
+impl Drop for Told {
+    fn drop(&mut self) {
+        self.tell(Msg::WorkerGone);
+    }
+}
+
 /// Starts the worker that opens an exploration, which is kept in that file as it goes on.
-fn start_worker(
-    open: Open,
-    session: Option<PathBuf>,
-    tell: &SyncSender<Msg>,
-    control: &Arc<ExplorerControl>,
-) -> io::Result<Sender<SessionCommand>> {
-    let (events, control) = (tell.clone(), control.clone());
-    let gone = Gone(tell.clone());
+fn start_worker(open: Open, session: Option<PathBuf>, told: Told) -> io::Result<Sender<SessionCommand>> {
     let tell_event = move |event| {
-        let _ = &gone;
-        control.hear(&event);
-        // Whoever does not listen any more commands nothing any more either.
-        drop(events.send(Msg::Session(event)));
+        told.control.hear(&event);
+        told.tell(Msg::Session(event));
     };
     let open = move || {
         let exploration = open()?;
@@ -169,15 +231,6 @@ fn let_work_end(messages: &Receiver<Msg>, until: Instant) {
     }
 }
 
-/// Says that the worker and all that it set to work ended, however they did.
-struct Gone(SyncSender<Msg>);
-
-impl Drop for Gone {
-    fn drop(&mut self) {
-        let _ = self.0.send(Msg::WorkerGone);
-    }
-}
-
 /// The state, the display that shows it, and the threads that work for it.
 pub struct ScreenLoop<W: Write> {
     app: App,
@@ -190,6 +243,12 @@ pub struct ScreenLoop<W: Write> {
     metered: (u32, u64),
     /// When the meter of bytes a second began to count, and the bytes written until then.
     since: (Instant, u64),
+    /// A new picture is not sent yet.
+    is_picture_new: bool,
+    /// A key was pressed, or a run began or ended, and that is not shown yet: over a slow link pictures wait for it.
+    is_urgent: bool,
+    /// The picture that waits.
+    waiting: Option<Picture>,
 }
 
 impl<W: Write> ScreenLoop<W> {
@@ -212,7 +271,18 @@ impl<W: Write> ScreenLoop<W> {
         history: Option<PathBuf>,
     ) -> ScreenLoop<W> {
         let since = (Instant::now(), terminal::WRITTEN.load(Ordering::Relaxed));
-        ScreenLoop { app, display, commands, encoder, history, metered: (0, 0), since }
+        ScreenLoop {
+            app,
+            display,
+            commands,
+            encoder,
+            history,
+            metered: (0, 0),
+            since,
+            is_picture_new: false,
+            is_urgent: false,
+            waiting: None,
+        }
     }
 
     /// Draws the state and sends it out whole.
@@ -230,8 +300,15 @@ impl<W: Write> ScreenLoop<W> {
     pub fn on_messages(&mut self, messages: impl IntoIterator<Item = Msg>) -> io::Result<Option<ExitReason>> {
         let mut encode = false;
         for msg in messages {
-            if matches!(msg, Msg::Ready) {
-                self.display.answered();
+            match msg {
+                Msg::Ready => self.display.answered(),
+                Msg::Key(_) | Msg::Session(SessionEvent::Running(_)) => self.is_urgent = true,
+                Msg::Picture(picture) if self.is_urgent && self.display.affords().is_some() => {
+                    self.waiting = Some(picture);
+                    continue;
+                }
+                Msg::Picture(_) => self.is_picture_new = true,
+                _ => {}
             }
             for effect in update(&mut self.app, msg) {
                 match effect {
@@ -264,6 +341,17 @@ impl<W: Write> ScreenLoop<W> {
         Ok(None)
     }
 
+    /// Takes in what the frame that was sent cost; says whether a picture waited for it, which is to be shown now.
+    fn after_drawing(&mut self) -> io::Result<bool> {
+        self.is_urgent = false;
+        if std::mem::take(&mut self.is_picture_new) {
+            self.app.traffic.keep_to_link(self.display.cost(), self.display.affords());
+        }
+        let Some(picture) = self.waiting.take() else { return Ok(false) };
+        self.on_messages([Msg::Picture(picture)])?;
+        Ok(true)
+    }
+
     /// Takes in the terminal's size, should a message about it have been missed.
     fn measure(&mut self) -> io::Result<()> {
         let size = self.display.size()?;
@@ -294,7 +382,7 @@ impl<W: Write> ScreenLoop<W> {
 }
 
 /// Takes in messages until one of them ends it.
-fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<ExitReason> {
+fn run_loop(screen: &mut ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> anyhow::Result<ExitReason> {
     // Something changed that is not drawn yet.
     let mut is_stale = true;
     loop {
@@ -302,7 +390,10 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
         let mut wait = None;
         if is_stale {
             wait = screen.display.show_when_ready(&screen.app)?;
-            is_stale = wait.is_some();
+            is_stale = wait.is_some() || screen.after_drawing()?;
+        }
+        if is_stale && wait.is_none() {
+            continue;
         }
         let first = match wait {
             None => Some(messages.recv().context("all threads are gone")?),
@@ -324,17 +415,19 @@ fn run_loop(mut screen: ScreenLoop<impl Write>, messages: &Receiver<Msg>) -> any
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-    use std::sync::atomic::AtomicBool;
     use std::sync::mpsc::sync_channel;
 
     use super::*;
+
+    fn told(tell: &SyncSender<Msg>) -> Told {
+        Told { tell: tell.clone(), is_heard: Arc::new(AtomicBool::new(true)) }
+    }
 
     #[test]
     fn the_end_waits_for_those_who_still_compute_and_hears_them_out() {
         let (tell, messages) = sync_channel(1);
         let computed = Arc::new(AtomicBool::new(false));
-        let (done, gone) = (computed.clone(), Gone(tell.clone()));
+        let (done, gone) = (computed.clone(), told(&tell));
         std::thread::spawn(move || {
             let _gone = gone;
             // The queue holds one message: unheard, the worker would wait here for ever.
@@ -350,7 +443,8 @@ mod tests {
     #[test]
     fn the_end_does_not_wait_for_a_worker_past_its_time() {
         let (tell, messages) = sync_channel(1);
-        let still_working = Gone(tell);
+        let still_working = told(&tell);
+        drop(tell);
         let_work_end(&messages, Instant::now());
         assert!(messages.try_recv().is_err(), "the worker is still there, and has said nothing");
         drop(still_working);

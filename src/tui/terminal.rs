@@ -104,6 +104,15 @@ pub(crate) fn holds_pictures(forget: String) {
     *FORGET.lock().unwrap_or_else(PoisonError::into_inner) = Some(forget);
 }
 
+/// Lets the terminal forget the pictures that it holds, while it stays ours.
+///
+/// # Errors
+/// When the terminal cannot be written.
+pub(crate) fn forget_pictures(out: &mut impl Write) -> io::Result<()> {
+    let forget = FORGET.lock().unwrap_or_else(PoisonError::into_inner).take();
+    out.write_all(forget.unwrap_or_default().as_bytes())
+}
+
 /// Gives the terminal back, once. Errors are passed over: a terminal that is gone needs nothing.
 pub(crate) fn give_back() {
     if !OWNED.swap(false, Ordering::SeqCst) {

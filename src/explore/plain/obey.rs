@@ -86,6 +86,7 @@ impl<W: Write> Plain<W> {
             | Verb::Bandwidth(_)
             | Verb::FullFrame
             | Verb::Suspend
+            | Verb::List
             | Verb::Mouse => anyhow::bail!("that is about the screen, and there is none"),
             // Keys of the screen; no line says them.
             Verb::Edit

@@ -89,6 +89,8 @@ pub(crate) enum Verb {
     OpenLink,
     /// Stop, and go on when the shell says so.
     Suspend,
+    /// Back to the list of what there is to start with.
+    List,
     /// End the session.
     Quit,
     /// While typing: tell the agent.

@@ -198,8 +198,10 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     key_verb("turn help", "the next part of the help", |_| Ok(Verb::TurnHelp), &[
         key(Help, "tab", &["tab", "j", "down", "pagedown"], "more", ""),
     ]),
+    verb("start", "", "the list of houses, tasks, agents and runs to start with", |_| Ok(Verb::List)).or(&["list"])
+        .on(&[key(Common, "", &["H"], "the list to start with", "")]),
     verb("quit", "", "end", |_| Ok(Verb::Quit)).or(&["q", "exit"])
-        .on(&[key(Common, "q", &["q"], "quit", "")]),
+        .on(&[key(Common, "q H", &["q"], "quit; H: the list of houses", "")]),
     key_verb("apply", "tell the agent what was typed, or do it; put the wish that is selected on the line", |_| Ok(Verb::Apply), &[
         key(Typing, "enter", &["enter"], "tell the agent", ""),
         key(WishList, "enter", &["enter", "i"], "put it on the line", ""),

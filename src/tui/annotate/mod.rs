@@ -56,7 +56,7 @@ pub(crate) fn run(screen: AnnotateScreen, session: AnnotationSession, scenes: Sc
     let encoder = PictureEncoder::start(move |picture| tell.send(Msg::Picture(picture)).is_ok())?;
     let mut effects = vec![AnnotateEffect::Encode];
     // Something changed that is not drawn yet.
-    let mut is_stale = true;
+    let (mut is_stale, mut is_picture_new) = (true, false);
     let mut next_shot = Instant::now() + SHOT;
     let mut counted = WRITTEN.load(Ordering::Relaxed);
     let exit = loop {
@@ -84,6 +84,9 @@ pub(crate) fn run(screen: AnnotateScreen, session: AnnotationSession, scenes: Sc
         if is_stale {
             wait = display.show_when_ready(&state)?;
             is_stale = wait.is_some();
+            if !is_stale && std::mem::take(&mut is_picture_new) {
+                state.traffic.keep_to_link(display.cost(), display.affords());
+            }
         }
         let shot = state.is_playing().then(|| next_shot.saturating_duration_since(Instant::now()));
         let msg = match wait.into_iter().chain(shot).min() {
@@ -114,7 +117,7 @@ pub(crate) fn run(screen: AnnotateScreen, session: AnnotationSession, scenes: Sc
                 }
             }
             Msg::Paste(text) => state.on_paste(&text),
-            Msg::Picture(picture) => state.picture = Some(picture),
+            Msg::Picture(picture) => (state.picture, is_picture_new) = (Some(picture), true),
             Msg::Ready => display.answered(),
             Msg::StopAsked => display.stop()?,
             Msg::Continued => display.go_on()?,

@@ -51,6 +51,10 @@ pub struct FrameState {
 pub struct Traffic {
     /// The most that a step may cost.
     pub(crate) limit: Option<u64>,
+    /// The most that a picture may cost on the link as it is, where that is slow.
+    pub(crate) link: Option<u64>,
+    /// Pictures of runs are left out: the coarsest cost more than the link can take in time.
+    pub(crate) spares_runs: bool,
     /// How coarse pictures are to keep to that.
     pub(crate) coarseness: u8,
     /// What the newest step cost.
@@ -65,6 +69,9 @@ pub struct Traffic {
 
 /// Steps after which a picture is shown whatever the others cost.
 const LONGEST_WAIT: u32 = 10;
+
+/// A picture that costs so many times what it may is far too much.
+const FAR_TOO_MUCH: u64 = 2;
 
 impl Traffic {
     /// Takes in what the newest steps cost. Pictures get coarser or finer, so that steps keep to what they may cost; where the
@@ -88,9 +95,31 @@ impl Traffic {
         }
     }
 
+    /// Takes in what a frame with a new picture cost over the link as it is. Pictures get coarser, so that a key that is pressed
+    /// behind one is answered in time; where the coarsest cost far more, runs show none.
+    pub(crate) fn keep_to_link(&mut self, bytes: u64, link: Option<u64>) {
+        self.link = link;
+        let Some(most) = link else {
+            if self.limit.is_none() {
+                self.coarseness = 0;
+            }
+            self.spares_runs = false;
+            return;
+        };
+        // Once left out, they are shown again when one keeps to the link: one of a pause may happen to be cheap.
+        let may = if self.spares_runs { most } else { FAR_TOO_MUCH * most };
+        self.spares_runs = bytes > may && self.coarseness >= COARSEST;
+        if bytes > most {
+            let steps = if bytes > FAR_TOO_MUCH * most { 2 } else { 1 };
+            self.coarseness = (self.coarseness + steps).min(COARSEST);
+        } else if self.limit.is_none() && 4 * bytes < most {
+            self.coarseness = self.coarseness.saturating_sub(1);
+        }
+    }
+
     /// Whether a run may show another picture.
     pub(crate) fn affords_picture(&self) -> bool {
-        self.limit.is_none() || self.debt == 0
+        !self.spares_runs && (self.limit.is_none() || self.debt == 0)
     }
 }
 
@@ -109,6 +138,23 @@ mod tests {
             traffic.keep_to_limit(picture + 1000, 1);
         }
         assert!((300_000..=410_000).contains(&written), "{written} bytes in 100 steps");
+    }
+
+    #[test]
+    fn over_a_slow_link_pictures_are_coarser_and_left_out_of_runs_where_that_is_not_enough() {
+        let mut traffic = Traffic::default();
+        traffic.keep_to_link(9000, Some(1250));
+        traffic.keep_to_link(6000, Some(1250));
+        assert_eq!((traffic.coarseness, traffic.affords_picture()), (COARSEST, true));
+        traffic.keep_to_link(1100, Some(1250));
+        assert_eq!((traffic.coarseness, traffic.affords_picture()), (COARSEST, true));
+        traffic.keep_to_link(8000, Some(1250));
+        traffic.keep_to_link(2000, Some(1250));
+        assert!(!traffic.affords_picture());
+        traffic.keep_to_link(300, Some(1250));
+        assert_eq!((traffic.coarseness, traffic.affords_picture()), (COARSEST - 1, true));
+        traffic.keep_to_link(9000, None);
+        assert_eq!((traffic.coarseness, traffic.affords_picture()), (0, true), "the link got better");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
+use super::coarse::COARSEST;
 use super::job::Job;
 use super::labels::over_pixels;
 
@@ -29,6 +30,35 @@ pub(crate) fn kitty(job: &Job) -> String {
         control = "q=2,".into();
     }
     sequence
+}
+
+/// The pixels that are sent, and their width and height: of a coarse frame one for each of its larger pixels, as the terminal
+/// scales. Numbers on things would not be legible then, and keep the frame's own size.
+fn sent(job: &Job) -> (Vec<u8>, usize, usize) {
+    let pixels = over_pixels(&job.labels, &job.frame);
+    let side = side(job);
+    if side == 1 {
+        return (pixels, job.frame.width, job.frame.height);
+    }
+    let (width, height) = (job.frame.width.div_ceil(side), job.frame.height.div_ceil(side));
+    let mut smaller = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let from = 3 * (y * side * job.frame.width + x * side);
+            smaller.extend_from_slice(&pixels[from..from + 3]);
+        }
+    }
+    (smaller, width, height)
+}
+
+/// Pixels of the frame to one that is sent.
+fn side(job: &Job) -> usize {
+    if job.labels.is_empty() { 1 << job.coarseness.min(COARSEST) } else { 1 }
+}
+
+/// The rows of pixels that are sent.
+pub(crate) fn rows_sent(job: &Job) -> usize {
+    job.frame.height.div_ceil(side(job))
 }
 
 /// Lays the uppermost `pixels` rows of the transmitted frame over so many cells from the cursor on, which stays where it is.
@@ -58,11 +88,10 @@ pub(crate) fn iterm2(job: &Job) -> String {
 }
 
 fn png(job: &Job) -> Vec<u8> {
-    let pixels = over_pixels(&job.labels, &job.frame);
+    let (pixels, width, height) = sent(job);
     let mut data = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut data, CompressionType::Default, FilterType::Adaptive);
-    let (width, height) = (job.frame.width as u32, job.frame.height as u32);
-    match encoder.write_image(&pixels, width, height, ExtendedColorType::Rgb8) {
+    match encoder.write_image(&pixels, width as u32, height as u32, ExtendedColorType::Rgb8) {
         Ok(()) => data,
         Err(_) => Vec::new(),
     }

@@ -54,7 +54,7 @@ impl Picture {
             Protocol::HalfBlocks => in_blocks(blocks::draw(job)),
             Protocol::Ascii => in_blocks(classes::draw(job)),
             Protocol::Kitty if job.in_tmux => Content::Placed(inline::kitty(job)),
-            Protocol::Kitty => Content::Laid(inline::kitty(job), job.frame.height),
+            Protocol::Kitty => Content::Laid(inline::kitty(job), inline::rows_sent(job)),
             Protocol::Iterm2 => Content::Drawn(inline::iterm2(job)),
             Protocol::Sixel => Content::Drawn(sixel::draw(job)),
         };

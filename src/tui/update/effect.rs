@@ -30,6 +30,8 @@ pub(crate) enum Effect {
 pub enum ExitReason {
     /// The person wanted to.
     Asked,
+    /// The person wants the list of what there is to start with.
+    ToList,
     /// A signal of that number came.
     Signal(i32),
     /// The worker stopped.

@@ -61,7 +61,10 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         Msg::Mouse(event) => pointer::on_pointer(app, event),
         Msg::Key(key) => match key_after_notice(app, key).or_else(|| keys::verb(app.input.mode, app.page, key)) {
             // What cannot be seen is not begun.
-            Some(verb) if app.layout().is_none() && !matches!(verb, Verb::Quit | Verb::Suspend | Verb::Cancel) => {
+            Some(verb)
+                if app.layout().is_none()
+                    && !matches!(verb, Verb::Quit | Verb::List | Verb::Suspend | Verb::Cancel) =>
+            {
                 vec![]
             }
             Some(verb) => on_action(app, verb),

@@ -111,6 +111,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
         }
         Verb::Suspend => vec![Effect::Stop],
         Verb::Quit => vec![Effect::Quit(ExitReason::Asked)],
+        Verb::List => vec![Effect::Send(SessionCommand::Stop), Effect::Quit(ExitReason::ToList)],
         Verb::Copy => copy(app),
         Verb::Graphics | Verb::Overlay | Verb::Labels | Verb::Bandwidth(_) | Verb::FullFrame | Verb::Mouse => {
             change_display(app, &verb)
@@ -121,7 +122,7 @@ pub(crate) fn on_action(app: &mut App, verb: Verb) -> Vec<Effect> {
 /// Whether a verb would leave what is in no run folder, and was not asked for twice. On a screen too small to ask on, it would
 /// be asked in vain.
 fn asks_first(app: &App, verb: &Verb) -> bool {
-    let leaves = matches!(verb, Verb::Quit | Verb::Ask(SessionCommand::Next | SessionCommand::Seed(_)));
+    let leaves = matches!(verb, Verb::Quit | Verb::List | Verb::Ask(SessionCommand::Next | SessionCommand::Seed(_)));
     let is_unsaved = app.session.now.as_ref().is_some_and(|now| !now.unsaved.is_empty());
     leaves && is_unsaved && app.layout().is_some() && app.input.confirms.as_ref() != Some(verb)
 }

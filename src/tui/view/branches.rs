@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::panel::{fit, panel, put};
+use super::panel::{fit, panel, put, wrap};
 use super::picture::picture;
 use crate::episode::wish::{Wish, WishVerdict};
 use crate::explore::timeline::{Divergence, Timeline};
@@ -42,7 +42,9 @@ impl Widget for BranchesView<'_> {
                     (_, Some(_)) => "this is the branch in hand; select another one (j k)",
                     (_, None) => "select a branch (j k) to see where it parts from the one in hand",
                 };
-                put(buf, inner, 0, hint, THEME.quiet);
+                for (row, line) in (0..).zip(wrap(hint, usize::from(inner.width), "")) {
+                    put(buf, inner, row, line, THEME.quiet);
+                }
             }
         }
     }
@@ -63,12 +65,13 @@ impl BranchesView<'_> {
             let width = if inner.width < 100 { 14 } else { 24 };
             let name = fit(&format!("{tree}{}", branch.name), width);
             let text = format!(
-                "{mark} {:>2} {name:<width$} {:>4} steps {:>2} done  {from:<16} {}",
+                "{mark} {:>2} {name:<width$} {:>4} steps {:>2} done  {from:<16}",
                 at + 1,
                 branch.last,
                 branch.completed,
-                branch.why
             );
+            let has_room = usize::from(inner.width) > text.width() + 10;
+            let text = if has_room { format!("{text} {}", branch.why) } else { text };
             let style = if at == self.0.branches.selected { THEME.chosen } else { Style::new() };
             let prefix = if at == self.0.branches.selected { ">" } else { " " };
             put(buf, inner, row as u16, format!("{prefix}{text}"), style);

@@ -41,7 +41,7 @@ impl Content {
 fn content(app: &App, screen: Size) -> Content {
     if app.input.help.shows_terms {
         let width = WIDEST_TERMS.min(screen.width);
-        let room = usize::from(width).saturating_sub(4 + TERM).max(1);
+        let room = usize::from(width).saturating_sub(5 + TERM).max(1);
         let lines = TERMS.iter().flat_map(|(term, meaning)| {
             let words = wrap(meaning, room, "").into_iter().enumerate();
             words.map(move |(at, line)| (if at == 0 { (*term).to_string() } else { String::new() }, line))

@@ -31,6 +31,9 @@ impl Widget for InstructionRow<'_> {
                 Some(whole) => format!("  tab: {}", fit(whole, usize::from(area.width) / 3)),
                 None => format!("  now: {}", fit(now, usize::from(area.width) / 3)),
             };
+            // What is typed needs the room first.
+            let is_tight = app.input.editor.text().width() + hint.width() + 1 > usize::from(rest.width);
+            let hint = if is_tight { String::new() } else { hint };
             let typed = rest.width.saturating_sub(hint.width() as u16);
             app.input.editor.area().render(Rect { width: typed, ..rest }, buf);
             buf.set_string(rest.x + typed, rest.y, hint, THEME.quiet);

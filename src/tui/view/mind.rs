@@ -137,7 +137,7 @@ fn masked(kind: ActionType, now: &SessionSnapshot, room: usize) -> &'static str 
         ActionType::Slice => ("masked: nothing to slice in reach", "none near"),
         _ => ("masked: tried at this view", "tried here"),
     };
-    if long.width() <= room { long } else { short }
+    [long, short].into_iter().find(|words| words.width() <= room).unwrap_or("-")
 }
 
 /// One class a row, with bars.

@@ -12,7 +12,7 @@ use crate::tui::theme::THEME;
 /// Draws a panel's title over a rule, with something quiet at its right; returns the rest of the panel.
 pub(crate) fn panel(buf: &mut Buffer, area: Rect, title: &str, right: &str) -> Rect {
     let width = usize::from(area.width);
-    let right = fit(right, width.saturating_sub(title.width() + 4));
+    let right = fit_parts(right, width.saturating_sub(title.width() + 4));
     let rule = width.saturating_sub(title.width() + 1 + if right.is_empty() { 0 } else { right.width() + 1 });
     let mut spans =
         vec![Span::styled(title.to_string(), THEME.title), Span::raw(" "), Span::styled("─".repeat(rule), THEME.quiet)];
@@ -39,6 +39,20 @@ pub(crate) fn fit(text: &str, width: usize) -> String {
         short.push('…');
     }
     short
+}
+
+/// A cut text of fewer columns says nothing.
+const STUMP: usize = 6;
+
+/// Parts of a text (`a · b, c`) as far as they fit whole, from the first; a first one that does not fit is cut.
+pub(super) fn fit_parts(text: &str, width: usize) -> String {
+    let ends = [" · ", ", "].iter().flat_map(|between| text.match_indices(between)).map(|(at, _)| at);
+    let whole = std::iter::once(text.len()).chain(ends).filter(|&end| text[..end].width() <= width).max();
+    match whole {
+        Some(end) => text[..end].to_owned(),
+        None if width < STUMP => String::new(),
+        None => fit(text, width),
+    }
 }
 
 /// Lines of at most `width` columns, broken at spaces; later lines start with `indent`.
@@ -86,5 +100,20 @@ pub(crate) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String
     if row < area.height {
         let line = Rect { y: area.y + row, height: 1, ..area };
         Line::styled(fit(&text.into(), usize::from(area.width)), style).render(line, buf);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_that_do_not_fit_whole_are_left_out() {
+        let parts = |width| fit_parts("west, 30 down · far", width);
+        assert_eq!(
+            [parts(30), parts(18), parts(12), parts(4)],
+            ["west, 30 down · far", "west, 30 down", "west", "west"]
+        );
+        assert_eq!((fit_parts("southwards", 8), fit_parts("southwards", 5)), ("southwa…".into(), String::new()));
     }
 }

@@ -6,7 +6,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
-use super::panel::{fit, panel, put};
+use super::panel::{fit, panel, put, wrap};
 use crate::house::view::Candidate;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -31,16 +31,16 @@ impl Widget for ReachPanel<'_> {
         let both = format!("{more} · {hand}");
         // On a narrow screen the last row says it in place of a distance.
         let above = pages > 1 && both.width() + 12 <= usize::from(area.width);
+        let is_narrow = hand.width() + "In reach".width() + 4 > usize::from(area.width);
+        let hand =
+            if is_narrow { hand.trim_start_matches("hand: ").trim_start_matches("hand ").to_owned() } else { hand };
         let inner = panel(buf, area, "In reach", if above { &both } else { &hand });
         let page = app.page_of_candidates();
         if page.is_empty() {
-            put(
-                buf,
-                inner,
-                0,
-                if inner.width < 30 { "nothing: move or turn" } else { "nothing: move closer, or turn" },
-                THEME.quiet,
-            );
+            let hint = if inner.width < 30 { "nothing: move or turn" } else { "nothing: move closer, or turn" };
+            for (row, line) in (0..).zip(wrap(hint, usize::from(inner.width), "")) {
+                put(buf, inner, row, line, THEME.quiet);
+            }
             return;
         }
         let chosen = app.session.decision.as_ref().map(|(decision, _)| decision.action);
@@ -51,7 +51,10 @@ impl Widget for ReachPanel<'_> {
             let style = if chosen == Some(candidate.action()) { THEME.chosen } else { THEME.key };
             let tells = pages > 1 && !above && usize::from(at) + 1 == page.len();
             let distance = format!("  {:.1} m", candidate.distance / 1000.0);
-            let room = longest.min(usize::from(width) - 3 - 6);
+            // A name that would be cut needs the room more than its distance.
+            let distance = if longest + 3 + 6 > usize::from(width) && !tells { String::new() } else { distance };
+            let beside = if tells { more.width() + 2 } else { distance.width() };
+            let room = longest.min(usize::from(width).saturating_sub(2 + beside));
             let spans = vec![
                 Span::styled(format!("{} ", at + 1), style),
                 Span::styled(

@@ -7,7 +7,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::log::tone;
-use super::panel::fit;
+use super::panel::{fit, fit_parts};
 use crate::explore::session::{RunMode, SessionCommand};
 use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
@@ -34,11 +34,12 @@ impl Widget for HeaderRow<'_> {
             });
             words.push(format!("seed {}", now.seed));
         }
-        words.push(if app.input.by_hand() {
+        let who = if app.input.by_hand() {
             format!("you act ({} advises)", app.session.acts())
         } else {
             format!("{} acts", app.session.acts())
-        });
+        };
+        words.push(who);
         let (state, style) = match (&app.session.busy, app.session.run_mode) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
             (None, Some(RunMode::Policy)) => (format!("running {}", app.session.rate.name()), THEME.good),
@@ -52,7 +53,7 @@ impl Widget for HeaderRow<'_> {
         let width = usize::from(area.width);
         let state = fit(&state, width.saturating_sub(NAME.len() + 2));
         let room = width.saturating_sub(NAME.len() + state.width() + 2);
-        let words = fit(&format!("  {}", words.join(" · ")), room);
+        let words = fit(&format!("  {}", said(words, room.saturating_sub(2))), room);
         let gap = width.saturating_sub(NAME.len() + words.width() + state.width());
         Line::from(vec![
             Span::styled(NAME, THEME.title),
@@ -64,11 +65,26 @@ impl Widget for HeaderRow<'_> {
     }
 }
 
+/// The parts that fit whole: where there is no room for all, the seed goes first, then what is in brackets, then
+/// the last.
+fn said(mut words: Vec<String>, room: usize) -> String {
+    while words.len() > 1 && words.join(" · ").width() > room {
+        let seed = words.iter().position(|word| word.starts_with("seed "));
+        let last = words.len() - 1;
+        match (seed, words[last].split_once(" (").map(|(short, _)| short.to_owned())) {
+            (Some(seed), _) => drop(words.remove(seed)),
+            (None, Some(short)) => words[last] = short,
+            (None, None) => drop(words.remove(last)),
+        }
+    }
+    words.join(" · ")
+}
+
 /// The program's name, which the line begins with.
 const NAME: &str = "SPRINT";
 
 /// For whoever has never been here.
-const WELCOME: &str = "New here? space: it acts, waits · w: wishes · i: tell it · h l: time · ?: keys";
+const WELCOME: &str = "New here? ?: keys · space: it acts, waits · w: wishes · i: tell it · h l: time";
 
 /// How pictures are shown and what they cost, as much of it as there is room for.
 fn pictures(app: &App, room: usize) -> String {
@@ -91,16 +107,19 @@ fn pictures(app: &App, room: usize) -> String {
 }
 
 /// What would be lost, and how to keep it or go on.
-fn question(app: &App, verb: &Verb) -> String {
+fn question(app: &App, verb: &Verb, room: usize) -> String {
     let unsaved = app.session.now.as_ref().map_or_else(String::new, |now| now.unsaved.words());
     let is_text = matches!(app.input.mode, Mode::Typing | Mode::Palette);
     let again = match verb {
         Verb::Quit if is_text => "ctrl-c again leaves (kept as the last session)",
         Verb::Quit => "q again leaves (kept as the last session)",
+        Verb::List => "the same again goes to the list (kept as the last session)",
         Verb::Ask(SessionCommand::Next) => "N again leaves this house without",
         _ => "the same again leaves this house without",
     };
-    format!("Not saved: {unsaved}. S saves, {again}")
+    let short = again.split(" (").next().unwrap_or_default();
+    let whole = format!("Not saved: {unsaved}. S saves, {again}");
+    if whole.width() <= room { whole } else { fit(&format!("Not saved: {unsaved}. S saves, {short}"), room) }
 }
 
 /// The last row.
@@ -110,11 +129,11 @@ impl Widget for StatusRow<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let app = self.0;
         if let Some(verb) = &app.input.asked {
-            Line::styled(fit(&question(app, verb), usize::from(area.width)), THEME.bad).render(area, buf);
+            Line::styled(question(app, verb, usize::from(area.width)), THEME.bad).render(area, buf);
             return;
         }
         if app.input.newcomer && (app.input.mode, app.page) == (Mode::Watch, ExplorerPage::Main) {
-            Line::styled(fit(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
+            Line::styled(fit_parts(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
             return;
         }
         if let Some(notice) = app
@@ -172,8 +191,15 @@ impl Widget for StatusRow<'_> {
         };
         let mut spans = Vec::new();
         let mut used = 0;
+        // How to find all keys is said wherever it can be; of the others those that fit whole.
+        let kept: usize =
+            hints.iter().filter(|(key, _)| *key == "?").map(|(key, word)| key.width() + word.width() + 3).sum();
         for (key, word) in hints {
             let word = if *key == "space" && app.session.run_mode.is_some() { "pause" } else { word };
+            let kept = if *key == "?" { 0 } else { kept };
+            if used + key.width() + word.width() + 1 + kept > usize::from(area.width) {
+                continue;
+            }
             used += key.width() + word.width() + 3;
             spans.extend([Span::styled(*key, THEME.key), Span::styled(format!(" {word}  "), THEME.quiet)]);
         }

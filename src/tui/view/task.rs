@@ -50,7 +50,6 @@ impl Widget for TaskPanel<'_> {
         let both = format!("{right}{beside}");
         // Where there is no room for both, the wish in force comes first.
         let right = if both.width() + title.len() + 4 <= width { both } else { right };
-        let inner = panel(buf, area, title, &right);
         let mut lines: Vec<(String, Style)> = Vec::new();
         let advice = wish.and_then(|wish| wish.advice.as_deref()).map(with_keys);
         for (at, subtask) in progress.subtasks.iter().enumerate() {
@@ -72,16 +71,17 @@ impl Widget for TaskPanel<'_> {
         }
         // Done subtasks scroll away first: the current one must be in sight.
         let current = lines.iter().position(|(line, _)| line.starts_with("[>]")).unwrap_or(lines.len());
-        let skip = lines.len().saturating_sub(usize::from(inner.height)).min(current);
-        let hidden = (lines.len() - skip).saturating_sub(usize::from(inner.height));
+        let room = usize::from(area.height.saturating_sub(1));
+        let skip = lines.len().saturating_sub(room).min(current);
+        let hidden = (lines.len() - skip).saturating_sub(room);
+        let right = match (hidden, verdict) {
+            (0, _) => right,
+            (hidden, Some(verdict)) => format!("{verdict} · ▼{hidden}"),
+            (hidden, None) => format!("{done} of {of} · ▼{hidden}"),
+        };
+        let inner = panel(buf, area, title, &right);
         for (row, (line, style)) in (0..inner.height).zip(lines.into_iter().skip(skip)) {
             put(buf, inner, row, line, style);
-        }
-        if hidden > 0 && inner.height > 1 {
-            let mark = format!(" ▼ {hidden} more ");
-            let width = (mark.width() as u16).min(inner.width);
-            let corner = Rect { x: inner.right() - width, y: inner.bottom() - 1, width, height: 1 };
-            put(buf, corner, 0, mark, THEME.note);
         }
     }
 }

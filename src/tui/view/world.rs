@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Widget;
+use unicode_width::UnicodeWidthStr;
 
 use super::map;
 use super::panel::{fit, panel, put};
@@ -66,10 +67,21 @@ impl WorldView<'_> {
                     style,
                 ),
                 Span::styled(format!("{:>5.1} m   ", thing.metres), THEME.quiet),
-                Span::styled(fit(&verdict, room), if thing.possible.is_empty() { THEME.quiet } else { THEME.good }),
+                Span::styled(cut(&verdict, room), if thing.possible.is_empty() { THEME.quiet } else { THEME.good }),
             ])
             .render(row, buf);
         }
+    }
+}
+
+/// A reason of fewer columns says nothing.
+const REASON: usize = 24;
+
+/// A verdict whose reason has hardly any room is given without it: it stands below for the thing that is selected.
+fn cut(verdict: &str, room: usize) -> String {
+    match verdict.split_once(':') {
+        Some((short, _)) if verdict.width() > room && room < REASON => short.to_owned(),
+        _ => fit(verdict, room),
     }
 }
 
