@@ -262,6 +262,8 @@ fn an_agent_with_a_memory_is_trained_evaluated_by_its_own_end_verified_and_corre
     assert!(sprint.read("agent/README.md").contains("on a map of its own"));
     let refused = sprint.run("pretrain D --preset memory.toml --out agent");
     assert!(refused.code != Some(0) && refused.stderr.contains("holds a training already"), "{}", refused.stderr);
+    let refused = sprint.run("eval --tasks tasks.json --checkpoint agent --decision paper --out ruled");
+    assert!(refused.stderr.contains("--decision says nothing to it"), "{}", refused.stderr);
     let refused = sprint.run("pretrain D --preset memory.toml --steps 5 --out other");
     assert!(refused.code != Some(0) && refused.stderr.contains("--steps says nothing"), "{}", refused.stderr);
     done(&sprint, "pretrain D --preset memory.toml --visual-from agent --out second");
@@ -367,6 +369,88 @@ fn an_agent_that_sees_through_resnet18_needs_the_weights_it_was_trained_on() {
     let others = sprint.run("eval --tasks tasks.json --checkpoint agent --out again");
     assert_eq!(others.code, Some(1));
     assert!(others.stderr.contains("the agent was trained on"), "{}", others.stderr);
+}
+
+/// The paper's size in miniature: as it, but narrow, through a tiny MPNet.
+const PAPER: &str = r#"
+extends = "paper"
+save_every = 1
+report_every = 1
+
+[policy]
+embedding = 32
+channels = [4, 4, 4, 4]
+hidden = [8]
+goal_channels = [4, 4, 4, 4]
+
+[policy.attention]
+vocabulary_size = 50
+layers = 1
+heads = 2
+feedforward = 8
+
+[critic]
+channels = [4, 4, 4, 4]
+hidden = [8]
+
+[chaining]
+batch_size = 6
+
+[training]
+steps = 2
+batch_size = 6
+
+[validation]
+tasks = 1
+swaps = 0
+"#;
+
+#[test]
+fn the_papers_size_is_trained_evaluated_verified_explored_and_corrected_through_the_encoders_that_it_names() {
+    let Some(mpnet) = needed::shared("fixtures/tiny-mpnet") else { return };
+    let sprint = Sprint::new();
+    done(&sprint, "collect D --episodes 4 --seed 5 --lengths 2 --annotations 1");
+    done(&sprint, "relabel D --with rules");
+    std::fs::write(sprint.path("paper.toml"), PAPER).unwrap();
+    std::fs::create_dir_all(sprint.path("home/encoders")).unwrap();
+    write_resnet18(&sprint.path("home/encoders/resnet18.safetensors"), 0.01);
+    // No encoder that set-up fetches is there: one that lies elsewhere, and one that is found by its name.
+    let elsewhere = format!("pretrain D --preset sprint --size paper.toml --encoder {} --out agent", mpnet.display());
+    let trained = sprint.run(&elsewhere);
+    assert_eq!(trained.code, Some(0), "{}", trained.stderr);
+    assert!(trained.stderr.contains("an update takes about"), "{}", trained.stderr);
+    let config: serde_json::Value = serde_json::from_str(&sprint.read("agent/config.json")).unwrap();
+    assert_eq!((&config["decision"], &config["loop_guard"]), (&"paper".into(), &false.into()), "{config}");
+    assert!(config["resnet18"].is_string() && config.get("advantage_scale").is_none(), "{config}");
+    assert_eq!(config["logit_adjustment"]["strength"], 0.0, "{config}");
+    assert!(sprint.read("agent/README.md").contains("takes the likeliest possible action, then its class"));
+    assert!(sprint.read("agent/training/progress.jsonl").contains("aggregate_b_action_loss"));
+    std::os::unix::fs::symlink(&mpnet, sprint.path("home/encoders/tiny-mpnet")).unwrap();
+    done(&sprint, "pretrain D --preset sprint --size paper.toml --encoder tiny-mpnet --parts 2 --out parted");
+    assert!(!sprint.read("parted/config.json").contains("folder"), "its name leads to it");
+    assert!(sprint.read("parted/training/preset.toml").contains("parts = 2"));
+    for method in ["am", "l-bc-transformer"] {
+        done(&sprint, &format!("pretrain D --preset {method} --size paper.toml --out {method}"));
+        assert!(!sprint.read(&format!("{method}/config.json")).contains("sentence_encoder"), "{method} reads none");
+    }
+    sprint.sample("tasks.json", 1, 1);
+    for agent in ["agent", "parted", "l-bc-transformer"] {
+        done(&sprint, &format!("eval --tasks tasks.json --checkpoint {agent} --out run-{agent}"));
+    }
+    assert!(done(&sprint, "verify run-agent --checkpoint agent").contains("equal"));
+    done(&sprint, "collect C --episodes 1 --seed 9 --learner agent");
+    let mut explore = assert_cmd::Command::cargo_bin("sprint").unwrap();
+    let explore = explore.current_dir(sprint.path("")).env("SPRINT_HOME", sprint.path("home"));
+    let explored = explore.args(["explore", "--plain", "--checkpoint", "agent"]).write_stdin("step 1\nquit\n").output();
+    assert!(explored.unwrap().status.success());
+    let refused = sprint.run("eval --tasks tasks.json --policy expert --decision mass --out none");
+    assert!(refused.stderr.contains("--decision and --loop-guard are for trained agents"), "{}", refused.stderr);
+    done(&sprint, "eval --tasks tasks.json --checkpoint agent --decision mass --loop-guard on --out other");
+    let manifest: serde_json::Value = serde_json::from_str(&sprint.read("other/manifest.json")).unwrap();
+    assert_eq!(manifest["deciding"], serde_json::json!({"decision": "mass", "loop_guard": true}), "{manifest}");
+    assert!(done(&sprint, "verify other --checkpoint agent").contains("equal"));
+    let continued = sprint.run("eval --tasks tasks.json --checkpoint agent --out other");
+    assert!(continued.code != Some(0) && continued.stderr.contains("deciding"), "{}", continued.stderr);
 }
 
 /// Weights of torchvision's forms, all the same number.

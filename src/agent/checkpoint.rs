@@ -50,7 +50,7 @@ impl Networks {
     ) -> Networks {
         let policy_store = nn::VarStore::new(device);
         let features = visual_encoder.features();
-        let senses = CriticInputs {
+        let inputs = CriticInputs {
             channels: policy.history * features,
             conditioning: policy.embedding,
             goal: policy.goal_channels,
@@ -62,8 +62,8 @@ impl Networks {
             critic: critic.map(|spec| {
                 let (online_store, target_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
                 Critics {
-                    online: Critic::new(&online_store.root(), spec, senses),
-                    target: Critic::new(&target_store.root(), spec, senses),
+                    online: Critic::new(&online_store.root(), spec, inputs),
+                    target: Critic::new(&target_store.root(), spec, inputs),
                     online_store,
                     target_store,
                 }
@@ -82,7 +82,7 @@ impl Networks {
         conditioning: &Tensor,
         candidates: &[Candidate],
     ) -> anyhow::Result<Option<Values>> {
-        match (&self.critic, config.advantage_scale) {
+        match (&self.critic, config.weighing()) {
             (Some(critic), Some(_)) => Values::of(&critic.online, observation, conditioning, candidates).map(Some),
             _ => Ok(None),
         }

@@ -24,7 +24,7 @@ pub(crate) fn of(
     observation: &mut Observation<'_>,
     config: &CheckpointConfig,
     visual: &dyn FrameEncoder,
-    sentences: &SharedEmbedder,
+    sentences: Option<&SharedEmbedder>,
     device: Device,
 ) -> anyhow::Result<Tensor> {
     if config.policy.goal_channels.is_some() {
@@ -36,12 +36,17 @@ pub(crate) fn of(
         numbers.resize(WORDS, Vocabulary::PADDING);
         return Ok(Tensor::from_slice(&numbers).unsqueeze(0).to_device(device));
     }
+    let sentences = sentences.context("there is no sentence encoder to read the instruction")?;
     let mut embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
     Ok(embedder.embed(&[&instruction])?.to_device(device).to_kind(Kind::Float))
 }
 
 /// How much of an instruction the agent reads; nothing where it is shown its goal, or the sentence encoder fails.
-pub(crate) fn reading(instruction: &str, config: &CheckpointConfig, sentences: &SharedEmbedder) -> Option<Reading> {
+pub(crate) fn reading(
+    instruction: &str,
+    config: &CheckpointConfig,
+    sentences: Option<&SharedEmbedder>,
+) -> Option<Reading> {
     let instruction = normalise(instruction);
     match (&config.policy.goal_channels, &config.policy.attention) {
         (Some(_), _) => None,
@@ -50,7 +55,7 @@ pub(crate) fn reading(instruction: &str, config: &CheckpointConfig, sentences: &
             Some(Reading { tokens: words.min(WORDS), cut: words.saturating_sub(WORDS) })
         }
         (None, None) => {
-            let count = sentences.lock().ok()?.encoder().tokens(&instruction).ok()?;
+            let count = sentences?.lock().ok()?.encoder().tokens(&instruction).ok()?;
             Some(Reading { tokens: count.used, cut: count.truncated })
         }
     }

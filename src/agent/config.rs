@@ -1,12 +1,13 @@
 //! A checkpoint's `config.json`: what its networks are, and where they come from.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tch::Device;
 
+use super::decision_rule::{self, DecisionRule};
 use super::logit_adjustment::LogitAdjustment;
 use super::value_estimates::{AdvantageScale, Values};
 use crate::data::json;
@@ -50,6 +51,9 @@ pub(crate) struct SentenceSpec {
     pub(crate) name: String,
     /// The digest of its weights.
     pub(crate) digest: String,
+    /// Where it lay when the agent was trained, unless its name leads there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) folder: Option<PathBuf>,
 }
 
 /// A checkpoint from which another one took networks.
@@ -125,7 +129,7 @@ pub struct CheckpointConfig {
     /// The digest of ResNet-18's weights, where the agent sees through that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) resnet18: Option<String>,
-    /// The method it was trained by: `bc`, `iql`, `sprint`, `am`, `et`; absent in older checkpoints, which are cloned.
+    /// The method it was trained by: `bc`, `iql`, `sprint`, `am`, `transformer-bc`; absent in older checkpoints, which are cloned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) method: Option<String>,
     /// The policy network's size.
@@ -142,7 +146,15 @@ pub struct CheckpointConfig {
     /// How much the critic's advantages count when it decides, see [`AdvantageScale`]; absent where the policy decides alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) advantage_scale: Option<f32>,
-    pub(crate) sentence_encoder: SentenceSpec,
+    /// By which rule it decides.
+    #[serde(default, skip_serializing_if = "DecisionRule::is_mass")]
+    pub(crate) decision: DecisionRule,
+    /// Whether it is kept from repeating itself.
+    #[serde(default = "decision_rule::on", skip_serializing_if = "decision_rule::is_on")]
+    pub(crate) loop_guard: bool,
+    /// What turns its instruction into numbers; absent where it reads words or is shown its goal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) sentence_encoder: Option<SentenceSpec>,
     /// How it was trained, and from what.
     pub(crate) provenance: Provenance,
 }
@@ -218,12 +230,9 @@ impl CheckpointConfig {
     /// # Errors
     /// When `encoder` is another; begins with the field that differs.
     pub(crate) fn goes_with(&self, encoder: &SentenceEncoder) -> anyhow::Result<()> {
-        let (wanted, found) = (self.policy.embedding, encoder.width() as i64);
-        anyhow::ensure!(
-            wanted == found || self.policy.attention.is_some(),
-            "policy.embedding is {wanted}, the sentence encoder's width is {found}"
-        );
-        let SentenceSpec { name, digest: wanted } = &self.sentence_encoder;
+        let Some(SentenceSpec { name, digest: wanted, .. }) = self.read_sentences() else { return Ok(()) };
+        let (embedding, width) = (self.policy.embedding, encoder.width() as i64);
+        anyhow::ensure!(embedding == width, "policy.embedding is {embedding}, the sentence encoder's width is {width}");
         let found = encoder.digest();
         anyhow::ensure!(
             wanted == found,
@@ -232,9 +241,14 @@ impl CheckpointConfig {
         Ok(())
     }
 
-    /// Adjusts the logits of the action head [12] in place, where `logit_adjustment` is there.
+    /// The sentence encoder, where the agent reads an instruction through one.
+    pub(crate) fn read_sentences(&self) -> Option<&SentenceSpec> {
+        self.sentence_encoder.as_ref().filter(|_| self.policy.reads_sentences())
+    }
+
+    /// Adjusts the logits of the action head [12] in place, where `logit_adjustment` is there and the rule has it count.
     pub(crate) fn adjust_logits(&self, logits: &mut [f32]) {
-        if let Some(logit_adjustment) = &self.logit_adjustment {
+        if let (Some(logit_adjustment), DecisionRule::Mass) = (&self.logit_adjustment, self.decision) {
             logit_adjustment.apply(logits);
         }
     }
@@ -269,7 +283,12 @@ impl CheckpointConfig {
 
     /// The values with their scale, where the critic takes part in decisions.
     pub(crate) fn advantage_scale<'a>(&self, values: Option<&'a Values>) -> Option<AdvantageScale<'a>> {
-        values.zip(self.advantage_scale).map(|(values, weight)| AdvantageScale { values, weight })
+        values.zip(self.weighing()).map(|(values, weight)| AdvantageScale { values, weight })
+    }
+
+    /// How much advantages count when it decides; nothing where the policy decides alone.
+    pub(crate) fn weighing(&self) -> Option<f32> {
+        self.advantage_scale.filter(|_| self.decision == DecisionRule::Mass)
     }
 
     /// Features in each of the 7 x 7 cells of a map.
@@ -291,6 +310,10 @@ impl CheckpointConfig {
             "an agent has either visual_encoder or resnet18, not both or none"
         );
         self.check_vocabulary()?;
+        ensure!(
+            self.sentence_encoder.is_some() || !self.policy.reads_sentences(),
+            "sentence_encoder is missing, through which the agent reads its instruction"
+        );
         if let Some(logit_adjustment) = &self.logit_adjustment {
             logit_adjustment.check().map_err(anyhow::Error::msg)?;
         }
@@ -341,7 +364,9 @@ pub(super) mod tests {
             vocabulary: None,
             logit_adjustment: None,
             advantage_scale: None,
-            sentence_encoder: SentenceSpec { name: "tiny".into(), digest: "00".into() },
+            decision: DecisionRule::Mass,
+            loop_guard: true,
+            sentence_encoder: Some(SentenceSpec { name: "tiny".into(), digest: "00".into(), folder: None }),
             provenance: Provenance {
                 preset: "test".into(),
                 dataset: "none".into(),

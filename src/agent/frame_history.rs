@@ -131,11 +131,20 @@ impl FrameHistory {
         Ok(conditioning)
     }
 
-    /// Decides from what the networks say, and remembers the choice. Nothing that the loop guard knows to repeat is chosen
-    /// while there is something else.
-    pub(crate) fn decide(&mut self, heads: &Heads<'_>, candidates: &[Candidate], samples: bool) -> Decision {
+    /// Decides from what the networks say, and remembers the choice. Where it is `guarded`, nothing that the loop guard knows to
+    /// repeat is chosen while there is something else.
+    pub(crate) fn decide(
+        &mut self,
+        heads: &Heads<'_>,
+        candidates: &[Candidate],
+        samples: bool,
+        guarded: bool,
+    ) -> Decision {
         let selection = if samples { Selection::Sample(&mut self.rng) } else { Selection::Greedy };
-        let (candidates, tried) = self.loop_guard.untried(&self.last_image, candidates);
+        let (candidates, tried) = match guarded {
+            true => self.loop_guard.untried(&self.last_image, candidates),
+            false => (candidates.to_vec(), Vec::new()),
+        };
         let decision = select::decide(heads, &candidates, &tried, selection);
         self.loop_guard.chose(decision.action, &candidates);
         decision
@@ -163,10 +172,22 @@ mod tests {
             memory.look(&[7], step);
             let _ = memory.observe(map(0.0), step, 5);
             let logits = ActionType::ALL.map(|kind| -(kind.index() as f32));
-            memory.decide(&Heads::of(&logits, &[0.0; 82]), &[], false).action.kind
+            memory.decide(&Heads::of(&logits, &[0.0; 82]), &[], false, true).action.kind
         };
         assert_eq!([leave("Go.", 0), leave("Go.", 1), leave("Go.", 2)], [MoveAhead, RotateLeft, RotateRight]);
         assert_eq!([leave("Come.", 3), leave("Come.", 4)], [MoveAhead, RotateLeft]);
+    }
+
+    #[test]
+    fn without_a_loop_guard_the_likeliest_is_done_again_and_again() {
+        let mut memory = FrameHistory::default();
+        let logits = ActionType::ALL.map(|kind| -(kind.index() as f32));
+        for step in 0..3 {
+            memory.look(&[7], step);
+            let _ = memory.observe(map(0.0), step, 5);
+            let decision = memory.decide(&Heads::of(&logits, &[0.0; 82]), &[], false, false);
+            assert_eq!(decision.action.kind, ActionType::MoveAhead);
+        }
     }
 
     #[test]
@@ -183,7 +204,7 @@ mod tests {
             for step in 3..12u8 {
                 memory.look(&[step / 4], u32::from(step));
                 let seen = memory.observe(map(f32::from(step)), u32::from(step), 5);
-                let decision = memory.decide(&Heads::of(&[0.1; ActionType::COUNT], &[0.0; 82]), &[], true);
+                let decision = memory.decide(&Heads::of(&[0.1; ActionType::COUNT], &[0.0; 82]), &[], true, true);
                 trace.push((Vec::<f32>::try_from(seen.flatten(0, -1)).unwrap(), decision.action));
             }
             trace

@@ -14,6 +14,7 @@ use super::checkpoint::Networks;
 use super::conditioning;
 use super::config::CheckpointConfig;
 use super::decision::Decision;
+use super::decision_rule::{DecisionOverride, DecisionRule};
 use super::frame_history::FrameHistory;
 pub(crate) use super::frame_history::SharedEmbedder;
 use super::policy::{Decisions, Observation, Policy, PolicyState, Reading};
@@ -32,9 +33,11 @@ pub(crate) struct LearnedPolicy {
     networks: Networks,
     /// The visual encoder of the networks, for computing alone.
     encoder: Box<dyn FrameEncoder>,
-    sentences: SharedEmbedder,
+    sentences: Option<SharedEmbedder>,
     device: Device,
     samples: bool,
+    /// The checkpoint's own rule, and whether it has a loop guard: what is asked for may be taken back.
+    own: (DecisionRule, bool),
     slots: Vec<FrameHistory>,
 }
 
@@ -52,9 +55,13 @@ impl LearnedPolicy {
     ///
     /// # Errors
     /// When the checkpoint is malformed, or was trained with another sentence encoder.
-    pub(crate) fn load(folder: &Path, sentences: SharedEmbedder, device: Device) -> anyhow::Result<LearnedPolicy> {
+    pub(crate) fn load(
+        folder: &Path,
+        sentences: Option<SharedEmbedder>,
+        device: Device,
+    ) -> anyhow::Result<LearnedPolicy> {
         let config = CheckpointConfig::read(folder)?;
-        {
+        if let Some(sentences) = &sentences {
             let embedder = sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
             config.goes_with(embedder.encoder()).with_context(|| folder.join("config.json").display().to_string())?;
         }
@@ -71,12 +78,13 @@ impl LearnedPolicy {
         name: String,
         config: CheckpointConfig,
         networks: Networks,
-        sentences: SharedEmbedder,
+        sentences: Option<SharedEmbedder>,
         device: Device,
     ) -> anyhow::Result<LearnedPolicy> {
         let encoder = networks.visual_encoder.frozen()?;
         let slots = (0..LearnedPolicy::SLOTS).map(|_| FrameHistory::default()).collect();
-        Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, slots })
+        let own = (config.decision, config.loop_guard);
+        Ok(LearnedPolicy { name, config, networks, encoder, sentences, device, samples: false, own, slots })
     }
 
     /// Decides from now on by the weights of networks of the same size that learn elsewhere.
@@ -122,7 +130,7 @@ impl LearnedPolicy {
         history.look(&image, here.step);
         let observation = history.observe(map, here.step, self.config.policy.history as usize);
         let instruction = here.instruction;
-        let condition = || conditioning::of(here, &self.config, &*self.encoder, &self.sentences, self.device);
+        let condition = || conditioning::of(here, &self.config, &*self.encoder, self.sentences.as_ref(), self.device);
         Ok(PolicyInputs { observation, conditioning: history.conditioning(instruction, condition)? })
     }
 
@@ -148,8 +156,9 @@ impl LearnedPolicy {
             actions: logits.actions,
             objects: logits.objects,
             advantage_scale: self.config.advantage_scale(values.as_ref()),
+            rule: self.config.decision,
         };
-        let decision = self.slots[slot].decide(&heads, &candidates, self.samples);
+        let decision = self.slots[slot].decide(&heads, &candidates, self.samples, self.config.loop_guard);
         Ok(Decision { values, ..decision })
     }
 }
@@ -226,8 +235,13 @@ impl Policy for LearnedPolicy {
         self.samples = samples;
     }
 
+    fn set_deciding(&mut self, asked: DecisionOverride) {
+        self.config.decision = asked.decision.unwrap_or(self.own.0);
+        self.config.loop_guard = asked.loop_guard.unwrap_or(self.own.1);
+    }
+
     fn reading(&self, instruction: &str) -> Option<Reading> {
-        conditioning::reading(instruction, &self.config, &self.sentences)
+        conditioning::reading(instruction, &self.config, self.sentences.as_ref())
     }
 
     fn values(&mut self, slot: usize, observation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {

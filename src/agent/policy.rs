@@ -4,6 +4,7 @@ use anyhow::Context;
 use rand_chacha::ChaCha8Rng;
 
 use super::decision::Decision;
+use super::decision_rule::DecisionOverride;
 use super::frame_history::FrameHistory;
 use super::memory_agent::Recollection;
 use super::served::ServedState;
@@ -98,6 +99,9 @@ pub trait Policy: Send {
     fn takes_own_actions(&self) -> bool {
         false
     }
+
+    /// Decides from now on as asked, and where nothing is asked as its checkpoint says, where it is one of a checkpoint.
+    fn set_deciding(&mut self, _asked: DecisionOverride) {}
 
     /// How much it reads of an instruction, where it has a limit.
     fn reading(&self, _instruction: &str) -> Option<Reading> {

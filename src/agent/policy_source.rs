@@ -2,12 +2,13 @@
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use anyhow::Context;
 use sha2::{Digest, Sha256};
 
 use super::config::CheckpointConfig;
+use super::decision_rule::DecisionOverride;
 use super::experts::expert::ExpertPolicy;
 use super::learned::{LearnedPolicy, SharedEmbedder};
 use super::memory_agent::MemoryPolicy;
@@ -15,10 +16,9 @@ use super::memory_agent::config::MemoryConfig;
 use super::policy::Policy;
 use super::random::RandomPolicy;
 use super::registry::{Loaded, NamedAgent};
+use super::sentence_encoders;
 use crate::data::json;
 use crate::nets::device;
-use crate::nets::embedding_cache::Embedder;
-use crate::nets::sentence::default_folder;
 
 /// Makes a policy; whoever acts on a thread of his own has one of his own.
 pub(crate) type MakePolicy = dyn Fn() -> anyhow::Result<Box<dyn Policy>> + Send + Sync;
@@ -65,15 +65,20 @@ impl PolicySource {
     }
 
     /// A trained agent; all that are made share one sentence encoder. It draws its actions where `sampling`, else it takes the
-    /// likeliest.
+    /// likeliest, and decides as `asked`.
     ///
     /// # Errors
-    /// When the checkpoint or its sentence encoder cannot be used.
-    pub(crate) fn checkpoint(folder: PathBuf, sampling: bool) -> anyhow::Result<PolicySource> {
+    /// When the checkpoint or its sentence encoder cannot be used, or the agent cannot decide so.
+    pub(crate) fn checkpoint(folder: PathBuf, sampling: bool, asked: DecisionOverride) -> anyhow::Result<PolicySource> {
+        anyhow::ensure!(
+            asked.decision.is_none() || !MemoryConfig::is_there(&folder),
+            "{}: an agent with a memory chooses among ways to act, so that --decision says nothing to it",
+            folder.display()
+        );
         // More threads than one would make sums depend on how many there are, and workers get in each other's way.
         device::set_threads(1);
         let computes = device::best_device();
-        let sentences = Arc::new(Mutex::new(Embedder::open(&default_folder(), computes)?));
+        let sentences = sentence_encoders::open_for(&folder, computes)?;
         let loading = |chosen: String| {
             let (folder, sentences) = (folder.clone(), sentences.clone());
             move || -> anyhow::Result<Box<dyn Policy>> {
@@ -81,6 +86,7 @@ impl PolicySource {
                 // What was loaded is what the run's manifest names.
                 check_hash(&folder, &chosen)?;
                 agent.set_sampling(sampling);
+                agent.set_deciding(asked);
                 Ok(agent)
             }
         };
@@ -140,7 +146,7 @@ pub(crate) fn hash(folder: &Path) -> anyhow::Result<String> {
 /// When the checkpoint is malformed, or was trained with another sentence encoder.
 pub(crate) fn load_agent(
     folder: &Path,
-    sentences: SharedEmbedder,
+    sentences: Option<SharedEmbedder>,
     computes: tch::Device,
 ) -> anyhow::Result<Box<dyn Policy>> {
     // More threads than one would make sums depend on how many there are, and workers get in each other's way.
@@ -159,7 +165,7 @@ pub(crate) fn load_agent(
 pub(crate) fn find(
     name: &str,
     checkpoint: Option<&str>,
-    sampling: bool,
+    (sampling, asked): (bool, DecisionOverride),
     named: Option<&Path>,
 ) -> anyhow::Result<Option<PolicySource>> {
     let Some(wanted) = checkpoint else {
@@ -171,7 +177,7 @@ pub(crate) fn find(
     };
     for folder in named.map(folder_of).into_iter().chain(checkpoints()) {
         if hash(&folder)? == wanted {
-            return PolicySource::checkpoint(folder, sampling).map(Some);
+            return PolicySource::checkpoint(folder, sampling, asked).map(Some);
         }
     }
     Ok(None)
@@ -184,8 +190,8 @@ pub(crate) fn folder_of(named: &Path) -> PathBuf {
     known.flatten().unwrap_or_else(|| named.to_owned())
 }
 
-/// The agents that an explorer may let act: the named one first, then those that are found.
-pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
+/// The agents that an explorer may let act: the named one first, then those that are found. They decide as `asked`.
+pub(crate) fn agents(named: Option<&Path>, asked: DecisionOverride) -> Vec<NamedAgent> {
     let mut folders: Vec<PathBuf> = named.map(folder_of).into_iter().chain(checkpoints()).collect();
     let mut seen = Vec::new();
     folders.retain(|folder| {
@@ -196,7 +202,7 @@ pub(crate) fn agents(named: Option<&Path>) -> Vec<NamedAgent> {
     });
     let agent = |folder: PathBuf| {
         let name = folder.file_name().map_or_else(|| "agent".into(), |name| name.to_string_lossy().into_owned());
-        agent_of(name, move || PolicySource::checkpoint(folder.clone(), false))
+        agent_of(name, move || PolicySource::checkpoint(folder.clone(), false, asked))
     };
     folders.into_iter().map(agent).collect()
 }

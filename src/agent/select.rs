@@ -1,12 +1,14 @@
-//! From the two heads to an action. The heads are two factors: an interaction is as likely as its action times its class.
-//! Pairs that are impossible now are masked and the rest renormalised, so an action whose only candidates are things that
-//! nobody asked for is as unlikely as they are. What the critic thinks better than usual is made likelier, where the agent
-//! weighs so. The instance is the nearest of its class.
+//! From the two heads to an action. By [`DecisionRule::Mass`] the heads are two factors: an interaction is as likely as its action
+//! times its class. Pairs that are impossible now are masked and the rest renormalised, so an action whose only candidates are
+//! things that nobody asked for is as unlikely as they are. What the critic thinks better than usual is made likelier, where the
+//! agent weighs so. By [`DecisionRule::Paper`] impossible actions are masked, and the class is chosen after the action. The
+//! instance is the nearest of its class.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::decision::{ActionDistribution, Decision};
+use super::decision_rule::DecisionRule;
 use super::value_estimates::AdvantageScale;
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::{Candidate, nearest};
@@ -28,13 +30,15 @@ pub(crate) struct Heads<'a> {
     pub(crate) objects: &'a [f32],
     /// What the critic has to say; absent where the policy decides alone.
     pub(crate) advantage_scale: Option<AdvantageScale<'a>>,
+    /// How they become an action.
+    pub(crate) rule: DecisionRule,
 }
 
 impl<'a> Heads<'a> {
     /// A policy's logits alone.
     #[cfg(test)]
     pub(crate) fn of(actions: &'a [f32], objects: &'a [f32]) -> Heads<'a> {
-        Heads { actions, objects, advantage_scale: None }
+        Heads { actions, objects, advantage_scale: None, rule: DecisionRule::Mass }
     }
 
     fn factor(&self, kind: ActionType, class: Option<usize>) -> f32 {
@@ -81,10 +85,13 @@ pub(crate) fn decide(
     Decision { action, distribution: Some(distribution), values: None, done: None, own: None }
 }
 
-/// Each possible action's share times that of its candidates among all classes, each choice weighed by its advantage,
-/// renormalised.
+/// The share of each possible action. By [`DecisionRule::Mass`] times that of its candidates among all classes, each choice weighed
+/// by its advantage, renormalised.
 fn weigh(heads: &Heads<'_>, open: &[usize], candidates: &[Candidate]) -> Vec<f32> {
     let shares = softmax_over(heads.actions, open);
+    if heads.rule == DecisionRule::Paper {
+        return shares;
+    }
     let all: Vec<usize> = (1..heads.objects.len().min(Class::VOCABULARY)).collect();
     let classes = softmax_over(heads.objects, &all);
     let mass = |kind: ActionType| {
@@ -266,6 +273,26 @@ mod tests {
         };
         assert_eq!(choose("Mug"), ActionType::Pickup);
         assert_eq!(choose("Apple"), ActionType::MoveAhead);
+    }
+
+    #[test]
+    fn by_the_papers_rule_the_likeliest_possible_action_is_taken_and_then_the_class() {
+        let candidates =
+            [candidate(ActionType::Pickup, "Mug", 3, 400.0), candidate(ActionType::Pickup, "Bowl", 4, 400.0)];
+        let mut logits = vec![0.0; ActionType::COUNT];
+        (logits[ActionType::Pickup.index()], logits[ActionType::Slice.index()]) = (2.0, 9.0);
+        // Nobody asked for a mug or a bowl, the bowl is likelier than the mug, and nothing can be cut.
+        let mut wanted = objects("Apple");
+        wanted[Class::named("Bowl").unwrap().index()] = 1.0;
+        let choose = |rule| {
+            let heads = Heads { rule, ..Heads::of(&logits, &wanted) };
+            decide(&heads, &candidates, &[], Selection::Greedy)
+        };
+        let taken = choose(DecisionRule::Paper);
+        assert_eq!(taken.action, Action::interact(ActionType::Pickup, Instance::Object(4)));
+        let share = taken.distribution.unwrap().actions[ActionType::Pickup.index()].unwrap();
+        assert!((share - 2f32.exp() / (2f32.exp() + 5.0)).abs() < 1e-5, "{share}");
+        assert_eq!(choose(DecisionRule::Mass).action.kind, ActionType::MoveAhead);
     }
 
     #[test]

@@ -51,9 +51,19 @@ impl AdamW {
 
     /// Takes one step against the gradients of `loss`.
     pub(crate) fn minimise(&mut self, loss: &Tensor, learning_rate: f64) {
+        let gradients = self.gradients(loss);
+        self.step(gradients, learning_rate);
+    }
+
+    /// The gradients of `loss`, as [`step`](AdamW::step) takes them; undefined where a weight has none.
+    pub(crate) fn gradients(&self, loss: &Tensor) -> Vec<Tensor> {
         let weights: Vec<&Tensor> = self.parameters.values().map(|parameter| &parameter.weight).collect();
         // Not added to what the weights hold: nothing has to be zeroed, and no sum is read and written once more.
-        let gradients = Tensor::run_backward(&[loss], &weights, false, false);
+        Tensor::run_backward(&[loss], &weights, false, false)
+    }
+
+    /// Takes one step against gradients.
+    pub(crate) fn step(&mut self, gradients: Vec<Tensor>, learning_rate: f64) {
         self.steps += 1;
         let AdamWConfig { beta1, beta2, epsilon, weight_decay } = self.config;
         let steps = self.steps as f64;

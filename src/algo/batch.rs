@@ -1,8 +1,11 @@
 //! Batches: demonstrated transitions, chained pairs, and how an update lays them out.
 
-use tch::Tensor;
+use std::ops::Range;
+
+use tch::{Kind, Tensor};
 
 use super::chain::Chaining;
+use crate::nets::observations::Observations;
 use crate::nets::precision::Precision;
 use crate::nets::visual::SIDE;
 
@@ -13,6 +16,8 @@ pub(crate) struct Transitions {
     pub(crate) observation: Tensor,
     /// s′; absent where no critic reads it.
     pub(crate) next: Option<Tensor>,
+    /// The rows of `observation` and `next` that are the items' `[n]`; absent where all are, in their order.
+    pub(crate) rows: Option<Tensor>,
     /// z, as the networks take it.
     pub(crate) conditioning: Tensor,
     /// Actions, by index [n].
@@ -29,9 +34,42 @@ pub(crate) struct Transitions {
     pub(crate) executed: Tensor,
 }
 
+impl Transitions {
+    /// Some of the transitions, by their rows, under another conditioning. Observations are shared, not copied.
+    pub(crate) fn picked(&self, rows: &Tensor, conditioning: Tensor) -> Transitions {
+        let of = |all: &Tensor| all.index_select(0, rows);
+        Transitions {
+            observation: self.observation.shallow_clone(),
+            next: self.next.as_ref().map(Tensor::shallow_clone),
+            rows: Some(self.rows.as_ref().map_or_else(|| rows.shallow_clone(), of)),
+            conditioning,
+            actions: of(&self.actions),
+            objects: of(&self.objects),
+            object_target: of(&self.object_target),
+            terminal: of(&self.terminal),
+            executed: of(&self.executed),
+        }
+    }
+
+    /// How many distinct observations there are.
+    fn distinct(&self) -> i64 {
+        self.observation.size()[0]
+    }
+
+    /// Which observation each item has.
+    fn row_numbers(&self) -> Tensor {
+        match &self.rows {
+            Some(rows) => rows.shallow_clone(),
+            None => Tensor::arange(self.distinct(), (Kind::Int64, self.observation.device())),
+        }
+    }
+}
+
 /// Pairs (A, B) of transitions to chain, m of them.
 #[derive(Debug)]
 pub(crate) struct ChainedPairs {
+    /// Whether A and B are of the batch's base, so that their rows are its rows.
+    pub(crate) of_base: bool,
     /// A's transitions under z_B.
     pub(crate) first: Transitions,
     /// 1 where equation 4 ends A, `[m]`.
@@ -62,6 +100,8 @@ const AGG_B: &str = "aggregate_b";
 struct SegmentSource<'a> {
     name: &'static str,
     weight: f64,
+    /// Where its observations begin among the distinct ones of all.
+    first_observation: i64,
     transitions: &'a Transitions,
     conditioning: &'a Tensor,
     terminal: &'a Tensor,
@@ -75,6 +115,8 @@ pub(super) struct Segment {
     len: i64,
     /// Its share of the loss.
     pub(crate) weight: f64,
+    /// Where its observations lie among the distinct ones of all.
+    observations: Range<i64>,
 }
 
 impl Segment {
@@ -108,26 +150,52 @@ pub(super) fn gather(segments: &[&Segment], all: &Tensor) -> Tensor {
     }
 }
 
+/// The observations of several segments, out of the distinct ones of all items.
+pub(super) fn gather_observations(segments: &[&Segment], all: &Transitions) -> Observations {
+    let start = segments.iter().map(|segment| segment.observations.start).min().unwrap_or(0);
+    let end = segments.iter().map(|segment| segment.observations.end).max().unwrap_or(0);
+    let rows = all.rows.as_ref().map(|rows| gather(segments, rows) - start);
+    // Those of the base alone are its items in their order.
+    let in_order = segments.iter().all(|segment| segment.name == BASE && segment.len == end - start);
+    let rows = rows.filter(|_| !in_order);
+    Observations { maps: all.observation.narrow(0, start, end - start), rows }
+}
+
 impl Batch {
-    /// The batch and its relabelled copies, one after the other, with observations in `precision`.
+    /// How many demonstrated items it has.
+    pub(super) fn items(&self) -> i64 {
+        self.base.actions.size()[0]
+    }
+
+    /// The batch and its relabelled copies, one after the other, with observations in `precision`, each once.
     pub(super) fn relabelled(&self, chaining: Option<&Chaining>, precision: Precision) -> (Transitions, Vec<Segment>) {
         let base = &self.base;
-        let segment = |name, weight, transitions, conditioning, terminal| SegmentSource {
+        let segment = |name, weight, (transitions, first_observation), conditioning, terminal| SegmentSource {
             name,
             weight,
+            first_observation,
             transitions,
             conditioning,
             terminal,
         };
-        let mut sources = vec![segment(BASE, 1.0, base, &base.conditioning, &base.terminal)];
+        let mut sources = vec![segment(BASE, 1.0, (base, 0), &base.conditioning, &base.terminal)];
+        // What has observations of its own; those of pairs come after the base's.
+        let mut owners = vec![base];
         if let (Some(pairs), Some(chaining)) = (&self.pairs, chaining) {
             let (first, share) =
                 (&pairs.first, chaining.loss_weight / (chaining.chain_weight + chaining.aggregate_weight));
-            sources.push(segment(CHAIN, share * chaining.chain_weight, first, &first.conditioning, &pairs.cut));
+            let second = pairs.joint.as_ref().map(|(_, second)| second);
+            let (mut at, mut second_at) = (0, 0);
+            if !pairs.of_base {
+                owners.push(first);
+                owners.extend(second);
+                (at, second_at) = (base.distinct(), base.distinct() + first.distinct());
+            }
+            sources.push(segment(CHAIN, share * chaining.chain_weight, (first, at), &first.conditioning, &pairs.cut));
             if let Some((joint, second)) = &pairs.joint {
                 let share = share * chaining.aggregate_weight / 2.0;
-                sources.push(segment(AGG_A, share, first, joint, &first.terminal));
-                sources.push(segment(AGG_B, share, second, &second.conditioning, &second.terminal));
+                sources.push(segment(AGG_A, share, (first, at), joint, &first.terminal));
+                sources.push(segment(AGG_B, share, (second, second_at), &second.conditioning, &second.terminal));
             }
         }
         let cat = |of: &dyn Fn(&SegmentSource<'_>) -> Tensor| match &sources[..] {
@@ -135,12 +203,17 @@ impl Batch {
             sources => Tensor::cat(&sources.iter().map(of).collect::<Vec<_>>(), 0),
         };
         let own = |of: fn(&Transitions) -> &Tensor| cat(&|source| of(source.transitions).shallow_clone());
+        let observations = |of: fn(&Transitions) -> &Tensor| match &owners[..] {
+            [owner] => network_input(of(owner), precision),
+            owners => {
+                network_input(&Tensor::cat(&owners.iter().map(|owner| of(owner)).collect::<Vec<_>>(), 0), precision)
+            }
+        };
         let all = Transitions {
-            observation: network_input(&own(|items| &items.observation), precision),
-            next: base
-                .next
-                .is_some()
-                .then(|| network_input(&own(|items| items.next.as_ref().unwrap_or(&items.observation)), precision)),
+            observation: observations(|items| &items.observation),
+            next: base.next.is_some().then(|| observations(|items| items.next.as_ref().unwrap_or(&items.observation))),
+            rows: (sources.len() > 1 || base.rows.is_some())
+                .then(|| cat(&|source| source.transitions.row_numbers() + source.first_observation)),
             conditioning: cat(&|source| source.conditioning.shallow_clone()),
             actions: own(|items| &items.actions),
             objects: own(|items| &items.objects),
@@ -153,7 +226,14 @@ impl Batch {
         let segments = sources.iter().map(|source| {
             let len = source.terminal.size()[0];
             start += len;
-            Segment { name: source.name, start: start - len, len, weight: source.weight }
+            let first = source.first_observation;
+            Segment {
+                name: source.name,
+                start: start - len,
+                len,
+                weight: source.weight,
+                observations: first..first + source.transitions.distinct(),
+            }
         });
         (all, segments.collect())
     }

@@ -14,6 +14,13 @@ pub struct Chaining {
     /// `pairs` does not count then.
     #[serde(default)]
     pub(crate) ranked: bool,
+    /// The share of a pool's pairs that come from one floor plan, A ending with in the hand what B began with; of random pairs
+    /// hardly any do.
+    #[serde(default)]
+    pub(crate) feasible_share: f64,
+    /// Whether each chained item weighs as much as its pair's bootstrap: as likely as the critic thinks that B follows A.
+    #[serde(default)]
+    pub(crate) weigh_by_value: bool,
     /// Pairs in a step; the paper's is the batch.
     pub batch_size: usize,
     /// What A's reward at the cut is bootstrapped from.

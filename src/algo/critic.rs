@@ -10,6 +10,7 @@ use super::iql::{self, Iql, PolyakTarget};
 use super::learner::{Learner, Optimisation};
 use super::loss_terms::LossTerms;
 use crate::nets::critic::{Critic, CriticValues};
+use crate::nets::observations::Observations;
 use crate::nets::weights::{self, Tensors};
 
 /// Twin Q and V, their target and their optimiser.
@@ -41,9 +42,14 @@ impl<'a> CriticLearner<'a> {
         self.learner.share() < self.iql.cloning_fraction
     }
 
-    /// One step of V and both Q, which share an optimiser and may share a trunk.
-    pub(super) fn update_v_and_q(&mut self, loss: &Tensor) {
-        self.learner.minimise(loss);
+    /// The gradients of the losses of V and both Q, which share an optimiser and may share a trunk.
+    pub(super) fn gradients(&self, loss: &Tensor) -> Vec<Tensor> {
+        self.learner.gradients(loss)
+    }
+
+    /// One step of V and both Q.
+    pub(super) fn update_v_and_q(&mut self, gradients: Vec<Tensor>) {
+        self.learner.step_against(gradients);
     }
 
     /// Moves the target Q̄ towards Q.
@@ -69,10 +75,14 @@ impl<'a> CriticLearner<'a> {
 
     /// Its values of all items, with what V, both Q and the policy learn from them.
     pub(super) fn evaluate(&self, all: &Transitions, segments: &[Segment], chaining: Option<&Chaining>) -> CriticBatch {
-        let next = all.next.as_ref().unwrap_or(&all.observation);
-        let target_q = self.target.min_q(&all.observation, &all.conditioning, &all.actions, &all.objects);
-        let next_value = self.online.value(next, &all.conditioning);
-        let values = self.online.evaluate(&all.observation, &all.conditioning, &all.actions, &all.objects);
+        let of_items = |maps: &Tensor| Observations {
+            maps: maps.shallow_clone(),
+            rows: all.rows.as_ref().map(Tensor::shallow_clone),
+        };
+        let (seen, next) = (of_items(&all.observation), of_items(all.next.as_ref().unwrap_or(&all.observation)));
+        let target_q = self.target.min_q(&seen, &all.conditioning, &all.actions, &all.objects);
+        let next_value = self.online.value(&next, &all.conditioning);
+        let values = self.online.evaluate(&seen, &all.conditioning, &all.actions, &all.objects);
         let chained = segments.iter().find(|segment| segment.name == CHAIN).zip(chaining);
         let bootstrap = chained.map(|(segment, chaining)| {
             chain::as_reward(&match chaining.bootstrap {
@@ -92,6 +102,16 @@ impl<'a> CriticLearner<'a> {
         let (reward, terminal) = (Tensor::cat(&rewards, 0), Tensor::cat(&terminals, 0));
         let q_target = iql::q_target(&reward, &terminal, &next_value, self.iql.discount);
         let weights = iql::advantage_weights(&target_q, &values.baseline, self.iql.temperature, self.iql.weight_cap);
+        let weights = match (&bootstrap, chaining) {
+            (Some(bootstrap), Some(chaining)) if chaining.weigh_by_value => {
+                // The segments after the first are of the same pairs, in the same order.
+                let ones = weights.narrow(0, 0, segments[0].len()).ones_like();
+                let factors: Vec<&Tensor> =
+                    std::iter::once(&ones).chain(segments[1..].iter().map(|_| bootstrap)).collect();
+                weights * Tensor::cat(&factors, 0)
+            }
+            _ => weights,
+        };
         let executed = all.executed.shallow_clone();
         CriticBatch { values, target_q, q_target, weights, executed, expectile: self.iql.expectile }
     }

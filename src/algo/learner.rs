@@ -95,6 +95,17 @@ impl<'a> Learner<'a> {
         self.optimiser.minimise(loss, rate);
     }
 
+    /// The gradients of `loss`, of a whole batch or of a part of it.
+    pub(crate) fn gradients(&self, loss: &Tensor) -> Vec<Tensor> {
+        self.optimiser.gradients(loss)
+    }
+
+    /// Takes a step against gradients.
+    pub(crate) fn step_against(&mut self, gradients: Vec<Tensor>) {
+        let rate = self.optimisation.schedule.at(self.step(), self.optimisation.steps);
+        self.optimiser.step(gradients, rate);
+    }
+
     /// Weights and moments by name: `weight.NAME`, `mean.NAME`, `square.NAME`.
     pub(crate) fn state(&self) -> Tensors {
         let mut tensors: Tensors =

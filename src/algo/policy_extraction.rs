@@ -2,10 +2,11 @@
 
 use tch::{Kind, Tensor};
 
-use super::batch::{CHAIN, Segment, Transitions, gather};
+use super::batch::{CHAIN, Segment, Transitions, gather, gather_observations};
 use super::bc;
 use super::chain::{BatchNormStatistics, Chaining, PolicyExtraction};
 use super::loss_terms::LossTerms;
+use crate::nets::observations::Observations;
 use crate::nets::policy::Logits;
 
 /// Segments that go through the policy in one forward pass.
@@ -29,6 +30,11 @@ impl<'a> ForwardPass<'a> {
         }
         passes.retain(|pass| !pass.segments.is_empty());
         passes
+    }
+
+    /// The observations of its segments.
+    pub(crate) fn observations(&self, all: &Transitions) -> Observations {
+        gather_observations(&self.segments, all)
     }
 
     /// The items of its segments.

@@ -59,27 +59,51 @@ impl<'a> Update<'a> {
     /// # Errors
     /// [`NotFinite`].
     pub fn update(&mut self, batch: &Batch, report: bool) -> Result<BTreeMap<String, f64>, NotFinite> {
+        self.update_in_parts(std::slice::from_ref(batch), report)
+    }
+
+    /// The same of a batch in parts, which are computed one after the other and take less memory. Batch norms see a part at a time.
+    ///
+    /// # Errors
+    /// [`NotFinite`].
+    pub fn update_in_parts(&mut self, parts: &[Batch], report: bool) -> Result<BTreeMap<String, f64>, NotFinite> {
         self.actor.begin_step();
+        let items: i64 = parts.iter().map(Batch::items).sum();
+        let (mut actor, mut critic) = (GradientSum::default(), GradientSum::default());
+        let mut numbers = BTreeMap::new();
+        for part in parts {
+            let share = part.items() as f64 / items.max(1) as f64;
+            let losses = self.losses(part, report)?;
+            actor.add(self.actor.gradients(&(losses.actor * share)));
+            if let (Some(learner), Some(loss)) = (&self.critic, losses.critic) {
+                critic.add(learner.gradients(&(loss * share)));
+            }
+            average(&mut numbers, losses.numbers, share);
+        }
+        self.actor.step_against(actor.0);
+        if let Some(learner) = &mut self.critic {
+            learner.update_v_and_q(critic.0);
+            learner.update_target();
+        }
+        Ok(numbers)
+    }
+
+    /// The losses of a batch or of a part of it; no weight is changed.
+    fn losses(&self, batch: &Batch, report: bool) -> Result<Losses, NotFinite> {
         let (all, segments) = batch.relabelled(self.chaining.as_ref(), self.precision);
         let critic = self.critic.as_ref().map(|critic| critic.evaluate(&all, &segments, self.chaining.as_ref()));
         let mut terms = LossTerms::default();
         let v_loss = critic.as_ref().map(|critic| critic.v_loss(&segments, &mut terms));
-        let (actor_loss, logits) = self.actor_loss(&all, &segments, critic.as_ref(), &mut terms);
+        let (actor, logits) = self.actor_loss(&all, &segments, critic.as_ref(), &mut terms);
         let q_loss = critic.as_ref().map(|critic| critic.q_loss(&segments, &mut terms));
         let mut numbers = terms.numbers(self.step() + 1)?;
-
-        self.actor.minimise(&actor_loss);
-        if let (Some(learner), Some(v_loss), Some(q_loss)) = (&mut self.critic, v_loss, q_loss) {
-            learner.update_v_and_q(&(v_loss + q_loss));
-            learner.update_target();
-        }
         if report {
             numbers.extend(accuracies(&logits, &batch.base));
             if let Some(critic) = &critic {
                 critic.describe(&segments, &mut numbers);
             }
         }
-        Ok(numbers)
+        Ok(Losses { actor, critic: v_loss.zip(q_loss).map(|(v, q)| v + q), numbers })
     }
 
     /// The loss of the policy, and its logits of the first forward pass, which begins with the demonstrated items. A chained
@@ -98,8 +122,8 @@ impl<'a> Update<'a> {
         let mut loss = Tensor::from(0.0f32).to_device(all.conditioning.device());
         let mut first = None;
         for pass in &passes {
-            let (observation, conditioning) = (pass.of(&all.observation), pass.of(&all.conditioning));
-            let logits = self.policy.forward(&observation, &conditioning, pass.train);
+            let (observations, conditioning) = (pass.observations(all), pass.of(&all.conditioning));
+            let logits = self.policy.forward_shared(&observations, &conditioning, pass.train);
             loss += policy_extraction::loss(&logits, all, pass, weights, terms);
             first.get_or_insert(logits);
         }
@@ -132,6 +156,38 @@ impl<'a> Update<'a> {
     }
 }
 
+/// What a batch, or a part of it, costs.
+struct Losses {
+    actor: Tensor,
+    critic: Option<Tensor>,
+    numbers: BTreeMap<String, f64>,
+}
+
+/// Gradients of the parts of a batch, added up.
+#[derive(Default)]
+struct GradientSum(Vec<Tensor>);
+
+impl GradientSum {
+    fn add(&mut self, gradients: Vec<Tensor>) {
+        if self.0.is_empty() {
+            self.0 = gradients;
+            return;
+        }
+        for (sum, gradient) in self.0.iter_mut().zip(gradients).filter(|(_, gradient)| gradient.defined()) {
+            *sum = if sum.defined() { &*sum + gradient } else { gradient };
+        }
+    }
+}
+
+/// Adds a part's numbers by its share; of what is largest the largest counts.
+fn average(numbers: &mut BTreeMap<String, f64>, part: BTreeMap<String, f64>, share: f64) {
+    for (name, value) in part {
+        let largest = name.ends_with("max");
+        let entry = numbers.entry(name).or_insert(if largest { f64::MIN } else { 0.0 });
+        *entry = if largest { entry.max(value) } else { *entry + share * value };
+    }
+}
+
 /// Shares of right answers among the demonstrated items, with which `logits` begin.
 fn accuracies(logits: &Option<Logits>, base: &Transitions) -> Vec<(String, f64)> {
     let Some(logits) = logits else { return Vec::new() };
@@ -152,6 +208,7 @@ mod tests {
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
+    use crate::nets::observations::Observations;
     use crate::nets::policy::PolicySpec;
     use crate::nets::visual::SIDE;
 
@@ -210,6 +267,8 @@ mod tests {
     const CHAINING: Chaining = Chaining {
         pairs: PairSource::Pool(1),
         ranked: false,
+        feasible_share: 0.0,
+        weigh_by_value: false,
         batch_size: 4,
         bootstrap: Bootstrap::NextValue,
         policy_extraction: PolicyExtraction::Both,
@@ -260,6 +319,7 @@ mod tests {
         Transitions {
             observation: look(&column(|row| row.0)),
             next: Some(look(&column(|row| row.3))),
+            rows: None,
             conditioning: say(&column(|row| row.1)),
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
             object_target: Tensor::from_slice(&vec![0i64; rows.len()]),
@@ -278,7 +338,7 @@ mod tests {
         let first = Transitions { conditioning: say(&[1; 4]), ..many(a) };
         let cut = first.terminal.shallow_clone();
         let joint = Some((say(&[2; 4]), Transitions { conditioning: say(&[2; 4]), ..many(b) }));
-        Batch { base: transitions(&base), pairs: Some(ChainedPairs { first, cut, joint }) }
+        Batch { base: transitions(&base), pairs: Some(ChainedPairs { of_base: false, first, cut, joint }) }
     }
 
     /// The chain: action 0 leads from state 0 to state 1 and from there to the end, action 1 back to state 0.
@@ -312,8 +372,9 @@ mod tests {
         }
         let four = transitions(&CHAIN_OF_TWO);
         let (q, v, policy) = solution();
-        let found = nets.target.0.min_q(&four.observation, &four.conditioning, &four.actions, &four.objects);
-        let values = nets.online.0.value(&four.observation, &four.conditioning);
+        let seen = Observations::distinct(&four.observation);
+        let found = nets.target.0.min_q(&seen, &four.conditioning, &four.actions, &four.objects);
+        let values = nets.online.0.value(&seen, &four.conditioning);
         let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.conditioning, false));
         let shares = logits.actions.softmax(-1, Kind::Double);
         for (row, (state, action)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
@@ -336,7 +397,7 @@ mod tests {
         while !update.is_done() {
             numbers = update.update(&chained_skills(), true).unwrap();
         }
-        let values = nets.online.0.value(&look(&[0, 0, 1]), &say(&[1, 2, 2]));
+        let values = nets.online.0.value(&Observations::distinct(&look(&[0, 0, 1])), &say(&[1, 2, 2]));
         for i in 0..3 {
             // The joint costs nothing, and each skill is one step: all are worth 1.
             assert!((values.double_value(&[i]) - 1.0).abs() < 0.05, "{values}");
@@ -388,6 +449,23 @@ mod tests {
         for name in ["chain_q_loss", "chain_value_loss", "aggregate_a_action_loss", "aggregate_b_action_loss"] {
             assert!(joint.contains_key(name), "{name} is not among {joint:?}");
         }
+    }
+
+    #[test]
+    fn a_chained_item_weighs_what_its_critic_thinks_of_the_pair() {
+        let _chance = crate::nets::testing::chance();
+        let numbers = |weigh_by_value: bool| {
+            let nets = nets();
+            let chaining = Chaining { weigh_by_value, ..CHAINING };
+            update(&nets, 1, IQL, Some(chaining)).update(&chained_skills(), true).unwrap()
+        };
+        let (plain, weighed) = (numbers(false), numbers(true));
+        for name in ["chain_weight_mean", "aggregate_a_weight_mean", "aggregate_b_weight_mean"] {
+            let factor = weighed[name] / plain[name];
+            assert!((0.0..0.9).contains(&factor), "{name}: a fresh critic thinks little of it: {factor}");
+        }
+        assert_eq!(plain["weight_mean"], weighed["weight_mean"]);
+        assert_eq!(plain["chain_q_loss"], weighed["chain_q_loss"], "the critic learns as before");
     }
 
     #[test]
@@ -460,6 +538,41 @@ mod tests {
         };
         assert_eq!((loss(0, 0), loss(1, 0)), (0.0, 0.0));
         assert!(loss(0, 1) > 0.0);
+    }
+
+    #[test]
+    fn a_batch_of_two_like_halves_in_two_parts_is_the_same_step() {
+        let _chance = crate::nets::testing::chance();
+        let step = |parts: &[Batch]| {
+            let nets = nets();
+            let mut update = update(&nets, 10, IQL, Some(CHAINING));
+            let numbers = update.update_in_parts(parts, true).unwrap();
+            let weights: Tensors = update.state().into_iter().map(|(name, tensor)| (name, tensor.copy())).collect();
+            (numbers, weights)
+        };
+        let twice = |of: &Transitions| {
+            let rows: Vec<i64> = (0..of.actions.size()[0]).chain(0..of.actions.size()[0]).collect();
+            let conditioning = Tensor::cat(&[&of.conditioning, &of.conditioning], 0);
+            of.picked(&Tensor::from_slice(&rows), conditioning)
+        };
+        let half = chained_skills();
+        let pairs = half.pairs.as_ref().unwrap();
+        let joint = pairs.joint.as_ref().map(|(joint, second)| (Tensor::cat(&[joint, joint], 0), twice(second)));
+        let cut = Tensor::cat(&[&pairs.cut, &pairs.cut], 0);
+        let whole = Batch {
+            base: twice(&half.base),
+            pairs: Some(ChainedPairs { of_base: false, first: twice(&pairs.first), cut, joint }),
+        };
+        let ((once, together), (parts, apart)) = (step(&[whole]), step(&[chained_skills(), chained_skills()]));
+        // What is estimated of the next state sees the first part's running statistics in the second.
+        for (name, number) in once.iter().filter(|(name, _)| !name.contains("q_loss")) {
+            assert!((number - parts[name]).abs() < 1e-5, "{name}: {number} and {}", parts[name]);
+        }
+        // Its first moments are a tenth of the gradients.
+        for (name, tensor) in together.iter().filter(|(name, _)| name.starts_with("policy.mean.")) {
+            let difference = (tensor - &apart[name]).abs().max().double_value(&[]);
+            assert!(difference < 1e-6, "{name}: {difference}");
+        }
     }
 
     #[test]

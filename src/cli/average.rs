@@ -1,7 +1,6 @@
 //! `sprint average`: one agent of several.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 
 use anyhow::Context;
 use clap::Args;
@@ -10,11 +9,10 @@ use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::validate::validate;
 use crate::agent::average::average;
+use crate::agent::sentence_encoders;
 use crate::data::ensure_free;
 use crate::data::folder_lock::FolderLock;
 use crate::nets::device::best_device;
-use crate::nets::embedding_cache::Embedder;
-use crate::nets::sentence::default_folder;
 use crate::train::preset::{Preset, ValidationSpec};
 
 /// Averages the policies of checkpoints that were trained on from a common start; all else is the first one's. Of one
@@ -36,16 +34,13 @@ pub(crate) struct Average {
     /// Tasks in generated houses to measure the result on, and half as many pairs of objects for agents that read to tell apart
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     validate: u32,
-    /// The sentence encoder's folder, for measuring the result [default: all-MiniLM-L6-v2, which `make setup` fetched]
-    #[arg(long, value_name = "DIR")]
-    encoder: Option<PathBuf>,
 }
 
 impl Average {
     /// Averages, measures the result as a training does, and writes its model card.
     ///
     /// # Errors
-    /// When a checkpoint cannot be read, does not go with the first or the sentence encoder, or `out` holds one already.
+    /// When a checkpoint cannot be read, does not go with the first, or `out` holds one already.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         ensure_free::check(&self.out)?;
         let device = best_device();
@@ -59,15 +54,14 @@ impl Average {
         if let Some(weight) = self.advantage_scale {
             config.set_advantage_scale(weight).with_context(|| format!("--advantage-scale {weight} for {first}"))?;
         }
-        let sentences = Embedder::open(&self.encoder.unwrap_or_else(default_folder), device)?;
-        config.goes_with(sentences.encoder()).with_context(|| self.checkpoints[0].display().to_string())?;
+        let sentences = sentence_encoders::open_for(&self.checkpoints[0], device)?;
         let _lock = FolderLock::take(&self.out)?;
         ensure_free::check(&self.out)?;
         networks.save(&self.out, &config)?;
         let tasks = self.validate as usize;
         let swaps = if config.policy.goal_channels.is_some() { 0 } else { tasks / 2 };
         let validation = ValidationSpec { tasks, swaps, ..Preset::named("sprint")?.validation };
-        validate(&self.out, &validation, Arc::new(Mutex::new(sentences)), Progress::new())?;
+        validate(&self.out, &validation, sentences, Progress::new())?;
         Ok(ExitStatus::Ok)
     }
 }

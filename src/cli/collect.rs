@@ -1,7 +1,6 @@
 //! `sprint collect`: demonstrations in generated houses, or of given tasks.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 
 use anyhow::ensure;
 use clap::Args;
@@ -11,13 +10,12 @@ use super::progress::Progress;
 use super::stop;
 use super::streams::say;
 use super::value_names;
+use crate::agent::{policy_source, sentence_encoders};
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::house::expert::TurnTiming;
 use crate::language::count::counted;
 use crate::nets::device::best_device;
-use crate::nets::embedding_cache::Embedder;
-use crate::nets::sentence::default_folder;
 use crate::train::collect::{Collection, DemonstrationSettings, ExpertKind, TaskSource};
 
 /// Collects demonstrations.
@@ -52,8 +50,8 @@ pub(crate) struct Collect {
     /// Phrasings of each demonstration
     #[arg(long, default_value_t = 4)]
     annotations: usize,
-    /// A checkpoint that acts, while the demonstrator only says what it would do
-    #[arg(long, value_name = "DIR")]
+    /// A checkpoint that acts, while the demonstrator only says what it would do: its folder, or its name among checkpoints/
+    #[arg(long, value_name = "DIR|NAME")]
     learner: Option<PathBuf>,
 }
 
@@ -67,9 +65,10 @@ impl Collect {
         let lengths = self.lengths.iter().all(|length| (1..=16).contains(length));
         ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
         let learner = match self.learner {
-            Some(folder) => {
-                let embedder = Embedder::open(&default_folder(), best_device())?;
-                Some((folder, Arc::new(Mutex::new(embedder))))
+            Some(named) => {
+                let folder = policy_source::folder_of(&named);
+                let sentences = sentence_encoders::open_for(&folder, best_device())?;
+                Some((folder, sentences))
             }
             None => None,
         };

@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::exit_status::ExitStatus;
 use super::streams;
+use crate::agent::sentence_encoders;
 use crate::data::text_file;
 use crate::nets::device::best_device;
 use crate::nets::sentence::{SentenceEncoder, default_folder};
@@ -18,8 +19,9 @@ const TOGETHER: usize = 256;
 /// Embeds sentences.
 #[derive(Args)]
 pub(crate) struct EmbedArgs {
-    /// A sentence encoder's folder, as sentence-transformers publishes them [default: all-MiniLM-L6-v2, which `make setup` fetched]
-    #[arg(long, value_name = "DIR")]
+    /// A sentence encoder's folder, as sentence-transformers publishes them, or its name in SPRINT_HOME/encoders [default:
+    /// all-MiniLM-L6-v2, which `make setup` fetched]
+    #[arg(long, value_name = "DIR|NAME")]
     encoder: Option<PathBuf>,
 }
 
@@ -30,7 +32,10 @@ impl EmbedArgs {
     /// # Errors
     /// When the encoder cannot be loaded or a line is not UTF-8.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let encoder = SentenceEncoder::load(&self.encoder.unwrap_or_else(default_folder), best_device())?;
+        let encoder = SentenceEncoder::load(
+            &self.encoder.as_deref().map_or_else(default_folder, sentence_encoders::folder_of),
+            best_device(),
+        )?;
         for settings in encoder.unread_settings() {
             streams::say(&format!("settings of the sentence encoder that are not read: {settings}"));
         }

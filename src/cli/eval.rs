@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use super::environment::EnvironmentChoice;
 use super::controlled::ControlledRun;
 use super::exit_status::ExitStatus;
-use super::policies::PolicyChoice;
+use super::policies::{Deciding, PolicyChoice};
 use super::streams::say;
 use super::{jobs, progress, stop, streams};
 use crate::data::json::Document;
@@ -66,6 +66,8 @@ pub(crate) struct Eval {
     /// Draw the agent's actions by chance instead of taking the likeliest
     #[arg(long)]
     sample: bool,
+    #[command(flatten)]
+    deciding: Deciding,
     /// Also play each task told in other words: another task's, none, its own shuffled, and a paraphrase
     #[arg(long)]
     language: bool,
@@ -107,7 +109,7 @@ impl Eval {
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let (set, file) = self.task_set()?;
         let scenes = Scenes::of(&file, &set.value);
-        let chosen = self.policy.open(self.sample)?;
+        let chosen = self.policy.open(self.sample, self.deciding.asked())?;
         let evaluation =
             Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
                 .with_context(|| format!("{}", file.display()))?
@@ -161,6 +163,7 @@ impl Eval {
             jobs: jobs::threads(self.jobs),
             step_by_step: self.step_by_step,
             sampling: self.sample,
+            deciding: self.deciding.asked(),
             language: self.language,
             every_start: self.from_subtask.is_some(),
             retries: self.retries,

@@ -11,6 +11,7 @@ use etcetera::BaseStrategy;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::logging;
+use super::policies::Deciding;
 use super::policy_name::{Elsewhere, ElsewhereOptions, PolicyName, PolicyNameParser};
 use super::recorded::recorded;
 use super::streams::Printable;
@@ -70,6 +71,7 @@ pub(crate) struct Origin {
     room: Option<Room>,
     #[command(flatten)]
     environment: EnvironmentChoice,
+    deciding: Deciding,
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
     instruction: Option<String>,
@@ -345,6 +347,7 @@ impl Origin {
             || self.room.is_some()
             || self.seed.is_some()
             || self.environment.elsewhere().is_some()
+            || !self.deciding.asked().is_none()
     }
 
     /// The same without what was named: where to look, and what is made of what is typed.
@@ -369,8 +372,8 @@ impl Origin {
         let mut from = self.clone();
         match start {
             Start::Session(path) => {
-                let policies = Policies::new(policy_source::agents(None));
                 let kept = KeptSession::read(path)?;
+                let policies = Policies::new(policy_source::agents(None, kept.author.deciding));
                 let taken_up = Exploration::take_up(&kept, policies).context("the last session cannot be taken up")?;
                 return Ok(taken_up.reading_as(self.expect.into()));
             }
@@ -389,9 +392,12 @@ impl Origin {
     fn exploration(&self, kind: PolicyKind) -> anyhow::Result<Exploration> {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
+        let asked = self.deciding.asked();
         let elsewhere = self.elsewhere.iter().map(|(named, options)| named.agent(*options));
-        let policies = Policies::new(elsewhere.chain(policy_source::agents(self.checkpoint.as_deref())).collect());
-        Exploration::new(source, policies, kind, None)?.expecting(self.expect.into(), self.instruction.as_deref())
+        let agents = policy_source::agents(self.checkpoint.as_deref(), asked);
+        let policies = Policies::new(elsewhere.chain(agents).collect());
+        let exploration = Exploration::new(source, policies, kind, None)?.deciding(asked);
+        exploration.expecting(self.expect.into(), self.instruction.as_deref())
     }
 
     fn start(&self) -> anyhow::Result<(EpisodeOrigin, Scenes)> {

@@ -13,6 +13,7 @@ mod chains;
 mod collect;
 mod compare;
 mod controlled;
+mod critic;
 mod ctl;
 mod doctor;
 mod embed;
@@ -107,6 +108,8 @@ enum Command {
     Finetune(finetune::Finetune),
     /// Average the policies of checkpoints that were trained on from a common start
     Average(average::Average),
+    /// Measure whether a critic tells skills that can follow another from those that cannot
+    Critic(critic::CriticArgs),
     /// Draw the curves of trainings to SVG and PNG
     Plot(plot::PlotCurves),
     /// Re-run recorded demonstrations in the simulator
@@ -166,6 +169,7 @@ fn run(command: Command) -> anyhow::Result<ExitStatus> {
         Command::Pretrain(pretrain) => pretrain.run(),
         Command::Finetune(finetune) => finetune.run(),
         Command::Average(average) => average.run(),
+        Command::Critic(critic) => critic.run(),
         Command::Plot(plot) => plot.run(),
         Command::Replay(replay) => replay.run(),
         Command::Embed(embed) => embed.run(),

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
 use crate::agent::policy_source::{self, PolicySource};
+use crate::agent::{DecisionOverride, DecisionRule};
 
 /// Which policy acts.
 #[derive(Args)]
@@ -20,17 +21,59 @@ pub(crate) struct PolicyChoice {
     elsewhere: ElsewhereOptions,
 }
 
+/// How a trained agent decides, where not as its checkpoint says.
+#[derive(Args, Clone, Copy)]
+pub(crate) struct Deciding {
+    /// The rule by which the agent decides: paper (of the possible actions the likeliest, then its class), or mass (the likeliest
+    /// pair of both, adjusted and weighed as its checkpoint says) [default: its checkpoint's]
+    #[arg(long, value_enum)]
+    decision: Option<RuleName>,
+    /// Whether the agent is kept from repeating itself [default: as its checkpoint says]
+    #[arg(long, value_enum, value_name = "on|off")]
+    loop_guard: Option<OnOff>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RuleName {
+    Mass,
+    Paper,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum OnOff {
+    On,
+    Off,
+}
+
+impl Deciding {
+    /// What is asked.
+    pub(crate) fn asked(self) -> DecisionOverride {
+        DecisionOverride {
+            decision: self.decision.map(|rule| match rule {
+                RuleName::Mass => DecisionRule::Mass,
+                RuleName::Paper => DecisionRule::Paper,
+            }),
+            loop_guard: self.loop_guard.map(|guard| guard == OnOff::On),
+        }
+    }
+}
+
 impl PolicyChoice {
     /// Opens what was chosen.
     ///
     /// # Errors
     /// When the checkpoint or its sentence encoder cannot be used, or a policy from elsewhere.
-    pub(crate) fn open(&self, sampling: bool) -> anyhow::Result<PolicySource> {
+    pub(crate) fn open(&self, sampling: bool, asked: DecisionOverride) -> anyhow::Result<PolicySource> {
         if self.policy != PolicyName::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
         }
         if sampling && self.policy != PolicyName::Agent {
             anyhow::bail!("--sample draws the actions of a trained agent; leave it out with another --policy");
+        }
+        if !asked.is_none() && self.policy != PolicyName::Agent {
+            anyhow::bail!(
+                "--decision and --loop-guard are for trained agents; leave them out with another --policy"
+            );
         }
         match &self.policy {
             PolicyName::Expert => Ok(PolicySource::expert()),
@@ -41,7 +84,7 @@ impl PolicyChoice {
                     Some(named) => policy_source::folder_of(named),
                     None => policy_source::shipped()?,
                 };
-                PolicySource::checkpoint(folder, sampling)
+                PolicySource::checkpoint(folder, sampling, asked)
             }
         }
     }

@@ -1,7 +1,6 @@
 //! `sprint pretrain`: trains an agent on a dataset.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 
 use clap::Args;
 
@@ -14,13 +13,13 @@ use super::validate::{name, validate};
 use crate::agent::learned::SharedEmbedder;
 use crate::control::Kind;
 use crate::nets::device::best_device;
-use crate::nets::embedding_cache::Embedder;
-use crate::nets::sentence::default_folder;
+use crate::nets::resnet18;
 use crate::train::in_training_eval::InTrainingEval;
 use crate::train::memory_agent::MemoryTraining;
 use crate::train::memory_agent::preset::MemoryPreset;
-use crate::train::preset::Preset;
-use crate::train::pretrain::{Pretraining, Trained};
+use crate::train::memory_need;
+use crate::train::preset::{Preset, VisualBackbone};
+use crate::train::pretrain::{Pretraining, Sentences, Trained};
 
 /// Trains an agent.
 #[derive(Args)]
@@ -28,11 +27,12 @@ pub(crate) struct Pretrain {
     /// Dataset folders
     #[arg(required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// A method: sprint, l-bc, iql-primitive, am, et, sprint-no-chain, sprint-no-agg, sprint-concat-agg, sprint-llm-chain, l-bc-agg, sprint-memory; or a preset's
+    /// A method: sprint, l-bc, iql-primitive, am, l-bc-transformer, sprint-no-chain, sprint-no-agg, sprint-concat-agg, sprint-llm-chain, l-bc-agg, sprint-memory; or a preset's
     /// file, which may extend one of these
     #[arg(long)]
     preset: String,
-    /// A size other than the preset's own, which suits two CPU cores: paper, or a file of such values
+    /// A size other than the preset's own, which suits two CPU cores: paper, narrow (that of checkpoints/first and sprint), or a
+    /// file of such values, which may extend one of these
     #[arg(long)]
     size: Option<String>,
     /// The checkpoint folder to write
@@ -56,6 +56,10 @@ pub(crate) struct Pretrain {
     /// Steps of the policy's training, instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
+    /// Compute each update in so many parts, one after the other, which takes less memory; batch norms then see a part at a time
+    /// [default: as few as fit]
+    #[arg(long, value_name = "N")]
+    parts: Option<usize>,
     /// Let the agent play these tasks while it trains: not those it will be evaluated on
     #[arg(long, value_name = "FILE")]
     trials: Option<PathBuf>,
@@ -65,8 +69,8 @@ pub(crate) struct Pretrain {
     /// Only the first N tasks of the trials
     #[arg(long, value_name = "N", requires = "trials")]
     trials_limit: Option<usize>,
-    /// A sentence encoder's folder [default: all-MiniLM-L6-v2, which `make setup` fetched]
-    #[arg(long, value_name = "DIR")]
+    /// A sentence encoder's folder, or its name in SPRINT_HOME/encoders [default: all-MiniLM-L6-v2, which `make setup` fetched]
+    #[arg(long, value_name = "DIR|NAME")]
     encoder: Option<PathBuf>,
 }
 
@@ -86,9 +90,21 @@ impl Pretrain {
         if let Some(steps) = self.steps {
             preset.training.steps = steps;
         }
-        let folder = self.encoder.unwrap_or_else(default_folder);
         let device = best_device();
-        let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
+        let begun = if self.resume { Preset::parts_of(&self.out.join("training/preset.toml"))? } else { None };
+        let features = match preset.visual_backbone {
+            VisualBackbone::House => preset.visual_encoder.features(),
+            VisualBackbone::ResNet18 => resnet18::FEATURES,
+        };
+        let (parts, told) = memory_need::plan(&preset, features, device, self.parts.or(begun))?;
+        preset.parts = parts;
+        preset.check_parts()?;
+        say(&told);
+        let sentences = match preset.policy.reads_sentences() {
+            true => Some(Sentences::open(self.encoder.as_deref(), device)?),
+            false => None,
+        };
+        let embedder = sentences.as_ref().map(|sentences| sentences.embedder.clone());
         let pretraining = Pretraining {
             preset,
             data: self.data,
@@ -102,8 +118,7 @@ impl Pretrain {
                 limit: self.trials_limit,
                 every: self.trials_every,
             }),
-            embedder: embedder.clone(),
-            sentence_encoder: name(&folder),
+            sentences,
             device,
         };
         let stop = stop::on_signals()?;
@@ -125,6 +140,8 @@ impl Pretrain {
             ("--policy-from", self.policy_from.is_some()),
             ("--critic-from", self.critic_from.is_some()),
             ("--trials", self.trials.is_some()),
+            ("--encoder", self.encoder.is_some()),
+            ("--parts", self.parts.is_some()),
             ("--steps", self.steps.is_some()),
             ("--encoder-steps", self.encoder_steps.is_some()),
         ];
@@ -132,8 +149,6 @@ impl Pretrain {
             anyhow::bail!("{option} says nothing to the preset {}: a preset's file that extends it can", preset.name);
         }
         let device = best_device();
-        let folder = self.encoder.unwrap_or_else(default_folder);
-        let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
         let training = MemoryTraining {
             preset,
             data: self.data,
@@ -151,7 +166,7 @@ impl Pretrain {
             say("stopped; --resume goes on from here");
             return Ok(ExitStatus::Interrupted);
         }
-        validate(&training.out, &training.preset.validation, embedder, progress)?;
+        validate(&training.out, &training.preset.validation, None, progress)?;
         Ok(ExitStatus::Ok)
     }
 }

@@ -75,7 +75,7 @@ pub(super) fn recorded(
     let open = move || -> anyhow::Result<Exploration> {
         let scenes = recorded.scenes;
         let start = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };
-        let policies = Policies::new(policy_source::agents(checkpoint.as_deref()));
+        let policies = Policies::new(policy_source::agents(checkpoint.as_deref(), acts.deciding));
         let source = EpisodeSource::new(start, 0, scenes);
         let mut exploration = Exploration::new(source, policies, kind, None)?;
         if explored {

@@ -175,6 +175,7 @@ impl SampleArgs {
             })?
         };
         taskset::write(&self.out, &set)?;
+        say_how_told(&set.tasks);
         Ok(ExitStatus::Ok)
     }
 }
@@ -246,6 +247,7 @@ impl CheckArgs {
             },
         )?;
         let count = set.value.tasks.len();
+        say_how_told(&set.value.tasks);
         let (file, tasks) = (self.file.display(), counted(count, "task"));
         writeln!(out, "{file}: {tasks}, {} solved by the expert", count - unsolved)?;
         Ok(if unsolved == 0 { ExitStatus::Ok } else { ExitStatus::SomeFailed })
@@ -273,6 +275,15 @@ impl ShowArgs {
             }
         }
         Ok(ExitStatus::Ok)
+    }
+}
+
+/// Says how many instructions are joined sentences: nobody put those runs of steps in words as wholes.
+fn say_how_told(tasks: &[Task]) {
+    let joined = tasks.iter().filter(|task| task.is_joined()).count();
+    if joined > 0 {
+        let all = counted(tasks.len(), "task");
+        streams::say(&format!("the instructions of {joined} of {all} are their steps' sentences, one after the other"));
     }
 }
 

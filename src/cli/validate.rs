@@ -21,7 +21,7 @@ use crate::train::validation;
 pub(crate) fn validate(
     folder: &Path,
     spec: &ValidationSpec,
-    sentences: SharedEmbedder,
+    sentences: Option<SharedEmbedder>,
     mut progress: Progress,
 ) -> anyhow::Result<()> {
     let mut policy = load_agent(folder, sentences, best_device())?;

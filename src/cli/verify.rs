@@ -47,7 +47,7 @@ impl Verify {
             policy_source::find(
                 author.policy.as_str(),
                 author.checkpoint.as_deref(),
-                author.sampling,
+                (author.sampling, author.deciding),
                 self.checkpoint.as_deref(),
             )
         };

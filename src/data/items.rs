@@ -181,6 +181,11 @@ impl Items {
         }
     }
 
+    /// The text "A. B." of two texts, by their numbers.
+    pub(crate) fn joint_text(&self, first: u32, second: u32) -> String {
+        format!("{} {}", self.texts[first as usize], self.texts[second as usize])
+    }
+
     /// The class that the object head learns to name at an item's frame; 0 where there is none.
     pub(crate) fn object_target(&self, item: &Item) -> u8 {
         let last = match self.object_target {

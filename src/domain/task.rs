@@ -120,6 +120,11 @@ impl Task {
     pub(crate) fn played_elsewhere(&self) -> Option<(&EnvironmentName, u64)> {
         Some((self.env.as_ref()?, self.seed?))
     }
+
+    /// Whether its instruction is nothing but the sentences of its several steps, one after the other.
+    pub(crate) fn is_joined(&self) -> bool {
+        self.sentences.len() > 1 && self.instruction == self.sentences.join(" ")
+    }
 }
 
 /// A file of tasks.

@@ -6,6 +6,7 @@ use super::failure::Failure;
 use super::instruction_variant::InstructionVariant;
 use super::rollout::{EndedBy, Rollout, Tick};
 use super::wish::Wish;
+use crate::agent::DecisionOverride;
 use crate::domain::world::Instance;
 use crate::domain::{Action, ActionType, Class};
 use crate::env::Environment;
@@ -219,15 +220,23 @@ pub struct Author {
     /// It drew its actions from its distribution instead of taking the likeliest.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(crate) sampling: bool,
+    /// What was asked of its decisions in place of what its checkpoint says.
+    #[serde(default, skip_serializing_if = "DecisionOverride::is_none")]
+    pub(crate) deciding: DecisionOverride,
 }
 
 impl Author {
     /// The name of a person who acts.
     pub(crate) const HAND: &str = "hand";
 
+    /// A policy without a checkpoint that takes what is likeliest, and its seed.
+    pub(crate) fn of(policy: &str, seed: u64) -> Author {
+        Author { policy: policy.into(), checkpoint: None, seed, sampling: false, deciding: DecisionOverride::default() }
+    }
+
     /// The author of what a person does.
     pub(crate) fn hand() -> Author {
-        Author { policy: Author::HAND.into(), checkpoint: None, seed: 0, sampling: false }
+        Author::of(Author::HAND, 0)
     }
 
     /// Whether a person chose, no policy.

@@ -85,6 +85,7 @@ impl Evaluation {
             end: options.end,
             step_by_step: options.step_by_step,
             sampling: options.sampling,
+            deciding: options.deciding,
             instruction_variants: options.language,
             all_start_subtasks: options.every_start,
             shard: options.shard,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::agent::DecisionOverride;
 use crate::episode::rollout::EndedBy;
 use crate::house::grading::Grading;
 use crate::run_dir::shard::Shard;
@@ -23,6 +24,8 @@ pub struct Options {
     pub step_by_step: bool,
     /// The agent draws its actions by chance instead of taking the likeliest.
     pub sampling: bool,
+    /// What is asked of the agent's decisions in place of what its checkpoint says.
+    pub deciding: DecisionOverride,
     /// Each task is also played in every other wording.
     pub language: bool,
     /// Each task is also played from each of its subtasks on; the expert does those before.
@@ -46,6 +49,7 @@ impl Options {
             jobs: 1,
             step_by_step: false,
             sampling: false,
+            deciding: DecisionOverride::default(),
             language: false,
             every_start: false,
             retries: 0,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context, ensure};
 use sha2::{Digest, Sha256};
 
-use crate::agent::ExpertPolicy;
+use crate::agent::{DecisionOverride, ExpertPolicy};
 use crate::data::{atomic_file, json, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
@@ -68,6 +68,7 @@ pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()>
         end: EndedBy::Grader,
         step_by_step: false,
         sampling: false,
+        deciding: DecisionOverride::default(),
         instruction_variants: false,
         all_start_subtasks: false,
         shard: None,

@@ -5,6 +5,7 @@ use tch::Tensor;
 use tch::nn::{self, Module};
 
 use super::bounds;
+use super::observations::Observations;
 use super::precision;
 use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use super::value::ValueHead;
@@ -132,7 +133,7 @@ impl Critic {
     fn input(
         &self,
         head: usize,
-        observation: &Tensor,
+        observations: &Observations,
         conditioning: &Tensor,
         earlier: Option<&Tensor>,
         train: bool,
@@ -141,24 +142,24 @@ impl Critic {
             (Some(earlier), [_]) => earlier.shallow_clone(),
             (_, trunks) => {
                 let trunk = &trunks[head.min(trunks.len() - 1)];
-                Tensor::cat(&[&trunk.forward(observation, Some(conditioning), train), conditioning], 1)
+                Tensor::cat(&[&trunk.forward_shared(observations, Some(conditioning), train), conditioning], 1)
             }
         }
     }
 
-    /// Q and V of a batch in training: `observation` [n, channels, 7, 7], `conditioning` as the policy's, `actions` and `objects` `[n]`
+    /// Q and V of a batch in training: `conditioning` as the policy's, `actions` and `objects` `[n]`
     /// (class indices, 0 for navigation).
     pub(crate) fn evaluate(
         &self,
-        observation: &Tensor,
+        observations: &Observations,
         conditioning: &Tensor,
         actions: &Tensor,
         objects: &Tensor,
     ) -> CriticValues {
-        let conditioning = self.conditioner.forward(conditioning, observation.kind(), true);
-        let first = self.input(0, observation, &conditioning, None, true);
-        let second = self.input(1, observation, &conditioning, Some(&first), true);
-        let third = self.input(2, observation, &conditioning, Some(&first), true);
+        let conditioning = self.conditioner.forward(conditioning, observations.kind(), true);
+        let first = self.input(0, observations, &conditioning, None, true);
+        let second = self.input(1, observations, &conditioning, Some(&first), true);
+        let third = self.input(2, observations, &conditioning, Some(&first), true);
         CriticValues {
             q: [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, true)),
             value: self.value.forward(&third, true),
@@ -169,15 +170,15 @@ impl Critic {
     /// min(Q1, Q2) [n], without dropout and without gradient.
     pub(crate) fn min_q(
         &self,
-        observation: &Tensor,
+        observations: &Observations,
         conditioning: &Tensor,
         actions: &Tensor,
         objects: &Tensor,
     ) -> Tensor {
         tch::no_grad(|| {
-            let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
-            let first = self.input(0, observation, &conditioning, None, false);
-            let second = self.input(1, observation, &conditioning, Some(&first), false);
+            let conditioning = self.conditioner.forward(conditioning, observations.kind(), false);
+            let first = self.input(0, observations, &conditioning, None, false);
+            let second = self.input(1, observations, &conditioning, Some(&first), false);
             let [one, other] =
                 [(0, &first), (1, &second)].map(|(k, input)| self.q[k].forward(input, actions, objects, false));
             one.minimum(&other)
@@ -185,10 +186,10 @@ impl Critic {
     }
 
     /// V [n], without dropout and without gradient.
-    pub(crate) fn value(&self, observation: &Tensor, conditioning: &Tensor) -> Tensor {
+    pub(crate) fn value(&self, observations: &Observations, conditioning: &Tensor) -> Tensor {
         tch::no_grad(|| {
-            let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
-            self.value.forward(&self.input(2, observation, &conditioning, None, false), false)
+            let conditioning = self.conditioner.forward(conditioning, observations.kind(), false);
+            self.value.forward(&self.input(2, observations, &conditioning, None, false), false)
         })
     }
 
@@ -205,9 +206,10 @@ impl Critic {
         let (actions, objects) = (column(|pair| pair.0), column(|pair| pair.1));
         tch::no_grad(|| {
             let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
-            let first = self.input(0, observation, &conditioning, None, false);
-            let inputs =
-                [0, 1, 2].map(|head| self.input(head, observation, &conditioning, (head > 0).then_some(&first), false));
+            let observation = Observations::distinct(observation);
+            let first = self.input(0, &observation, &conditioning, None, false);
+            let [second, third] = [1, 2].map(|head| self.input(head, &observation, &conditioning, Some(&first), false));
+            let inputs = [first, second, third];
             let rows = pairs.len() as i64;
             let [one, other] =
                 [0, 1].map(|k| self.q[k].forward(&inputs[k].expand([rows, -1], false), &actions, &objects, false));
@@ -250,7 +252,7 @@ mod tests {
         let convolutions = [true, false].map(|shared| {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = critic(&store, shared);
-            let values = critic.evaluate(&observation, &conditioning, &actions, &objects);
+            let values = critic.evaluate(&Observations::distinct(&observation), &conditioning, &actions, &objects);
             assert!([&values.q[0], &values.q[1], &values.value, &values.baseline].iter().all(|t| t.size() == [3]));
             assert!(values.value.requires_grad() && !values.baseline.requires_grad());
             store.variables().keys().filter(|name| name.ends_with("conv.weight")).count()
@@ -270,11 +272,30 @@ mod tests {
             let (value, q) = critic.evaluate_actions(&observation, &conditioning, &pairs);
             let (actions, objects) = (Tensor::from_slice(&pairs.map(|p| p.0)), Tensor::from_slice(&pairs.map(|p| p.1)));
             let repeat = |tensor: &Tensor| tensor.repeat([&[4i64][..], &vec![1; tensor.dim() - 1]].concat());
-            let (many, conditionings) = (repeat(&observation), repeat(&conditioning));
+            let (many, conditionings) = (Observations::distinct(&repeat(&observation)), repeat(&conditioning));
             let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-5;
             assert!(close(&q, &critic.min_q(&many, &conditionings, &actions, &objects)));
             assert!(close(&value, &critic.value(&many, &conditionings)));
             assert!((q.max() - q.min()).double_value(&[]) > 1e-4, "the action matters");
+        }
+    }
+
+    #[test]
+    fn items_that_share_an_observation_are_valued_as_those_that_have_one_each() {
+        let _chance = crate::nets::testing::chance();
+        for shared in [true, false] {
+            tch::manual_seed(5);
+            let store = nn::VarStore::new(Device::Cpu);
+            let critic = critic(&store, shared);
+            let (maps, conditioning, actions, objects) = inputs(4);
+            let rows = Tensor::from_slice(&[1i64, 0, 1, 1]);
+            let each = Observations::distinct(&maps.narrow(0, 0, 2).index_select(0, &rows));
+            let together = Observations { maps: maps.narrow(0, 0, 2), rows: Some(rows) };
+            let values = [each, together].map(|observations| {
+                critic.evaluate(&observations, &conditioning, &actions, &objects).baseline.to_kind(Kind::Double)
+            });
+            let apart = (&values[0] - &values[1]).abs().max().double_value(&[]);
+            assert!(apart < 1e-5, "{apart}");
         }
     }
 }

@@ -24,6 +24,25 @@ pub(crate) fn device_report() -> String {
     }
 }
 
+/// Bytes of memory that are free where it computes, if the system tells.
+pub(crate) fn free_memory(device: Device) -> Option<u64> {
+    let first_number = |text: &str| text.split_whitespace().next()?.parse::<u64>().ok();
+    match device {
+        Device::Cuda(_) => {
+            let visible = std::env::var("CUDA_VISIBLE_DEVICES").unwrap_or_default();
+            let first = visible.split(',').next().filter(|first| !first.is_empty()).unwrap_or("0").to_owned();
+            let asked = ["--query-gpu=memory.free", "--format=csv,noheader,nounits", "-i", &first];
+            let told = std::process::Command::new("nvidia-smi").args(asked).output().ok()?;
+            first_number(&String::from_utf8_lossy(&told.stdout)).map(|megabytes| megabytes << 20)
+        }
+        _ => {
+            let told = std::fs::read_to_string("/proc/meminfo").ok()?;
+            let available = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+            first_number(available).map(|kilobytes| kilobytes << 10)
+        }
+    }
+}
+
 /// How many threads libtorch computes with.
 pub(crate) fn threads() -> usize {
     usize::try_from(tch::get_num_threads()).unwrap_or(1)

@@ -1,4 +1,4 @@
-//! The visual encoder's training heads: classes and states of each place (marks), depth, and the held class.
+//! The visual encoder's training heads: classes and states of each place (cell labels), depth, and the held class.
 
 use tch::nn::{self, Module};
 use tch::{Kind, Reduction, Tensor};
@@ -9,7 +9,7 @@ use crate::domain::Class;
 /// Heads over a feature map; thrown away after training.
 #[derive(Debug)]
 pub(crate) struct PerceptionHeads {
-    marks: nn::Conv2D,
+    cell_labels: nn::Conv2D,
     depth: nn::Conv2D,
     held: nn::Linear,
 }
@@ -17,8 +17,8 @@ pub(crate) struct PerceptionHeads {
 /// A batch's losses; each a scalar tensor.
 #[derive(Debug)]
 pub(crate) struct PerceptionLoss {
-    /// Binary cross-entropy of the marks, added up over the marks of a place.
-    pub(crate) marks: Tensor,
+    /// Binary cross-entropy of the cell labels, added up over those of a place.
+    pub(crate) cell_labels: Tensor,
     /// Mean absolute error of the logarithm of depth.
     pub(crate) depth: Tensor,
     /// Cross-entropy of the held class.
@@ -28,15 +28,15 @@ pub(crate) struct PerceptionLoss {
 impl PerceptionLoss {
     /// The sum, unweighted.
     pub(crate) fn total(&self) -> Tensor {
-        &self.marks + &self.depth + &self.held
+        &self.cell_labels + &self.depth + &self.held
     }
 }
 
 /// The labels of a batch of frames.
 #[derive(Debug)]
 pub(crate) struct FrameLabels {
-    /// [n, marks, 7, 7], 0 or 1.
-    pub(crate) marks: Tensor,
+    /// [n, labels of a cell, 7, 7], 0 or 1.
+    pub(crate) cell_labels: Tensor,
     /// [n, 1, 7, 7], the logarithm of metres.
     pub(crate) depth: Tensor,
     /// `[n]`, class indices.
@@ -44,32 +44,36 @@ pub(crate) struct FrameLabels {
 }
 
 impl PerceptionHeads {
-    /// Heads for that many marks, over maps of `features` channels.
-    pub(crate) fn new(path: &nn::Path<'_>, features: i64, marks: i64) -> PerceptionHeads {
+    /// Heads for that many labels of a cell, over maps of `features` channels.
+    pub(crate) fn new(path: &nn::Path<'_>, features: i64, cell_labels: i64) -> PerceptionHeads {
         PerceptionHeads {
-            marks: nn::conv2d(path / "marks", features, marks, 1, Default::default()),
+            cell_labels: nn::conv2d(path / "cell_labels", features, cell_labels, 1, Default::default()),
             depth: nn::conv2d(path / "depth", features, 1, 1, Default::default()),
             held: nn::linear(path / "held", features * SIDE * SIDE, Class::VOCABULARY as i64, Default::default()),
         }
     }
 
-    /// How far `maps` are from the `labels`. A mark that holds weighs `positive_weight` times one that does not.
+    /// How far `maps` are from the `labels`. A label that holds weighs `positive_weight` times one that does not.
     pub(crate) fn loss(&self, maps: &Tensor, labels: &FrameLabels, positive_weight: f64) -> PerceptionLoss {
-        let logits = maps.apply(&self.marks);
+        let logits = maps.apply(&self.cell_labels);
         let weight = Tensor::from(positive_weight as f32).to_device(logits.device());
-        let marks =
-            logits.binary_cross_entropy_with_logits(&labels.marks, None::<&Tensor>, Some(&weight), Reduction::Mean);
+        let cell_loss = logits.binary_cross_entropy_with_logits(
+            &labels.cell_labels,
+            None::<&Tensor>,
+            Some(&weight),
+            Reduction::Mean,
+        );
         PerceptionLoss {
-            marks: marks * logits.size()[1],
+            cell_labels: cell_loss * logits.size()[1],
             depth: (maps.apply(&self.depth) - &labels.depth).abs().mean(Kind::Float),
             held: self.held.forward(&maps.flatten(1, -1)).cross_entropy_for_logits(&labels.held),
         }
     }
 
-    /// Of the marks `from..to`: how many hold and are predicted, hold, are predicted; and how many held classes are right.
+    /// Of the cell labels `from..to`: how many hold and are predicted, hold, are predicted; and how many held classes are right.
     pub(crate) fn counts(&self, maps: &Tensor, labels: &FrameLabels, from: i64, to: i64) -> [f64; 4] {
-        let predicted = maps.apply(&self.marks).gt(0.0).to_kind(Kind::Float).narrow(1, from, to - from);
-        let holds = labels.marks.narrow(1, from, to - from);
+        let predicted = maps.apply(&self.cell_labels).gt(0.0).to_kind(Kind::Float).narrow(1, from, to - from);
+        let holds = labels.cell_labels.narrow(1, from, to - from);
         let held = self.held.forward(&maps.flatten(1, -1)).argmax(-1, false).eq_tensor(&labels.held);
         [&predicted * &holds, holds, predicted, held.to_kind(Kind::Float)]
             .map(|tensor| tensor.sum(Kind::Float).double_value(&[]))

@@ -6,6 +6,7 @@ use tch::nn;
 
 use super::bounds;
 use super::episodic::{AttentionSpec, Episodic};
+use super::observations::Observations;
 use super::precision;
 use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use crate::domain::{ActionType, Class};
@@ -50,6 +51,11 @@ impl PolicySpec {
             bounds::sizes("policy.goal_channels", channels, 4096)?;
         }
         self.attention.as_ref().map_or(Ok(()), |attention| attention.check(self.embedding))
+    }
+
+    /// Whether it is conditioned on sentence embeddings, and not on words or a goal.
+    pub(crate) fn reads_sentences(&self) -> bool {
+        self.attention.is_none() && self.goal_channels.is_none()
     }
 
     /// Whether a network of this size can take another's weights: dropout is no matter of size.
@@ -112,11 +118,18 @@ impl PolicyNet {
     /// `observation` [n, history * features, 7, 7], oldest frame first, and `conditioning`: sentences [n, embedding] of unit length,
     /// goals of the observation's shape, or numbers of words [n, words].
     pub(crate) fn forward(&self, observation: &Tensor, conditioning: &Tensor, train: bool) -> Logits {
+        self.forward_shared(&Observations::distinct(observation), conditioning, train)
+    }
+
+    /// The same of items that may share observations.
+    pub(crate) fn forward_shared(&self, observations: &Observations, conditioning: &Tensor, train: bool) -> Logits {
         let features = match &self.body {
-            Body::Episodic(episodic) => episodic.forward(observation, conditioning, train),
+            Body::Episodic(episodic) => {
+                episodic.forward(&observations.for_items(observations.maps.shallow_clone()), conditioning, train)
+            }
             Body::Trunk { conditioner, trunk } => {
-                let conditioning = conditioner.forward(conditioning, observation.kind(), train);
-                Tensor::cat(&[trunk.forward(observation, Some(&conditioning), train), conditioning], 1)
+                let conditioning = conditioner.forward(conditioning, observations.kind(), train);
+                Tensor::cat(&[trunk.forward_shared(observations, Some(&conditioning), train), conditioning], 1)
             }
         };
         let x = self.dense.forward(features, train);

@@ -5,6 +5,7 @@ use tch::nn::{self, ModuleT};
 use tch::{Kind, Tensor};
 
 use super::film::Film;
+use super::observations::Observations;
 use super::precision;
 use super::visual::SIDE;
 
@@ -79,9 +80,23 @@ impl Trunk {
 
     /// `observation` [n, channels, 7, 7] and `conditioning` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
     pub(crate) fn forward(&self, observation: &Tensor, conditioning: Option<&Tensor>, train: bool) -> Tensor {
-        let mut x = observation.shallow_clone();
-        for TrunkStage { conv, stride, norm, film } in &self.stages {
-            x = norm.forward_t(&precision::convolution(conv, &x, *stride), train);
+        self.forward_shared(&Observations::distinct(observation), conditioning, train)
+    }
+
+    /// The same of items that may share observations: the first convolution is computed once for each.
+    pub(crate) fn forward_shared(
+        &self,
+        observations: &Observations,
+        conditioning: Option<&Tensor>,
+        train: bool,
+    ) -> Tensor {
+        let mut x = observations.maps.shallow_clone();
+        for (position, TrunkStage { conv, stride, norm, film }) in self.stages.iter().enumerate() {
+            x = precision::convolution(conv, &x, *stride);
+            if position == 0 {
+                x = observations.for_items(x);
+            }
+            x = norm.forward_t(&x, train);
             if let (Some(film), Some(conditioning)) = (film, conditioning) {
                 x = film.forward(&x, conditioning);
             }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::shard::Shard;
+use crate::agent::DecisionOverride;
 use crate::data::json;
 use crate::episode::rollout::EndedBy;
 use crate::house::grading::Grading;
@@ -42,6 +43,9 @@ pub struct RunManifest {
     /// The agent draws its actions by chance instead of taking the likeliest.
     #[serde(default)]
     pub(crate) sampling: bool,
+    /// What was asked of the agent's decisions in place of what its checkpoint says.
+    #[serde(default, skip_serializing_if = "DecisionOverride::is_none")]
+    pub(crate) deciding: DecisionOverride,
     /// Each task is also played with every other variant of its instruction.
     #[serde(default)]
     pub(crate) instruction_variants: bool,
@@ -119,6 +123,7 @@ pub(crate) mod tests {
             end: EndedBy::Grader,
             step_by_step: false,
             sampling: false,
+            deciding: DecisionOverride::default(),
             instruction_variants: false,
             all_start_subtasks: false,
             shard: None,

@@ -119,6 +119,7 @@ impl RecordedRun {
             checkpoint: self.manifest.checkpoint_hash.clone(),
             seed: policy_seed(task, episode.seed),
             sampling: self.manifest.sampling,
+            deciding: self.manifest.deciding,
         }
     }
 

@@ -5,6 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tch::{Device, Kind, Tensor};
 
+use super::chaining_pool::PairEnd;
 use super::training_data::{ConditioningTable, TrainingData};
 use crate::algo::batch::{Batch, ChainedPairs, Transitions};
 use crate::algo::chain::{Chaining, cut_chance};
@@ -48,8 +49,23 @@ impl<'a> BatchSampler<'a> {
     /// When a frame has no label, or a sentence cannot be embedded.
     pub fn at(&self, step: u64) -> anyhow::Result<Batch> {
         let items = self.draw(&self.data.items.training, step, self.size);
-        let pairs = self.chaining.map(|chaining| self.pairs(chaining, &items, step)).transpose()?;
-        Ok(Batch { base: self.base(&items)?, pairs })
+        self.part(&items, (0, 1), step)
+    }
+
+    /// The same items in so many parts, each with pairs of its own.
+    ///
+    /// # Errors
+    /// As [`at`](BatchSampler::at).
+    pub(crate) fn in_parts(&self, step: u64, parts: usize) -> anyhow::Result<Vec<Batch>> {
+        let items = self.draw(&self.data.items.training, step, self.size);
+        let of_part = items.chunks(self.size.div_ceil(parts.max(1)));
+        of_part.enumerate().map(|(number, items)| self.part(items, (number, parts.max(1)), step)).collect()
+    }
+
+    fn part(&self, items: &[Item], part: (usize, usize), step: u64) -> anyhow::Result<Batch> {
+        let base = self.base(items)?;
+        let pairs = self.chaining.map(|chaining| self.pairs(chaining, (items, &base), part, step)).transpose()?;
+        Ok(Batch { base, pairs })
     }
 
     /// Items of some spans; with goals, each ends at a random later frame of its trajectory.
@@ -84,14 +100,21 @@ impl<'a> BatchSampler<'a> {
         rng
     }
 
-    /// Pairs (A, B): from the batch by a permutation, or from the pool.
-    fn pairs(&self, chaining: &Chaining, items: &[Item], step: u64) -> anyhow::Result<ChainedPairs> {
-        let mut rng = self.random_stream(CHAINING, step);
+    /// Pairs (A, B): from the batch by a permutation, or from the pool. Those from the batch share its observations.
+    fn pairs(
+        &self,
+        chaining: &Chaining,
+        (items, base): (&[Item], &Transitions),
+        (part, parts): (usize, usize),
+        step: u64,
+    ) -> anyhow::Result<ChainedPairs> {
+        let mut rng = self.random_stream(CHAINING ^ ((part as u64) << 32), step);
+        let count = chaining.batch_size.div_ceil(parts);
+        let mut permuted = None;
         let (first, second, joint) = match &self.data.pool {
             Some(pool) => {
-                let drawn: Vec<usize> =
-                    (0..chaining.batch_size).map(|_| rng.random_range(0..pool.pairs.len())).collect();
-                let mut of = |text: u32| pool.item(self.data.items, text, &mut rng);
+                let drawn: Vec<usize> = (0..count).map(|_| rng.random_range(0..pool.pairs.len())).collect();
+                let mut of = |end: PairEnd| pool.item(self.data.items, end, &mut rng);
                 let first: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].0)).collect();
                 let second: Vec<Item> = drawn.iter().map(|&pair| of(pool.pairs[pair].1)).collect();
                 (first, second, pool.joint.rows(drawn.into_iter(), self.device)?)
@@ -99,22 +122,33 @@ impl<'a> BatchSampler<'a> {
             None => {
                 let mut order: Vec<usize> = (0..items.len()).collect();
                 order.shuffle(&mut rng);
-                let first = items[..chaining.batch_size.min(items.len())].to_vec();
+                let first = items[..count.min(items.len())].to_vec();
                 let second: Vec<Item> = order[..first.len()].iter().map(|&i| items[i]).collect();
                 let joint = match chaining.aggregate_weight > 0.0 {
                     true => self.data.embed_joint(&first, &second)?.to_device(self.device),
                     false => Tensor::from(0.0),
                 };
+                let rows: Vec<i64> = order[..first.len()].iter().map(|&i| i as i64).collect();
+                permuted = Some(Tensor::from_slice(&rows).to_device(self.device));
                 (first, second, joint)
             }
         };
         let cut: Vec<f32> = first.iter().map(|item| flag(rng.random_bool(cut_chance(item.end - item.frame)))).collect();
-        let joint = match chaining.aggregate_weight > 0.0 {
-            true => Some((joint.shallow_clone(), self.transitions(&second, joint)?)),
-            false => None,
+        let with_joint = chaining.aggregate_weight > 0.0;
+        let under_joint = joint.shallow_clone();
+        let (of_base, first, second) = match permuted {
+            Some(rows) => {
+                let count = Tensor::arange(rows.size()[0], (Kind::Int64, self.device));
+                let first = base.picked(&count, base.conditioning.index_select(0, &rows));
+                (true, first, with_joint.then(|| base.picked(&rows, joint)))
+            }
+            None => {
+                let under_second = self.transitions(&first, self.conditioning(&second)?)?;
+                (false, under_second, with_joint.then(|| self.transitions(&second, joint)).transpose()?)
+            }
         };
-        let first = self.transitions(&first, self.conditioning(&second)?)?;
-        Ok(ChainedPairs { first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
+        let joint = second.map(|second| (under_joint, second));
+        Ok(ChainedPairs { of_base, first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
     }
 
     /// What networks are conditioned on for these items: embeddings [n, width], token ids [n, longest], or goal observations.
@@ -147,14 +181,14 @@ impl<'a> BatchSampler<'a> {
 
     fn transitions(&self, items: &[Item], conditioning: Tensor) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
-        let (mut actions, mut objects, mut taken) = (Vec::new(), Vec::new(), Vec::new());
-        let named: Vec<i64> = items.iter().map(|item| i64::from(self.data.items.object_target(item))).collect();
+        let (mut actions, mut objects, mut executed) = (Vec::new(), Vec::new(), Vec::new());
+        let object_target: Vec<i64> = items.iter().map(|item| i64::from(self.data.items.object_target(item))).collect();
         for item in items {
             let label = self.data.items.labels.get(item.frame as usize).copied().flatten();
             let label = label.ok_or_else(|| anyhow::anyhow!("frame {} has no label", item.frame))?;
             actions.push(i64::from(label.action));
             objects.push(i64::from(label.object));
-            taken.push(flag(label.executed));
+            executed.push(flag(label.executed));
         }
         let terminal: Vec<f32> = items.iter().map(|item| flag(item.is_last())).collect();
         let ended = crate::algo::chain::RewardDone::of_skill(&Tensor::from_slice(&terminal).to_device(self.device));
@@ -167,13 +201,14 @@ impl<'a> BatchSampler<'a> {
         Ok(Transitions {
             observation: seen(0),
             next: self.with_next.then(|| seen(1)),
+            rows: None,
             conditioning,
             actions: Tensor::from_slice(&actions).to_device(self.device),
             objects: Tensor::from_slice(&objects).to_device(self.device),
-            object_target: Tensor::from_slice(&named).to_device(self.device),
+            object_target: Tensor::from_slice(&object_target).to_device(self.device),
             reward: ended.reward,
             terminal: ended.terminal,
-            executed: Tensor::from_slice(&taken).to_device(self.device),
+            executed: Tensor::from_slice(&executed).to_device(self.device),
         })
     }
 }

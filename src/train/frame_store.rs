@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::data::dataset::Dataset;
 use crate::data::items::ActionLabel;
 use crate::domain::task::SceneRef;
-use crate::domain::{Scene, Trajectory, World};
+use crate::domain::{Class, Scene, Trajectory, World};
 use crate::house::{Replay, generate, validate};
 
 /// The trajectories of datasets with the scenes they play in.
@@ -146,6 +146,24 @@ impl FrameStore {
         let (scene, recorded) = (self.scene(trajectory)?, &self.trajectories[trajectory]);
         let before = &recorded.actions[..frame - self.firsts[trajectory]];
         Ok((scene, Replay::new(scene, recorded.start.clone(), before).finish()))
+    }
+
+    /// The class of what is held in every frame.
+    ///
+    /// # Errors
+    /// Never for a store that was opened.
+    pub(crate) fn held(&self) -> anyhow::Result<Vec<Option<Class>>> {
+        let of = |trajectory: usize| -> anyhow::Result<Vec<Option<Class>>> {
+            let mut held = Vec::new();
+            self.replay(trajectory, |_, world, _| {
+                held.push(world.held.and_then(|held| world.object(held)).map(|object| object.class));
+                Ok(())
+            })?;
+            Ok(held)
+        };
+        let all: Vec<Vec<Option<Class>>> =
+            (0..self.trajectories.len()).into_par_iter().map(of).collect::<anyhow::Result<_>>()?;
+        Ok(all.concat())
     }
 
     /// What a learner should do in every frame, which is what the expert would do; nothing in the last of a trajectory. Where

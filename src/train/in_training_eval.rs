@@ -34,7 +34,7 @@ impl InTrainingEval {
         step / self.every.max(1) > before / self.every.max(1)
     }
 
-    /// The tasks, ready to be played in the checkpoint in `folder`.
+    /// The tasks, ready to be played.
     ///
     /// # Errors
     /// When the task file or a scene cannot be read.
@@ -54,12 +54,12 @@ impl InTrainingEval {
 pub(crate) fn run(
     evaluation: &Evaluation,
     folder: &Path,
-    sentences: &SharedEmbedder,
+    sentences: Option<&SharedEmbedder>,
     device: Device,
     stop: &Arc<AtomicBool>,
     scalars: &mut Scalars,
 ) -> anyhow::Result<()> {
-    let (folder, sentences) = (folder.to_owned(), sentences.clone());
+    let (folder, sentences) = (folder.to_owned(), sentences.cloned());
     let make_policy: Arc<MakePolicy> =
         Arc::new(move || -> anyhow::Result<Box<dyn Policy>> { load_agent(&folder, sentences.clone(), device) });
     let (mut episodes, mut successes, mut completed) = (0u32, 0u32, 0u32);

@@ -3,6 +3,9 @@
 pub mod batch_sampler;
 pub(crate) mod completion_server;
 pub mod collect;
+pub mod chaining_pool;
+pub(crate) mod chaining_value;
+pub mod embedding_table;
 pub(crate) mod feature_cache;
 pub(crate) mod detection;
 pub(crate) mod finetune;
@@ -10,6 +13,7 @@ pub(crate) mod frame_store;
 pub(crate) mod in_training_eval;
 pub(crate) mod memory_agent;
 pub(crate) mod http_summarizer;
+pub(crate) mod memory_need;
 pub mod metrics;
 pub(crate) mod opt_summarizer;
 pub(crate) mod model_card;

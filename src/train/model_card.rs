@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::validation::ValidationReport;
+use crate::agent::DecisionRule;
 use crate::agent::config::{CheckpointConfig, Provenance, SourceCheckpoint};
 use crate::agent::memory_agent::config::{MemoryConfig, MemoryProvenance};
 use crate::agent::memory_agent::eyes::Sight;
@@ -12,7 +13,7 @@ fn method(config: &CheckpointConfig) -> &'static str {
     match config.method.as_deref() {
         Some("iql") => "implicit Q-learning",
         Some("sprint") => "implicit Q-learning with skills chained across trajectories",
-        Some("et") => "behaviour cloning of an Episodic Transformer",
+        Some("transformer-bc" | "et") => "behaviour cloning of a transformer over words and frames",
         Some("am") => "Actionable Models: it is shown the state to reach",
         _ => "behaviour cloning",
     }
@@ -39,13 +40,18 @@ fn conditioning(config: &CheckpointConfig) -> String {
         (None, Some(_)) => "reads the instruction word by word".into(),
         (None, None) => format!(
             "reads the instruction as a sentence embedding ({}, {} numbers)",
-            config.sentence_encoder.name, policy.embedding
+            config.sentence_encoder.as_ref().map_or("unnamed", |encoder| &encoder.name),
+            policy.embedding
         ),
     }
 }
 
 /// How it decides, in words, where not by the logits alone.
 fn deciding(config: &CheckpointConfig) -> String {
+    if config.decision == DecisionRule::Paper {
+        let guard = if config.loop_guard { "with a loop guard" } else { "without a loop guard" };
+        return format!(" It takes the likeliest possible action, then its class, {guard}.");
+    }
     let strength = config.logit_adjustment.as_ref().map(|adjustment| adjustment.strength).filter(|&it| it > 0.0);
     let adjusted = strength.map(|strength| {
         format!(
@@ -57,7 +63,8 @@ fn deciding(config: &CheckpointConfig) -> String {
     let scaled = config.advantage_scale.map(|scale| {
         format!("a choice of advantage A by its critic is exp({scale} A) times as likely (`advantage_scale`)")
     });
-    let ways: Vec<String> = adjusted.into_iter().chain(scaled).collect();
+    let unguarded = (!config.loop_guard).then(|| "no loop guard keeps it from repeating itself".to_owned());
+    let ways: Vec<String> = adjusted.into_iter().chain(scaled).chain(unguarded).collect();
     if ways.is_empty() { String::new() } else { format!(" When it decides, {}.", ways.join(", and ")) }
 }
 

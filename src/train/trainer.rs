@@ -23,7 +23,7 @@ use crate::nets::precision::Precision;
 const MEASURED: usize = 2048;
 /// Of those, how many are computed at once.
 const CHUNK: usize = 256;
-/// BatchSampler that wait for their update.
+/// Batches that wait for their update.
 const AHEAD: usize = 2;
 
 /// A training's networks, hyper-parameters and state.
@@ -61,10 +61,11 @@ impl Trainer<'_> {
         let measured = batches.held_out(held_out, MEASURED, CHUNK)?;
         let (first, steps) = (update.step(), self.preset.training.steps);
         let (sender, gathered) = mpsc::sync_channel(AHEAD);
+        let parts = self.preset.parts;
         std::thread::scope(|scope| {
             // It ends with the last step, or when nobody waits for its batches any more.
             scope.spawn(move || {
-                (first..steps).map(|step| batches.at(step)).all(|batch| sender.send(batch).is_ok());
+                (first..steps).map(|step| batches.in_parts(step, parts)).all(|batch| sender.send(batch).is_ok());
             });
             let finished = self.steps(&mut update, &gathered, &measured, logger, stop, save_checkpoint);
             drop(gathered);
@@ -75,7 +76,7 @@ impl Trainer<'_> {
     fn steps(
         &self,
         update: &mut Update<'_>,
-        gathered: &mpsc::Receiver<anyhow::Result<Batch>>,
+        gathered: &mpsc::Receiver<anyhow::Result<Vec<Batch>>>,
         measured: &[Transitions],
         logger: &mut dyn ProgressLogger,
         stop: &AtomicBool,
@@ -94,7 +95,7 @@ impl Trainer<'_> {
             let (step, last) = (update.step() + 1, update.step() + 1 == self.preset.training.steps);
             let due = |every: u64| step.is_multiple_of(every) || last;
             let mut scalars = Scalars::new("policy", step, self.preset.training.steps);
-            let numbers = update.update(&batch, due(self.preset.report_every))?;
+            let numbers = update.update_in_parts(&batch, due(self.preset.report_every))?;
             if due(self.preset.report_every) {
                 scalars.values = numbers;
                 throughput.describe(step - first, self.preset.training.batch_size, &mut scalars);
@@ -138,15 +139,16 @@ impl Trainer<'_> {
         let mut sums = [0.0; 6];
         for items in measured {
             let observation = network_input(&items.observation, Precision::Full);
-            let (logits, surprise) = tch::no_grad(|| {
+            let (logits, nll) = tch::no_grad(|| {
                 let logits = self.networks.policy.forward(&observation, &items.conditioning, false);
-                let surprise = bc::neg_log_likelihood(&logits, &items.actions, &items.objects);
-                (logits, surprise)
+                let nll = bc::neg_log_likelihood(&logits, &items.actions, &items.objects);
+                (logits, nll)
             });
             let (actions, objects) = bc::accuracy(&logits, &items.actions, &items.objects);
             let sum = |tensor: &Tensor| tensor.sum(Kind::Double).double_value(&[]);
-            let (count, named) = (items.actions.size()[0] as f64, sum(&bc::object_mask(&items.objects)));
-            let found = [count, sum(&surprise.action), actions * count, named, sum(&surprise.object), objects * named];
+            let (count, with_object) = (items.actions.size()[0] as f64, sum(&bc::object_mask(&items.objects)));
+            let found =
+                [count, sum(&nll.action), actions * count, with_object, sum(&nll.object), objects * with_object];
             sums.iter_mut().zip(found).for_each(|(sum, value)| *sum += value);
         }
         for (head, [count, loss, right]) in
@@ -193,9 +195,9 @@ mod tests {
     use crate::nets::policy::PolicySpec;
     use crate::nets::visual_encoder::VisualEncoder;
     use crate::nets::weights;
-    use crate::train::training_data::{
-        ChainingPool, ConditioningTable, EmbeddingTable, FeatureMaps, TrainingData, joint_text,
-    };
+    use crate::train::chaining_pool::ChainingPool;
+    use crate::train::embedding_table::EmbeddingTable;
+    use crate::train::training_data::{ConditioningTable, FeatureMaps, TrainingData};
 
     const FRAMES: u64 = 24;
 
@@ -320,8 +322,8 @@ mod tests {
             let pool = preset.chaining.as_ref().and_then(|chaining| match chaining.pairs {
                 PairSource::InBatch => None,
                 PairSource::Pool(count) => {
-                    let pairs = ChainingPool::draw(&items, preset.seed, count);
-                    let texts: Vec<String> = pairs.iter().map(|&pair| joint_text(&items, pair)).collect();
+                    let pairs = ChainingPool::draw(&items, preset.seed, count, None);
+                    let texts: Vec<String> = pairs.iter().map(|&pair| ChainingPool::joint_text(&items, pair)).collect();
                     let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
                     Some(ChainingPool::new(&items, pairs, &joint, Device::Cpu).unwrap())
                 }
@@ -371,7 +373,7 @@ mod tests {
     #[test]
     fn mixed_precision_learns_nearly_the_same_and_keeps_32_bits() {
         let _chance = crate::nets::testing::chance();
-        for name in ["sprint", "am", "et"] {
+        for name in ["sprint", "am", "l-bc-transformer"] {
             // What is dropped by chance differs with the width of what it is dropped from.
             let mut preset = preset(name, 1);
             preset.policy.dropout = 0.0;
@@ -393,7 +395,7 @@ mod tests {
     #[test]
     fn a_training_that_was_stopped_and_resumed_equals_the_uninterrupted_one_to_the_bit() {
         let _chance = crate::nets::testing::chance();
-        let full = ["l-bc", "sprint", "am", "et"].map(|name| preset(name, 8));
+        let full = ["l-bc", "sprint", "am", "l-bc-transformer"].map(|name| preset(name, 8));
         let mixed = Preset { precision: Precision::Mixed, ..preset("l-bc", 8) };
         for preset in full.into_iter().chain([mixed]) {
             let name = preset.name.as_str();
@@ -428,7 +430,7 @@ mod tests {
             ("iql-primitive", "v_mean", "chain_q_loss"),
             ("sprint", "aggregate_b_q_loss", "none"),
             ("am", "chain_q_loss", "aggregate_a_q_loss"),
-            ("et", "action_loss", "q_loss"),
+            ("l-bc-transformer", "action_loss", "q_loss"),
         ] {
             let (_, last) = trained(&preset(name, 2), u64::MAX);
             assert!(last.values.contains_key(present) && !last.values.contains_key(absent), "{name}: {last:?}");

@@ -9,7 +9,9 @@ use tch::{Device, Kind, Tensor};
 use super::batch_sampler::BatchSampler;
 use super::preset::Preset;
 use super::trainer::Trainer;
-use super::training_data::{ChainingPool, ConditioningTable, EmbeddingTable, FeatureMaps, TrainingData, joint_text};
+use super::chaining_pool::ChainingPool;
+use super::embedding_table::EmbeddingTable;
+use super::training_data::{ConditioningTable, FeatureMaps, TrainingData};
 use super::training_state::TrainingState;
 use crate::agent::checkpoint::Networks;
 use crate::algo::chain::PairSource;
@@ -65,8 +67,8 @@ pub fn measure(preset: &Preset, device: Device, steps: u64) -> anyhow::Result<Up
     };
     let pool = match preset.chaining.as_ref().map(|chaining| chaining.pairs) {
         Some(PairSource::Pool(count)) => {
-            let pairs = ChainingPool::draw(&items, preset.seed, count);
-            let texts: Vec<String> = pairs.iter().map(|&pair| joint_text(&items, pair)).collect();
+            let pairs = ChainingPool::draw(&items, preset.seed, count, None);
+            let texts: Vec<String> = pairs.iter().map(|&pair| ChainingPool::joint_text(&items, pair)).collect();
             let joint = embed(&texts.iter().map(String::as_str).collect::<Vec<_>>())?;
             Some(ChainingPool::new(&items, pairs, &joint, device)?)
         }

@@ -62,7 +62,7 @@ pub(crate) fn train(
         learner.minimise(&loss.total());
         let mut scalars = Scalars::new("visual_encoder", learner.step(), training.optimisation.steps);
         if learner.step().is_multiple_of(preset.report_every) || learner.is_done() {
-            scalars.add("cell_label_loss", &loss.marks);
+            scalars.add("cell_label_loss", &loss.cell_labels);
             scalars.add("depth_loss", &loss.depth);
             scalars.add("held_object_loss", &loss.held);
         }
@@ -125,7 +125,7 @@ fn batch(frame_store: &FrameStore, encoder: &HouseEncoder, frames: &[usize]) -> 
     let depth: Vec<f32> = each.iter().flat_map(|target| target.depth.iter().copied()).collect();
     let device = encoder.device();
     let targets = FrameLabels {
-        marks: Tensor::from_slice(&gather(|target| &target.cell_labels))
+        cell_labels: Tensor::from_slice(&gather(|target| &target.cell_labels))
             .view([n, CELL_LABELS as i64, SIDE, SIDE])
             .to_device(device)
             .to_kind(Kind::Float),
@@ -162,7 +162,7 @@ pub(crate) mod testing {
         FrameStore::open(&[Dataset::open(folder.path()).unwrap()]).unwrap()
     }
 
-    /// RecordedScalars what is reported.
+    /// Records what is reported.
     pub(crate) struct RecordedScalars(pub(crate) Vec<Scalars>);
 
     impl ProgressLogger for RecordedScalars {

@@ -41,7 +41,7 @@ fn fresh(goal: Option<[i64; 4]>) -> Option<LearnedPolicy> {
         config.critic.as_ref(),
         Device::Cpu,
     );
-    LearnedPolicy::with("a".into(), config, networks, Arc::new(Mutex::new(embedder)), Device::Cpu).ok()
+    LearnedPolicy::with("a".into(), config, networks, Some(Arc::new(Mutex::new(embedder))), Device::Cpu).ok()
 }
 
 /// A fresh agent whose logits are all but equal, so that whatever rounds otherwise decides otherwise; nothing where there is no
@@ -64,7 +64,7 @@ fn shipped(name: &str) -> Option<LearnedPolicy> {
     device::set_threads(1);
     let sentences = Embedder::open(&needed::sentence_encoder(&default_folder())?, Device::Cpu).unwrap();
     let folder = needed::shipped_agent(name)?;
-    Some(LearnedPolicy::load(&folder, Arc::new(Mutex::new(sentences)), Device::Cpu).unwrap())
+    Some(LearnedPolicy::load(&folder, Some(Arc::new(Mutex::new(sentences))), Device::Cpu).unwrap())
 }
 
 fn kitchen(grader: Option<Grader>) -> HouseEnvironment {

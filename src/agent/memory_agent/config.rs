@@ -13,6 +13,7 @@ use crate::agent::config::{CheckpointConfig, Ontology};
 use crate::data::{json, text_file};
 use crate::nets::chooser::{Chooser, ChooserSpec};
 use crate::nets::detector::{Detector, DetectorSpec};
+use crate::nets::size_differences::size_differences;
 use crate::nets::weights::{self, TensorSpec};
 
 /// What tells the checkpoints of these agents from those of the paper's.
@@ -88,7 +89,7 @@ impl MemoryConfig {
 
     fn check(&self) -> anyhow::Result<()> {
         let (found, own) = (&self.ontology, Ontology::current());
-        ensure!(*found == own, "ontology is {found:?}, this program's is {own:?}");
+        ensure!(*found == own, "ontology is not this program's: {}", size_differences(found, &own));
         self.detector.check()?;
         self.chooser.check()?;
         for (field, found, own) in [

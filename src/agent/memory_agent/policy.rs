@@ -10,6 +10,7 @@ use super::eyes::{Eyes, Sight};
 use super::macro_action::{MacroAction, Purpose};
 use super::recollection::Recollection;
 use crate::agent::decision::{ActionDistribution, Decision};
+use crate::agent::decision_rule::DecisionOverride;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::Candidate;
@@ -23,6 +24,8 @@ pub(crate) struct MemoryPolicy {
     /// Owns the chooser's weights.
     _networks: tch::nn::VarStore,
     loop_guard: bool,
+    /// As its checkpoint says: what is asked for may be taken back.
+    own_loop_guard: bool,
     samples: bool,
     slots: Vec<Recollection>,
 }
@@ -53,6 +56,7 @@ impl MemoryPolicy {
             chooser: networks.chooser,
             _networks: networks.chooser_store,
             loop_guard: config.loop_guard,
+            own_loop_guard: config.loop_guard,
             samples: false,
             slots: (0..MemoryPolicy::SLOTS).map(|_| Recollection::default()).collect(),
         }
@@ -142,6 +146,10 @@ impl Policy for MemoryPolicy {
 
     fn set_sampling(&mut self, samples: bool) {
         self.samples = samples;
+    }
+
+    fn set_deciding(&mut self, asked: DecisionOverride) {
+        self.loop_guard = asked.loop_guard.unwrap_or(self.own_loop_guard);
     }
 }
 

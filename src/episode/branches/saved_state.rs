@@ -73,6 +73,7 @@ pub(crate) fn look_back(
 ) {
     policy.reset(rollout.slot, author.seed);
     policy.set_sampling(author.sampling);
+    policy.set_deciding(author.deciding);
     if before.is_empty() {
         return;
     }

@@ -41,6 +41,7 @@ pub(super) fn play_again(
             end: run.manifest.end,
             step_by_step: run.manifest.step_by_step,
             sampling: run.manifest.sampling,
+            deciding: run.manifest.deciding,
             ..Options::plain(run.manifest.grader)
         },
     };

@@ -35,7 +35,7 @@ fn walked() -> SessionExport {
     let mut rollout = Rollout::in_house(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
     let mut policy = RandomPolicy::new();
     policy.reset(0, 9);
-    let random = Author { policy: "random".into(), checkpoint: None, seed: 9, sampling: false };
+    let random = Author::of("random", 9);
     let mut tree = Tree::new(SavedState::of(&rollout, &random, policy.state(0)));
     for step in 0..8 {
         if step == 5 {

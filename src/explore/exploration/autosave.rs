@@ -122,7 +122,7 @@ impl Exploration {
 
     fn take_branch_again(&mut self, episode: &Episode) -> anyhow::Result<()> {
         self.back_to_task();
-        let author = Author { policy: String::new(), checkpoint: None, seed: 0, sampling: false };
+        let author = Author::of("", 0);
         self.retrace(episode, &author, false)?;
         // It has that name already where it is the first, or was numbered alike.
         self.tree.rename(self.tree.branch(), &episode.task);

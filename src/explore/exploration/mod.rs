@@ -65,7 +65,7 @@ impl Exploration {
     ) -> anyhow::Result<Exploration> {
         let start = source.open()?;
         let rollout = start.rollout();
-        let author = Author { policy: kind.name().into(), checkpoint: None, seed: source.seed(), sampling: false };
+        let author = Author::of(kind.name(), source.seed());
         let mut exploration = Exploration {
             checkpoints: Arc::new(policies.agents()),
             policies,

@@ -1,8 +1,8 @@
 //! Who decides: which policy, which checkpoint, which chance.
 
 use super::Exploration;
-use crate::agent::Policy;
 use crate::agent::registry::{Loaded, PolicyIdentity, PolicyKind};
+use crate::agent::{DecisionOverride, Policy};
 use crate::episode::record::Author;
 
 impl Exploration {
@@ -74,6 +74,13 @@ impl Exploration {
         self.acting.author.sampling = samples;
         self.look_back();
         self.make_start();
+    }
+
+    /// The same, but its agents decide as asked; before anything was done.
+    pub(crate) fn deciding(mut self, asked: DecisionOverride) -> Exploration {
+        self.acting.author.deciding = asked;
+        self.make_start();
+        self
     }
 
     /// Lets that author's policy begin here: its chance, and whether it draws.

@@ -40,9 +40,9 @@ pub struct Collection {
     pub seed: u64,
     /// Which expert demonstrates, and how much random actions disturb it.
     pub settings: DemonstrationSettings,
-    /// A checkpoint that acts instead of the expert, with its sentence encoder: the expert then only says what it
+    /// A checkpoint that acts instead of the expert, with its sentence encoder where it reads through one: the expert then only says what it
     /// would do, and finishes what is left at the horizon.
-    pub learner: Option<(PathBuf, SharedEmbedder)>,
+    pub learner: Option<(PathBuf, Option<SharedEmbedder>)>,
 }
 
 /// How a collection ended.
@@ -301,7 +301,7 @@ mod tests {
             },
             seed: 1,
             settings: UNDISTURBED,
-            learner: Some((first, Arc::new(std::sync::Mutex::new(sentences)))),
+            learner: Some((first, Some(Arc::new(std::sync::Mutex::new(sentences))))),
         };
         collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
         let dataset = Dataset::open(&collection.out).unwrap();

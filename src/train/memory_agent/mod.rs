@@ -25,6 +25,7 @@ use crate::agent::config::{CheckpointConfig, Ontology};
 use crate::agent::memory_agent::config::{AgentKind, MemoryConfig, MemoryNetworks, MemoryProvenance};
 use crate::agent::memory_agent::eyes::{Eyes, Sight};
 use crate::data::dataset::Dataset;
+use crate::nets::size_differences::size_differences;
 use crate::nets::weights;
 
 /// What to train, on what, into where.
@@ -97,7 +98,12 @@ impl MemoryTraining {
             let config = MemoryConfig::read(folder)?;
             let (found, own) = (&config.detector, &self.preset.detector);
             let file = folder.join("config.json");
-            anyhow::ensure!(found == own, "{}: detector is {found:?}, the preset's is {own:?}", file.display());
+            anyhow::ensure!(
+                found == own,
+                "{}: detector is of another size than the preset's: {}",
+                file.display(),
+                size_differences(found, own)
+            );
             let given = MemoryNetworks::load(folder, &config, self.device)?;
             weights::copy(&given.detector_store.variables().into_iter().collect(), "", &networks.detector_store)?;
             return Ok(true);

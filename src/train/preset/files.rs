@@ -12,7 +12,7 @@ const SHIPPED: [(&str, &str); 10] = [
     ("l-bc", include_str!("../../../assets/presets/l-bc.toml")),
     ("iql-primitive", include_str!("../../../assets/presets/iql-primitive.toml")),
     ("am", include_str!("../../../assets/presets/am.toml")),
-    ("et", include_str!("../../../assets/presets/et.toml")),
+    ("l-bc-transformer", include_str!("../../../assets/presets/l-bc-transformer.toml")),
     ("sprint-no-chain", include_str!("../../../assets/presets/sprint-no-chain.toml")),
     ("sprint-no-agg", include_str!("../../../assets/presets/sprint-no-agg.toml")),
     ("sprint-concat-agg", include_str!("../../../assets/presets/sprint-concat-agg.toml")),
@@ -20,7 +20,10 @@ const SHIPPED: [(&str, &str); 10] = [
     ("l-bc-agg", include_str!("../../../assets/presets/l-bc-agg.toml")),
 ];
 /// Sizes other than the presets' own, which suits two CPU cores.
-const SIZES: [(&str, &str); 1] = [("paper", include_str!("../../../assets/presets/sizes/paper.toml"))];
+const SIZES: [(&str, &str); 2] = [
+    ("paper", include_str!("../../../assets/presets/sizes/paper.toml")),
+    ("narrow", include_str!("../../../assets/presets/sizes/narrow.toml")),
+];
 
 impl Preset {
     /// The names of the shipped presets.
@@ -50,9 +53,18 @@ impl Preset {
         Preset::of(table).with_context(|| format!("the preset {name}"))
     }
 
-    /// The values of a size. Each has to be one that some method has; a method without it passes it over.
+    /// The values of a size, which may extend a shipped one. Each has to be one that some method has.
     fn size(name: &str) -> anyhow::Result<toml::Table> {
-        let values: toml::Table = shipped(&SIZES, name, "size")?.parse()?;
+        let mut values: toml::Table = shipped(&SIZES, name, "size")?.parse()?;
+        match values.remove("extends") {
+            None => (),
+            Some(toml::Value::String(base)) if SIZES.iter().any(|(size, _)| *size == base) && base != name => {
+                let mut whole = Preset::size(&base)?;
+                extend(&mut whole, values);
+                values = whole;
+            }
+            Some(other) => anyhow::bail!("extends is {other}, which is no other shipped size"),
+        }
         let mut every_method = toml::Table::new();
         for method in Preset::names() {
             extend(&mut every_method, Preset::table(method)?);
@@ -60,6 +72,20 @@ impl Preset {
         extend(&mut every_method, values.clone());
         Preset::parse(every_method)?;
         Ok(values)
+    }
+
+    /// The parts in which a training that was begun computes its updates, from the preset that it keeps; nothing where it keeps none.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub(crate) fn parts_of(kept: &Path) -> anyhow::Result<Option<usize>> {
+        let table: toml::Table = match text_file::read(kept) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            read => {
+                read.with_context(|| kept.display().to_string())?.parse().with_context(|| kept.display().to_string())?
+            }
+        };
+        Ok(Some(table.get("parts").and_then(toml::Value::as_integer).map_or(1, |parts| parts.max(1) as usize)))
     }
 
     /// A preset's text with what it extends.
@@ -102,13 +128,16 @@ pub(crate) fn extend(table: &mut toml::Table, over: toml::Table) {
     }
 }
 
-/// Puts the values of a size over those that `table` has.
+/// What a method may lack. A size says how large such a part is where there is one, and never adds it.
+const PARTS_OF_METHODS: [&str; 5] = ["critic", "iql", "chaining", "goal_channels", "attention"];
+
+/// Puts the values of a size over those of `table`.
 fn resize(table: &mut toml::Table, size: toml::Table) {
     for (key, value) in size {
         match (table.get_mut(&key), value) {
             (Some(toml::Value::Table(below)), toml::Value::Table(value)) => resize(below, value),
-            (Some(own), value) => *own = value,
-            (None, _) => {}
+            (None, _) if PARTS_OF_METHODS.contains(&key.as_str()) => {}
+            (_, value) => drop(table.insert(key, value)),
         }
     }
 }
@@ -116,8 +145,12 @@ fn resize(table: &mut toml::Table, size: toml::Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::agent::DecisionRule;
+    use crate::agent::config::CheckpointConfig;
     use crate::algo::chain::PairSource;
-    use crate::data::selection::{Composites, ObjectTarget};
+    use crate::data::selection::{Composites, HistoryStart, ObjectTarget};
+    use crate::nets::precision::Precision;
+    use crate::train::preset::VisualBackbone;
 
     #[test]
     fn every_shipped_preset_parses_in_every_size_and_is_what_its_name_says() {
@@ -134,17 +167,45 @@ mod tests {
                 "{name}"
             );
             assert!(paper.iql.is_none_or(|iql| iql.advantage_scale == 0.0), "{name}");
+            assert_eq!(
+                (paper.visual_backbone, paper.data.history_start, paper.hold_out),
+                (VisualBackbone::ResNet18, HistoryStart::Trajectory, 0),
+                "{name}"
+            );
+            assert_eq!((preset.decision, preset.loop_guard), (DecisionRule::Mass, true), "{name}");
+            assert_eq!((paper.decision, paper.loop_guard), (DecisionRule::Paper, false), "{name}");
             assert!(paper.chaining.is_none_or(|chaining| chaining.pairs == PairSource::InBatch), "{name}");
         }
         let method = |name| Preset::named(name).unwrap().method();
-        let methods = ["sprint", "sprint-no-agg", "sprint-no-chain", "iql-primitive", "l-bc", "l-bc-agg", "am", "et"];
-        assert_eq!(methods.map(method), ["sprint", "sprint", "iql", "iql", "bc", "bc", "am", "et"]);
+        let methods = [
+            "sprint",
+            "sprint-no-agg",
+            "sprint-no-chain",
+            "iql-primitive",
+            "l-bc",
+            "l-bc-agg",
+            "am",
+            "l-bc-transformer",
+        ];
+        assert_eq!(methods.map(method), ["sprint", "sprint", "iql", "iql", "bc", "bc", "am", "transformer-bc"]);
         let composites = |name| Preset::named(name).unwrap().data.composites;
         let selections = ["sprint", "l-bc", "iql-primitive", "sprint-no-agg", "sprint-concat-agg"].map(composites);
         assert_eq!(
             selections,
             [Composites::Labels, Composites::None, Composites::None, Composites::None, Composites::Concat]
         );
+    }
+
+    #[test]
+    fn the_older_agents_are_trained_on_in_the_narrow_size() {
+        for (name, preset) in [("first", "l-bc"), ("sprint", "sprint")] {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints").join(name);
+            let config = CheckpointConfig::read(&folder).unwrap();
+            let sized = Preset::sized(preset, Some("narrow")).unwrap();
+            assert!(config.policy.fits(&sized.policy), "{name}");
+            let critics = config.critic.zip(sized.critic);
+            assert!(critics.is_none_or(|(critic, sized)| critic.fits(&sized)), "{name}");
+        }
     }
 
     #[test]
@@ -173,5 +234,20 @@ mod tests {
             assert!(error.contains(&format!("`{field}`")) && error.contains(section), "{error}");
         }
         assert!(format!("{:#}", sized("[policy]\nhidden = 8").unwrap_err()).contains("hidden"));
+    }
+
+    #[test]
+    fn a_size_sets_what_a_preset_leaves_to_its_default_and_may_extend_a_shipped_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("own.toml");
+        let sized = |text: &str| {
+            std::fs::write(&file, text).unwrap();
+            Preset::sized("l-bc", file.to_str())
+        };
+        let own = sized("extends = \"paper\"\nprecision = \"mixed\"\n[policy]\nhidden = [8]").unwrap();
+        assert_eq!((own.policy.hidden, own.policy.embedding), (vec![8], 768));
+        assert_eq!((own.visual_backbone, own.precision), (VisualBackbone::ResNet18, Precision::Mixed));
+        let error = format!("{:#}", sized("extends = \"moon\"").unwrap_err());
+        assert!(error.contains("extends is \"moon\", which is no other shipped size"), "{error}");
     }
 }

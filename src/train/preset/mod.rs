@@ -1,11 +1,13 @@
 //! Presets: every hyper-parameter of a training by name, and what of them fits together.
 
 mod files;
+mod former_names;
 
 pub(crate) use self::files::extend;
 
 use serde::{Deserialize, Serialize};
 
+use crate::agent::decision_rule::{self, DecisionRule};
 use crate::algo::chain::{Chaining, PairSource};
 use crate::algo::iql::Iql;
 use crate::algo::learner::Optimisation;
@@ -55,14 +57,28 @@ pub struct Preset {
     pub chaining: Option<Chaining>,
     /// The training of policy and critic.
     pub training: Optimisation,
+    /// Parts that a batch is computed in, one after the other, where the device has too little memory for the whole. Batch norms
+    /// then see a part at a time.
+    #[serde(default = "one_part")]
+    pub(crate) parts: usize,
     /// How wide the numbers are that networks compute with while they learn.
     #[serde(default)]
     pub(crate) precision: Precision,
     /// How much of the log share that each action has among the labels is taken off its logit when the agent decides.
     #[serde(default)]
     pub(crate) logit_adjustment: f32,
+    /// By which rule the agent decides.
+    #[serde(default)]
+    pub(crate) decision: DecisionRule,
+    /// Whether the agent is kept from repeating itself.
+    #[serde(default = "decision_rule::on")]
+    pub(crate) loop_guard: bool,
     /// How the trained policy is measured.
     pub(crate) validation: ValidationSpec,
+}
+
+fn one_part() -> usize {
+    1
 }
 
 /// The network that turns frames into feature maps.
@@ -112,7 +128,10 @@ impl Preset {
                 Preset::FORMAT
             );
         }
-        table.try_into().map_err(|error| anyhow::anyhow!("{}", error.to_string().trim_end()))
+        table.try_into().map_err(|error| {
+            let told = error.to_string();
+            anyhow::anyhow!("{}{}", told.trim_end(), former_names::hint(&told))
+        })
     }
 
     fn of(table: toml::Table) -> anyhow::Result<Preset> {
@@ -125,6 +144,7 @@ impl Preset {
             anyhow::ensure!(value > 0, "{field} is 0");
         }
         preset.training.check("training")?;
+        preset.check_parts()?;
         preset.visual_encoder_training.optimisation.check("visual_encoder_training.optimisation")?;
         let weight = preset.visual_encoder_training.positive_weight;
         anyhow::ensure!(
@@ -140,6 +160,20 @@ impl Preset {
         preset.policy.check()?;
         preset.check_method()?;
         Ok(preset)
+    }
+
+    /// Every part of a batch needs two items.
+    ///
+    /// # Errors
+    /// When there are more parts than that.
+    pub(crate) fn check_parts(&self) -> anyhow::Result<()> {
+        let most = self.training.batch_size / 2;
+        anyhow::ensure!(
+            (1..=most).contains(&self.parts),
+            "parts is {}, which is not between 1 and {most}: a part needs two items",
+            self.parts
+        );
+        Ok(())
     }
 
     /// What a method consists of has to fit together.
@@ -175,12 +209,22 @@ impl Preset {
             ("chaining.loss_weight", chaining.loss_weight),
             ("chaining.chain_weight", chaining.chain_weight),
             ("chaining.aggregate_weight", chaining.aggregate_weight),
+            ("chaining.feasible_share", chaining.feasible_share),
         ] {
             anyhow::ensure!(value.is_finite() && value >= 0.0, "{field} is {value}");
         }
         anyhow::ensure!(
             chaining.chain_weight + chaining.aggregate_weight > 0.0,
             "chaining.chain_weight and chaining.aggregate_weight are both 0"
+        );
+        anyhow::ensure!(
+            chaining.feasible_share <= 1.0,
+            "chaining.feasible_share is {}, which is not a share",
+            chaining.feasible_share
+        );
+        anyhow::ensure!(
+            chaining.feasible_share == 0.0 || chaining.pairs != PairSource::InBatch,
+            "chaining.feasible_share is of a pool: chaining.pairs are from the batch"
         );
         let sentences = self.policy.goal_channels.is_none();
         anyhow::ensure!(
@@ -198,11 +242,11 @@ impl Preset {
         Ok(())
     }
 
-    /// The method as `config.json` names it: `bc`, `iql`, `sprint`, `am` or `et`.
+    /// The method as `config.json` names it: `bc`, `iql`, `sprint`, `am` or `transformer-bc`.
     pub(crate) fn method(&self) -> &'static str {
         match (&self.iql, &self.chaining, &self.policy.goal_channels) {
             (_, _, Some(_)) => "am",
-            (None, ..) if self.policy.attention.is_some() => "et",
+            (None, ..) if self.policy.attention.is_some() => "transformer-bc",
             (None, ..) => "bc",
             (Some(_), None, _) => "iql",
             (Some(_), Some(_), _) => "sprint",
@@ -243,6 +287,9 @@ mod tests {
         refused("[policy]\ngoal_channels = [4, 4, 4, 4]", "no instruction is read");
         refused("[policy]\ngoal_channels = [4, 4, 4, 4]\n[validation]\nswaps = 0", "goals have none");
         refused("[chaining]\nbatch_size = 0", "chaining.batch_size");
+        refused("[chaining]\nfeasible_share = 1.5", "chaining.feasible_share is 1.5");
+        refused("[chaining]\npairs = \"in-batch\"\nfeasible_share = 0.5", "chaining.feasible_share is of a pool");
+        refused("parts = 0", "parts is 0");
         refused("[iql]\ncloning_fraction = 3000.0", "iql.cloning_fraction");
         refused("[iql]\nadvantage_scale = -1.0", "iql.advantage_scale");
         refused("[iql]\nexpectile = 1.5", "iql.expectile");

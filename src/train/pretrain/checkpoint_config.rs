@@ -7,7 +7,7 @@ use std::path::Path;
 use super::demonstrations::Demonstrations;
 use super::spec::Pretraining;
 use super::text_embeddings::Texts;
-use crate::agent::config::{CheckpointConfig, Ontology, Provenance, SentenceSpec, SourceCheckpoint};
+use crate::agent::config::{CheckpointConfig, Ontology, Provenance, SourceCheckpoint};
 use crate::agent::logit_adjustment::LogitAdjustment;
 use crate::data::items::Items;
 use crate::nets::visual_encoder::VisualEncoder;
@@ -42,7 +42,9 @@ pub(super) fn checkpoint_config(
             action_frequencies: items.action_shares(),
         }),
         advantage_scale: advantage_scale.filter(|&scale| scale > 0.0),
-        sentence_encoder: sentence_encoder(spec)?,
+        decision: preset.decision,
+        loop_guard: preset.loop_guard,
+        sentence_encoder: spec.sentence_spec().cloned(),
         provenance: Provenance {
             preset: preset.name.clone(),
             dataset,
@@ -70,11 +72,6 @@ pub(super) fn checkpoint_config(
 pub(super) fn after(steps: u64, config: &CheckpointConfig) -> CheckpointConfig {
     let provenance = Provenance { policy_steps: steps, ..config.provenance.clone() };
     CheckpointConfig { provenance, ..config.clone() }
-}
-
-pub(super) fn sentence_encoder(spec: &Pretraining) -> anyhow::Result<SentenceSpec> {
-    let digest = spec.embedder()?.encoder().digest().to_string();
-    Ok(SentenceSpec { name: spec.sentence_encoder.clone(), digest })
 }
 
 /// The datasets and how many of their trajectories are learned from, each once however often it is named. `parts` are the
@@ -119,7 +116,7 @@ pub(super) fn identity(
         ("items", items.digest()),
         ("ontology", format!("{} {}", config.ontology.classes, config.ontology.actions.join(" "))),
         ("visual_encoder", encoder_digest.to_string()),
-        ("sentence_encoder", config.sentence_encoder.digest.clone()),
+        ("sentence_encoder", spec.sentence_spec().map_or_else(String::new, |sentences| sentences.digest.clone())),
         ("embedding", config.policy.embedding.to_string()),
     ];
     identity.extend(further.map(|(name, value)| (name.to_string(), value)));

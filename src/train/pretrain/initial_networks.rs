@@ -5,7 +5,6 @@ use std::path::Path;
 use anyhow::Context;
 use tch::nn::VarStore;
 
-use super::checkpoint_config::sentence_encoder;
 use super::spec::Pretraining;
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::CheckpointConfig;
@@ -37,12 +36,14 @@ pub(super) fn initial_networks(spec: &Pretraining) -> anyhow::Result<Networks> {
     Ok(networks)
 }
 
-/// An Episodic Transformer embeds words by itself; all others read what the sentence encoder makes of a text.
 fn check_sentence_width(spec: &Pretraining) -> anyhow::Result<()> {
+    let Some(sentences) = spec.sentence_spec() else { return Ok(()) };
     let (own, width) = (spec.preset.policy.embedding, spec.embedder()?.encoder().width());
     anyhow::ensure!(
-        own == width as i64 || spec.preset.policy.attention.is_some(),
-        "the preset's policy.embedding is {own}, the sentence encoder's width is {width}"
+        own == width as i64,
+        "the preset's policy.embedding is {own}, the width of the sentence encoder {} is {width}: name another with \
+         --encoder",
+        sentences.name
     );
     Ok(())
 }
@@ -90,17 +91,17 @@ fn copy_critic(spec: &Pretraining, folder: &Path, networks: &Networks) -> anyhow
 /// A checkpoint of the preset's visual encoder and of this training's sentence encoder.
 fn load_of_same_sentences(spec: &Pretraining, folder: &Path) -> anyhow::Result<(CheckpointConfig, Networks)> {
     let (config, given) = load(spec, folder)?;
-    let own = sentence_encoder(spec)?;
-    let found = &config.sentence_encoder;
-    anyhow::ensure!(
-        found.digest == own.digest,
-        "{}: sentence_encoder is {} ({}), this training's is {} ({})",
-        folder.join("config.json").display(),
-        found.name,
-        found.digest,
-        own.name,
-        own.digest
-    );
+    if let (Some(own), Some(found)) = (spec.sentence_spec(), config.read_sentences()) {
+        anyhow::ensure!(
+            found.digest == own.digest,
+            "{}: sentence_encoder is {} ({}), this training's is {} ({})",
+            folder.join("config.json").display(),
+            found.name,
+            found.digest,
+            own.name,
+            own.digest
+        );
+    }
     Ok((config, given))
 }
 

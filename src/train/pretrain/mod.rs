@@ -17,7 +17,7 @@ use self::demonstrations::Demonstrations;
 use self::initial_networks::initial_networks;
 use self::out_folder::TrainingFolder;
 use self::policy::Inputs;
-pub(crate) use self::spec::Pretraining;
+pub(crate) use self::spec::{Pretraining, Sentences};
 use self::text_embeddings::embed_texts;
 use super::feature_cache;
 use super::in_training_eval::InTrainingEval;
@@ -62,7 +62,7 @@ impl Pretraining {
             return Ok(Trained::Stopped);
         };
         let items = demonstrations.items(self)?;
-        let Some(texts) = embed_texts(self, &items, &mut logger, stop)? else {
+        let Some(texts) = embed_texts(self, (&items, frame_store), &mut logger, stop)? else {
             return Ok(Trained::Stopped);
         };
         let (demonstrations, networks, features, items) = (&demonstrations, &networks, &features, &items);

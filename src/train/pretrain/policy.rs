@@ -65,7 +65,8 @@ pub(super) fn train(
         let before = saved.replace(step).unwrap_or(step.saturating_sub(spec.preset.save_every));
         match spec.in_training_eval.as_ref().zip(evaluation.as_ref()) {
             Some((settings, evaluation)) if settings.is_due(before, step) => {
-                in_training_eval::run(evaluation, &spec.out, &spec.embedder, spec.device, stop, scalars)
+                let embedder = spec.sentences.as_ref().map(|sentences| &sentences.embedder);
+                in_training_eval::run(evaluation, &spec.out, embedder, spec.device, stop, scalars)
             }
             _ => Ok(()),
         }

@@ -1,12 +1,16 @@
 //! What a pretraining is asked for.
 
-use std::path::PathBuf;
-use std::sync::MutexGuard;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard};
 
+use anyhow::Context;
 use tch::Device;
 
+use crate::agent::config::SentenceSpec;
 use crate::agent::learned::SharedEmbedder;
+use crate::agent::sentence_encoders;
 use crate::nets::embedding_cache::Embedder;
+use crate::nets::sentence::default_folder;
 use crate::nets::visual::VisualSpec;
 use crate::train::in_training_eval::InTrainingEval;
 use crate::train::preset::{Preset, VisualBackbone};
@@ -29,10 +33,8 @@ pub(crate) struct Pretraining {
     pub(crate) critic_from: Option<PathBuf>,
     /// Tasks that the agent plays while it trains.
     pub(crate) in_training_eval: Option<InTrainingEval>,
-    /// Embeds the instructions.
-    pub(crate) embedder: SharedEmbedder,
-    /// The name of the sentence encoder's folder.
-    pub(crate) sentence_encoder: String,
+    /// Embeds the instructions, where the method reads sentences.
+    pub(crate) sentences: Option<Sentences>,
     /// Where to compute.
     pub(crate) device: Device,
 }
@@ -48,7 +50,32 @@ impl Pretraining {
         (self.preset.visual_backbone == VisualBackbone::House).then_some(&self.preset.visual_encoder)
     }
 
+    /// What checkpoints say of the sentence encoder.
+    pub(super) fn sentence_spec(&self) -> Option<&SentenceSpec> {
+        self.sentences.as_ref().map(|sentences| &sentences.spec)
+    }
+
     pub(super) fn embedder(&self) -> anyhow::Result<MutexGuard<'_, Embedder>> {
-        self.embedder.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))
+        let sentences = self.sentences.as_ref().context("the method reads no sentences")?;
+        sentences.embedder.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))
+    }
+}
+
+/// A training's sentence encoder, and what its checkpoint says of it.
+pub(crate) struct Sentences {
+    pub(crate) embedder: SharedEmbedder,
+    pub(crate) spec: SentenceSpec,
+}
+
+impl Sentences {
+    /// Opens an encoder by its folder or name, or the one that set-up fetches.
+    ///
+    /// # Errors
+    /// When it cannot be used.
+    pub(crate) fn open(named: Option<&Path>, device: Device) -> anyhow::Result<Sentences> {
+        let folder = named.map_or_else(default_folder, sentence_encoders::folder_of);
+        let embedder = Embedder::open(&folder, device)?;
+        let spec = sentence_encoders::spec_of(&folder, embedder.encoder().digest());
+        Ok(Sentences { embedder: Arc::new(Mutex::new(embedder)), spec })
     }
 }

@@ -11,8 +11,11 @@ use crate::data::items::Items;
 use crate::data::ranked_chains;
 use crate::language::instruction::normalise;
 use crate::language::vocabulary::Vocabulary;
+use crate::train::chaining_pool::{ChainingPool, Compatibility, Pair, PairEnd};
+use crate::train::embedding_table::EmbeddingTable;
+use crate::train::frame_store::FrameStore;
 use crate::train::metrics::{ProgressLogger, Scalars};
-use crate::train::training_data::{ChainingPool, ConditioningTable, EmbeddingTable, joint_text};
+use crate::train::training_data::ConditioningTable;
 
 /// Texts that are embedded at once.
 const CHUNK: usize = 256;
@@ -29,7 +32,7 @@ pub(super) struct Texts {
 /// Embeds every text of the items; nothing when it was stopped.
 pub(super) fn embed_texts(
     spec: &Pretraining,
-    items: &Items,
+    (items, frame_store): (&Items, &FrameStore),
     logger: &mut dyn ProgressLogger,
     stop: &AtomicBool,
 ) -> anyhow::Result<Option<Texts>> {
@@ -49,8 +52,11 @@ pub(super) fn embed_texts(
         Some((ranked, source)) if ranked || source != PairSource::InBatch => {
             let (pairs, texts) = match source {
                 PairSource::Pool(count) if !ranked => {
-                    let pairs = ChainingPool::draw(items, spec.preset.seed, count);
-                    let texts = pairs.iter().map(|&pair| joint_text(items, pair)).collect();
+                    let share = spec.preset.chaining.as_ref().map_or(0.0, |chaining| chaining.feasible_share);
+                    let compatibility = (share > 0.0).then(|| Compatibility::of(frame_store)).transpose()?;
+                    let feasible = compatibility.as_ref().map(|compatibility| (share, compatibility));
+                    let pairs = ChainingPool::draw(items, spec.preset.seed, count, feasible);
+                    let texts = pairs.iter().map(|&pair| ChainingPool::joint_text(items, pair)).collect();
                     (pairs, texts)
                 }
                 _ => ranked_pairs(spec, items)?,
@@ -64,7 +70,7 @@ pub(super) fn embed_texts(
 }
 
 /// The pairs of the datasets' chains.jsonl whose instructions the items bear, and what a model calls both together.
-fn ranked_pairs(spec: &Pretraining, items: &Items) -> anyhow::Result<(Vec<(u32, u32)>, Vec<String>)> {
+fn ranked_pairs(spec: &Pretraining, items: &Items) -> anyhow::Result<(Vec<Pair>, Vec<String>)> {
     let learned: HashSet<u32> = items.training.iter().map(|span| span.text).collect();
     let numbers: HashMap<&str, u32> =
         learned.into_iter().map(|number| (items.texts[number as usize].as_str(), number)).collect();
@@ -74,7 +80,7 @@ fn ranked_pairs(spec: &Pretraining, items: &Items) -> anyhow::Result<(Vec<(u32, 
             ranked += 1;
             let both = numbers.get(pair.first.as_str()).zip(numbers.get(pair.second.as_str()));
             let Some((&first, &second)) = both.filter(|_| !pair.text.is_empty()) else { continue };
-            pairs.push((first, second));
+            pairs.push((PairEnd::Text(first), PairEnd::Text(second)));
             texts.push(normalise(&pair.text));
         }
     }

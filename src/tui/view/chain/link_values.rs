@@ -1,4 +1,4 @@
-//! LinkValueStrips of link_values: one row a link, one column a step, a colour and a digit for how warm the link was. The strips of two
+//! Strips of link values: one row a link, one column a step, a colour and a digit for how warm the link was. The strips of two
 //! policies stand over each other on the same scale and the same time.
 
 use ratatui::buffer::Buffer;
