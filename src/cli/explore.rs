@@ -253,6 +253,9 @@ impl Explore {
             Some(PolicyName::Random) => PolicyKind::Random,
         };
         if let Some(open) = self.from.elsewhere(kind)? {
+            if matches!(self.policy, Some(PolicyName::Agent)) {
+                bail!("the trained agents act in House only: name --policy random or manual with --env");
+            }
             let agent = self.from.policy_elsewhere(kind)?;
             return self.display.show_elsewhere(manual || self.policy.is_none(), open, agent);
         }
