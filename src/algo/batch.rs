@@ -46,6 +46,7 @@ impl Transitions {
             actions: of(&self.actions),
             objects: of(&self.objects),
             object_target: of(&self.object_target),
+            reward: of(&self.reward),
             terminal: of(&self.terminal),
             executed: of(&self.executed),
         }

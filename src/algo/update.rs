@@ -518,9 +518,12 @@ mod tests {
         }
         let at = |state, action: i64| {
             let one = Tensor::from_slice(&[action]);
-            nets.target.0.min_q(&look(&[state]), &say(&[0]), &one, &Tensor::from_slice(&[0i64])).double_value(&[0])
+            nets.target
+                .0
+                .min_q(&Observations::distinct(&look(&[state])), &say(&[0]), &one, &Tensor::from_slice(&[0i64]))
+                .double_value(&[0])
         };
-        let v = nets.online.0.value(&look(&[1]), &say(&[0])).double_value(&[0]);
+        let v = nets.online.0.value(&Observations::distinct(&look(&[1])), &say(&[0])).double_value(&[0]);
         assert!((v - 0.35).abs() < 0.02, "the 0.7-expectile of 0.5 and 0: {v}");
         for (state, action, right) in [(0, 0, 0.5 + 0.9 * 0.35), (0, 1, 0.0), (1, 0, 0.5), (1, 1, 0.0)] {
             assert!((at(state, action) - right).abs() < 0.03, "Q of {state}, {action}: {}", at(state, action));

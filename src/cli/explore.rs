@@ -71,6 +71,7 @@ pub(crate) struct Origin {
     room: Option<Room>,
     #[command(flatten)]
     environment: EnvironmentChoice,
+    #[command(flatten)]
     deciding: Deciding,
     /// What to tell the agent, in place of the task's own words
     #[arg(long, value_name = "TEXT")]
@@ -83,7 +84,7 @@ pub(crate) struct Origin {
     seed: Option<u64>,
     /// A policy from elsewhere, which acts as the agent.
     #[arg(skip)]
-    elsewhere: Option<(Elsewhere, ElsewhereOptions)>,
+    other_policy: Option<(Elsewhere, ElsewhereOptions)>,
 }
 
 /// How the explorer is shown.
@@ -261,17 +262,21 @@ impl Explore {
         }
         let is_named = self.policy.is_some() || self.from.is_named();
         let Explore { display, mut from, policy, elsewhere, .. } = self;
-        if let Some(PolicyName::Elsewhere(named)) = policy {
+        if let Some(PolicyName::Elsewhere(named)) = &policy {
             if from.checkpoint.is_some() {
                 bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
             }
-            from.elsewhere = Some((named, elsewhere));
+            from.other_policy = Some((named.clone(), elsewhere));
+        }
+        if let Some(open) = from.elsewhere(kind)? {
+            let agent = from.policy_elsewhere(kind)?;
+            return display.show_elsewhere(manual || policy.is_none(), open, agent);
         }
         if !is_named && !display.plain {
             return display.show_screen(kind, manual, || from.list(), || from.list());
         }
         // The screen shows what is wrong with an agent; a script is told by the exit code.
-        let is_chosen = from.checkpoint.is_some() || from.elsewhere.is_some();
+        let is_chosen = from.checkpoint.is_some() || from.other_policy.is_some();
         let needed = display.plain && is_chosen && kind == PolicyKind::Agent;
         let list = from.clone().unnamed();
         display.show(kind, manual, &list, move || {
@@ -299,10 +304,11 @@ impl Default for Origin {
             data: DATA.into(),
             room: None,
             environment: EnvironmentChoice::default(),
+            deciding: Deciding::default(),
             instruction: None,
             expect: ExpectName::Read,
             seed: None,
-            elsewhere: None,
+            other_policy: None,
         }
     }
 }
@@ -311,7 +317,10 @@ impl Origin {
     /// Who acts in an environment with actions of its own: chance, unless a policy that can was named.
     fn policy_elsewhere(&self, kind: PolicyKind) -> anyhow::Result<PolicySource> {
         if let Some(checkpoint) = &self.checkpoint {
-            return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false);
+            return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false, self.deciding.asked());
+        }
+        if let Some((named, options)) = &self.other_policy {
+            return named.open(*options);
         }
         match kind {
             PolicyKind::Expert => Ok(PolicySource::expert()),
@@ -396,7 +405,7 @@ impl Origin {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
         let asked = self.deciding.asked();
-        let elsewhere = self.elsewhere.iter().map(|(named, options)| named.agent(*options));
+        let elsewhere = self.other_policy.iter().map(|(named, options)| named.agent(*options));
         let agents = policy_source::agents(self.checkpoint.as_deref(), asked);
         let policies = Policies::new(elsewhere.chain(agents).collect());
         let exploration = Exploration::new(source, policies, kind, None)?.deciding(asked);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
 use crate::agent::policy_source::{self, PolicySource};
@@ -22,7 +22,7 @@ pub(crate) struct PolicyChoice {
 }
 
 /// How a trained agent decides, where not as its checkpoint says.
-#[derive(Args, Clone, Copy)]
+#[derive(Args, Clone, Copy, Default)]
 pub(crate) struct Deciding {
     /// The rule by which the agent decides: paper (of the possible actions the likeliest, then its class), or mass (the likeliest
     /// pair of both, adjusted and weighed as its checkpoint says) [default: its checkpoint's]
@@ -71,9 +71,7 @@ impl PolicyChoice {
             anyhow::bail!("--sample draws the actions of a trained agent; leave it out with another --policy");
         }
         if !asked.is_none() && self.policy != PolicyName::Agent {
-            anyhow::bail!(
-                "--decision and --loop-guard are for trained agents; leave them out with another --policy"
-            );
+            anyhow::bail!("--decision and --loop-guard are for trained agents; leave them out with another --policy");
         }
         match &self.policy {
             PolicyName::Expert => Ok(PolicySource::expert()),

@@ -1,6 +1,7 @@
 //! `sprint pretrain`: trains an agent on a dataset.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -9,8 +10,7 @@ use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::stop;
 use super::streams::say;
-use super::validate::{name, validate};
-use crate::agent::learned::SharedEmbedder;
+use super::validate::validate;
 use crate::control::Kind;
 use crate::nets::device::best_device;
 use crate::nets::resnet18;

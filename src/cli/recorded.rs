@@ -114,7 +114,9 @@ pub(super) fn recorded_elsewhere(
     let named = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
     let acts = named.unwrap_or(&author);
     // Without its policy an episode can still be seen, step by step, and chance acts on.
-    let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), acts.sampling, None).ok().flatten();
+    let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), (acts.sampling, acts.deciding), None)
+        .ok()
+        .flatten();
     let source = found.unwrap_or_else(PolicySource::random);
     let acting = source.clone();
     let step = reference.step.unwrap_or(0);

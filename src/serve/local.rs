@@ -124,7 +124,7 @@ impl Local {
         let mut flags = match playing.end() {
             Some(End::Success) => flag::SUCCESS,
             Some(End::Timeout) => flag::TIMEOUT,
-            None => 0,
+            Some(End::Environment) | None => 0,
         };
         flags |= if playing.last.is_none_or(|last| last.outcome.is_done()) { flag::POSSIBLE } else { 0 };
         flags |= if tells_legal { flag::LEGAL } else { 0 };

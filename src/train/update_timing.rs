@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use tch::{Device, Kind, Tensor};
 
 use super::batch_sampler::BatchSampler;
-use super::preset::Preset;
-use super::trainer::Trainer;
 use super::chaining_pool::ChainingPool;
 use super::embedding_table::EmbeddingTable;
+use super::preset::Preset;
+use super::trainer::Trainer;
 use super::training_data::{ConditioningTable, FeatureMaps, TrainingData};
 use super::training_state::TrainingState;
 use crate::agent::checkpoint::Networks;

@@ -420,7 +420,11 @@ mod tests {
     use super::*;
 
     fn told(tell: &SyncSender<Msg>) -> Told {
-        Told { tell: tell.clone(), is_heard: Arc::new(AtomicBool::new(true)) }
+        Told {
+            tell: tell.clone(),
+            is_heard: Arc::new(AtomicBool::new(true)),
+            control: ExplorerControl::new(tell.clone()),
+        }
     }
 
     #[test]

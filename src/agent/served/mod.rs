@@ -1,12 +1,14 @@
 //! Policies that act from another process: a policy server that speaks vla-eval's protocol or openpi's over a WebSocket.
 
 mod address;
+mod answer;
 mod array;
 mod connection;
 mod deadline_stream;
 mod dialogue;
 mod image;
 mod observation;
+mod own;
 mod policy;
 mod reply;
 mod server_gone;

@@ -3,7 +3,7 @@
 use rmpv::Value;
 
 use super::dialogue::{Protocol, map};
-use super::image;
+use super::{image, own};
 use crate::agent::policy::Observation;
 use crate::domain::{ActionType, Class};
 use crate::house::view::Candidate;
@@ -33,27 +33,29 @@ fn legal(candidates: &[Candidate], kind: ActionType) -> Value {
 
 /// The start of an episode.
 pub(super) fn episode(here: &Observation<'_>, seed: u64) -> Value {
+    let (actions, arguments) = match here.environment.own() {
+        Some(view) => own::actions(view.space),
+        None => house_actions(),
+    };
+    let task = [
+        ("name", here.instruction.into()),
+        ("environment", here.environment.name().into()),
+        ("seed", seed.into()),
+        ("step", here.step.into()),
+    ];
+    map([("task", map(task)), ("actions", actions), ("arguments", arguments)])
+}
+
+fn house_actions() -> (Value, Value) {
     let actions = ActionType::ALL.map(|kind| {
         let argument = if kind.is_interaction() { "class".into() } else { Value::Nil };
         map([("name", kind.name().into()), ("argument", argument)])
     });
     let classes = Class::all().filter(|class| class.in_vocabulary()).map(|class| class.name().into()).collect();
-    map([
-        (
-            "task",
-            map([
-                ("name", here.instruction.into()),
-                ("environment", here.environment.name().into()),
-                ("seed", seed.into()),
-                ("step", here.step.into()),
-            ]),
-        ),
-        ("actions", Value::Array(actions.into())),
-        ("arguments", map([("class", Value::Array(classes))])),
-    ])
+    (Value::Array(actions.into()), map([("class", Value::Array(classes))]))
 }
 
-/// The observation of a step. `state` is what the server gave to be given back.
+/// The observation of a step. `carried` is what the server gave to be given back.
 ///
 /// # Errors
 /// When the environment fails.
@@ -62,18 +64,30 @@ pub(super) fn observation(
     candidates: &[Candidate],
     protocol: Protocol,
     is_local: bool,
-    state: Option<&Value>,
+    carried: Option<&Value>,
 ) -> anyhow::Result<Value> {
-    let picture = image::pack(here.environment.frame()?, protocol, is_local)?;
-    let last = here.last.map_or(Value::Nil, |action| action.kind.name().into());
-    let names = Value::Array(ActionType::ALL.map(|kind| kind.name().into()).into());
-    let legal = Value::Array(ActionType::ALL.map(|kind| legal(candidates, kind)).into());
+    let shows = here.environment.own().is_none_or(|view| view.observation.picture.is_some());
+    let picture = if shows { image::pack(here.environment.frame()?, protocol, is_local)? } else { Value::Nil };
+    let (names, legal, last, text) = match here.environment.own() {
+        Some(view) => {
+            let names = view.space.actions().iter().map(|action| action.name.as_str().into()).collect();
+            let last = here.last.and_then(|action| Some(view.space.parts(action)?.0.into()));
+            let text = view.observation.text.as_deref().map(Value::from);
+            (Value::Array(names), own::legal(&view), last, text)
+        }
+        None => {
+            let names = Value::Array(ActionType::ALL.map(|kind| kind.name().into()).into());
+            let legal = Value::Array(ActionType::ALL.map(|kind| legal(candidates, kind)).into());
+            (names, legal, here.last.map(|action| action.kind.name().into()), None)
+        }
+    };
     let own = [
         ("step", here.step.into()),
         ("actions", names),
         ("legal", legal),
-        ("last_action", last),
-        ("state", state.cloned().unwrap_or(Value::Nil)),
+        ("last_action", last.unwrap_or(Value::Nil)),
+        ("text", text.unwrap_or(Value::Nil)),
+        ("state", carried.cloned().unwrap_or(Value::Nil)),
     ];
     let protocols_own: [(&str, Value); 2] = match protocol {
         Protocol::VlaEval => [("images", map([("camera", picture)])), ("task_description", here.instruction.into())],

@@ -8,7 +8,7 @@ use super::array::field;
 use super::dialogue::{Dialogue, Protocol};
 use super::server_gone::ServerGone;
 use super::state::ServedState;
-use super::{observation, reply};
+use super::{observation, own, reply};
 use crate::agent::decision::Decision;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState};
 use crate::agent::policy_source::PolicySource;
@@ -34,7 +34,8 @@ pub(crate) struct ServedPolicy {
 struct Question {
     step: u32,
     instruction: String,
-    rgb: Vec<u8>,
+    /// The frame, or what stands for it.
+    seen: Vec<u8>,
 }
 
 /// Connects to a server that was there before.
@@ -68,8 +69,11 @@ impl ServedPolicy {
     }
 
     fn decide(&mut self, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let rgb = here.environment.frame()?.rgb.clone();
-        let question = Question { step: here.step, instruction: here.instruction.into(), rgb };
+        let seen = match here.environment.own() {
+            Some(view) => view.observation.digest.clone().into_bytes(),
+            None => here.environment.frame()?.rgb.clone(),
+        };
+        let question = Question { step: here.step, instruction: here.instruction.into(), seen };
         if let Some((asked, said)) = &self.last
             && *asked == question
         {
@@ -101,8 +105,12 @@ impl ServedPolicy {
             observation::add(&mut told, "episode_start", observation::episode(here, self.state.seed));
         }
         let answer = dialogue.ask(told, here.step)?;
-        let decision = reply::decision(&answer, &candidates)
-            .map_err(|problem| anyhow!(dialogue.strange(&format!("at step {} {problem}", here.step))))?;
+        let decision = match here.environment.own() {
+            Some(view) => own::decision(&answer, &view),
+            None => reply::decision(&answer, &candidates),
+        };
+        let decision =
+            decision.map_err(|problem| anyhow!(dialogue.strange(&format!("at step {} {problem}", here.step))))?;
         self.versions += 1;
         (self.state.version, self.state.carried) = (self.versions, field(&answer, "state").cloned());
         Ok((dialogue, decision))
@@ -116,6 +124,10 @@ impl Policy for ServedPolicy {
 
     fn slots(&self) -> usize {
         1
+    }
+
+    fn takes_own_actions(&self) -> bool {
+        true
     }
 
     fn reset(&mut self, _slot: usize, seed: u64) {

@@ -16,6 +16,7 @@ pub(crate) use agent::DecisionTime;
 pub use baselines::{Baselines, copy_seconds};
 pub(crate) use simulator::SimulatorSpeed;
 
+use crate::agent::DecisionOverride;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::nets::device;
 use crate::nets::sentence::{SentenceEncoder, default_folder};
@@ -112,7 +113,7 @@ pub(crate) fn run(options: BenchOptions, tell: &dyn Fn(&str)) -> anyhow::Result<
     if asked(Part::Policy) {
         tell("an agent");
         let folder = checkpoint.map_or_else(policy_source::shipped, |named| Ok(policy_source::folder_of(&named)))?;
-        let source = PolicySource::checkpoint(folder, false)?;
+        let source = PolicySource::checkpoint(folder, false, DecisionOverride::default())?;
         report.policy = Some(agent::measure(&source, agent::EPISODES, &mut baselines)?);
     }
     if asked(Part::Encoder) {

@@ -6,6 +6,7 @@ use anyhow::Context;
 
 use super::breakpoint::OwnCondition;
 use super::tree::{MOST, OwnTree, State, Taken};
+use crate::agent::DecisionOverride;
 use crate::agent::policy_source::PolicySource;
 use crate::agent::{Decision, Policy, PolicyState};
 use crate::domain::{Action, EnvironmentName};
@@ -67,7 +68,8 @@ pub(crate) struct OwnStepTaken {
 
 /// The chance of a policy begins anew with each episode's seed.
 fn author_of(source: &PolicySource, seed: u64) -> Author {
-    Author { policy: source.name.clone(), checkpoint: source.checkpoint_hash.clone(), seed, sampling: false }
+    let checkpoint = source.checkpoint_hash.clone();
+    Author { policy: source.name.clone(), checkpoint, seed, sampling: false, deciding: DecisionOverride::default() }
 }
 
 impl OwnExploration {

@@ -7,6 +7,7 @@ use anyhow::ensure;
 use sha2::{Digest, Sha256};
 
 use super::exploration::OwnExploration;
+use crate::agent::DecisionOverride;
 use crate::data::{atomic_file, json};
 use crate::domain::{Task, TaskSet};
 use crate::episode::record::{Episode, TraceStep};
@@ -58,6 +59,7 @@ impl OwnExploration {
             end: EndedBy::Grader,
             step_by_step: false,
             sampling: false,
+            deciding: DecisionOverride::default(),
             instruction_variants: false,
             all_start_subtasks: false,
             shard: None,

@@ -120,7 +120,7 @@ impl<'a> Origin<'a> {
     pub(super) fn explorer(&self, epsilon: f64) -> anyhow::Result<EpsilonGreedy> {
         let sentences: SharedEmbedder = self.spec.embedder.clone();
         let (networks, device) = (self.networks()?, self.spec.device);
-        let agent = LearnedPolicy::with("agent".into(), self.config.clone(), networks, sentences, device)?;
+        let agent = LearnedPolicy::with("agent".into(), self.config.clone(), networks, Some(sentences), device)?;
         Ok(EpsilonGreedy::new(agent, epsilon))
     }
 }

@@ -202,6 +202,7 @@ impl Replay {
         Ok(Transitions {
             observation: maps.narrow(1, 0, history),
             next: Some(maps.narrow(1, 1, history)),
+            rows: None,
             conditioning: conditioning.expand(&shape[..], false),
             actions: indices(|step| step.action),
             objects: indices(|step| step.object),

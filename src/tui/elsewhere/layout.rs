@@ -52,5 +52,5 @@ pub(super) fn shaded(frame: &Frame, cells: Size) -> Picture {
             content.push((char::from(shade), Style::new()));
         }
     }
-    Picture { protocol: Protocol::Ascii, cells, content: Content::Cells(content) }
+    Picture { protocol: Protocol::Ascii, cells, content: Content::Cells(content), legend: Vec::new() }
 }
