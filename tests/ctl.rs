@@ -29,7 +29,7 @@ impl Steered {
     }
 
     fn eval(&self, run: &str) -> Child {
-        let line = format!("eval --tasks tasks.json --policy random --seeds 40 --jobs 1 --json --out {run}");
+        let line = format!("eval --tasks tasks.json --policy random --seeds 20 --jobs 1 --json --out {run}");
         self.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
@@ -134,7 +134,7 @@ fn only_the_user_himself_is_obeyed() {
         for path in socket.ancestors().take_while(|path| *path != std::env::temp_dir() && path.parent().is_some()) {
             std::fs::set_permissions(path, PermissionsExt::from_mode(0o777)).unwrap();
         }
-        let ask = r#"$s = IO::Socket::UNIX->new(Peer => $ARGV[0]) or die $!; print $s qq({"ask":"do","order":"stop"}\n);
+        let ask = r#"$SIG{PIPE} = "IGNORE"; $s = IO::Socket::UNIX->new(Peer => $ARGV[0]) or die $!; print $s qq({"ask":"do","order":"stop"}\n);
                      print <$s>"#;
         let said = String::from_utf8(as_other(ask).unwrap().stdout).unwrap();
         assert!(said.contains("it is another user's"), "{said}");
@@ -156,7 +156,8 @@ fn an_explorer_is_told_run_paused_and_ended_from_another_terminal() {
     session.see("step 0");
     let ctl = |words: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
-        let ended = command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path()).output().unwrap();
+        let ended =
+            command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path().join("runtime")).output().unwrap();
         assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
         String::from_utf8(ended.stdout).unwrap()
     };

@@ -200,6 +200,7 @@ fn a_served_environment_is_explored_on_a_screen() {
     session.press("\x1b");
     session.miss("compared");
     session.press("$");
+    session.see("step 2/2");
     session.press(":goto 1\r");
     session.see("step 1/2");
     session.press(":fly\r");

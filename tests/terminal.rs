@@ -57,7 +57,9 @@ impl Session {
         line.env("LANG", "en_US.UTF-8");
         line.env("XDG_STATE_HOME", state);
         line.env("XDG_CONFIG_HOME", state);
-        line.env("XDG_RUNTIME_DIR", state);
+        let runtime = state.join("runtime");
+        std::fs::create_dir_all(&runtime).unwrap();
+        line.env("XDG_RUNTIME_DIR", runtime);
         if let Some(home) = encoder_home() {
             line.env("SPRINT_HOME", home);
         }

@@ -32,7 +32,9 @@ fn explain(schema: &Value, error: &ValidationError<'_>, found: &mut Vec<Fault>) 
     let under = |name: &str| if field.is_empty() { name.to_owned() } else { format!("{field}.{name}") };
     let none = Map::new();
     let rules = rules_of(schema, error).unwrap_or(&none);
-    let known = rules.get("properties").and_then(Value::as_object).unwrap_or(&none);
+    let properties = |rules: &Map<String, Value>| rules.get("properties").and_then(Value::as_object).cloned();
+    let whole = || properties(around(schema, error)?);
+    let known = properties(rules).or_else(whole).unwrap_or_default();
     let problem = match error.kind() {
         ValidationErrorKind::AnyOf { context } | ValidationErrorKind::OneOfNotValid { context } => {
             return explain_alternatives(schema, error, context, found);
@@ -97,6 +99,13 @@ fn explain_alternatives(
 fn rules_of<'a>(schema: &'a Value, error: &ValidationError<'_>) -> Option<&'a Map<String, Value>> {
     let (rules, _keyword) = error.schema_path().as_str().rsplit_once('/')?;
     schema.pointer(rules)?.as_object()
+}
+
+/// The schema around a branch (`then`, `else`) that an error departs from: a branch describes no fields of its own.
+fn around<'a>(schema: &'a Value, error: &ValidationError<'_>) -> Option<&'a Map<String, Value>> {
+    let (rules, _keyword) = error.schema_path().as_str().rsplit_once('/')?;
+    let (whole, branch) = rules.rsplit_once('/')?;
+    matches!(branch, "then" | "else").then(|| schema.pointer(whole)?.as_object()).flatten()
 }
 
 /// A JSON pointer as people write it: `tasks[1].roles[0].class`.

@@ -40,7 +40,7 @@ impl SceneRef {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("if" = {"required": ["env"]}))]
 #[schemars(extend("then" = {"required": ["seed"]}))]
-#[schemars(extend("else" = {"required": ["scene", "instruction", "roles", "subtasks", "horizon"]}))]
+#[schemars(extend("else" = {"required": ["scene", "instruction", "horizon"]}))]
 pub struct Task {
     /// A name that is unique in its set.
     #[schemars(length(min = 1, max = 200))]
