@@ -142,8 +142,6 @@ impl Display {
         })
     }
 
-    /// The same on the screen; `opening` says what is opened, once it is known that there is a screen.
-
     /// The same on the screen; `opening` says what is opened, once it is known that there is a screen, and `list` what there is to
     /// come back to.
     fn show_screen(

@@ -230,7 +230,7 @@ mod tests {
         assert!(all.contains("tasks[1].horizon: -1, but 1 to 100000 was expected"), "{all}");
         assert!(all.contains("skill: \"Grab\", but one of Pickup, Put"), "{all}");
         assert!(all.contains("tasks[1].scene.generated.room: \"attic\""), "{all}");
-        assert!(all.contains("tasks[1].instruction: missing (What the agent is told)"), "{all}");
+        assert!(all.contains("tasks[1].instruction: missing (What the agent is told"), "{all}");
     }
 
     #[test]

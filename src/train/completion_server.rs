@@ -113,6 +113,9 @@ impl CompletionServer {
                             break;
                         }
                         let Some(answer) = ask(index).transpose() else { break };
+                        if answer.is_err() {
+                            ended.store(true, Ordering::Relaxed);
+                        }
                         // Nobody receives any more once the scope is left by a panic.
                         if send.send((index, answer)).is_err() {
                             break;

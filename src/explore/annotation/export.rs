@@ -52,9 +52,12 @@ pub(crate) struct Exported {
     pub(crate) stale: usize,
 }
 
+/// A span, with who wrote what of it.
+type AgreedText<'a> = (&'a SpanKey, (&'a str, &'a str));
+
 /// The spans that people agreed on, in the dataset's order, and how many it does not hold any more.
 fn agreed(dataset: &Dataset, answers: &Answers) -> anyhow::Result<(Vec<Agreed>, usize)> {
-    let mut wanted: HashMap<&str, Vec<(&SpanKey, (&str, &str))>> = HashMap::new();
+    let mut wanted: HashMap<&str, Vec<AgreedText<'_>>> = HashMap::new();
     let spans = by_span(answers);
     for (&key, told) in &spans {
         if let Some(best) = told.agreed() {

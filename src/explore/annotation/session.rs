@@ -108,7 +108,7 @@ impl AnnotationSession {
     }
 
     /// The first span without an answer, or the end.
-    pub(crate) fn to_first_open(&mut self) {
+    pub(crate) fn go_to_first_open(&mut self) {
         let open = self.spans.iter().position(|span| !self.answers.contains_key(&span.key));
         self.at = open.unwrap_or(self.spans.len());
     }
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(session.place(), (0, 3));
         (0..9).for_each(|_| session.forward());
         assert!(session.span().is_none() && session.skip().is_ok());
-        session.to_first_open();
+        session.go_to_first_open();
         assert_eq!(session.place().0, 0);
     }
 }

@@ -208,7 +208,7 @@ impl AnnotateState {
         };
         match asked {
             AnnotateKey::Keep if is_over => {
-                self.session.to_first_open();
+                self.session.go_to_first_open();
                 let is_open = self.session.span().is_some();
                 return if is_open { self.enter() } else { vec![AnnotateEffect::Leave] };
             }
@@ -234,11 +234,13 @@ impl AnnotateState {
                 self.message = None;
                 return if self.session.place().0 == at { Vec::new() } else { self.enter() };
             }
-            AnnotateKey::Shot(by) => return self.to_shot(|film, shot| shot.saturating_add_signed(by).min(film.last())),
-            AnnotateKey::Step(forward) => return self.to_shot(|film, shot| film.step_from(shot, forward)),
+            AnnotateKey::Shot(by) => {
+                return self.show_shot(|film, shot| shot.saturating_add_signed(by).min(film.last()));
+            }
+            AnnotateKey::Step(forward) => return self.show_shot(|film, shot| film.step_from(shot, forward)),
             AnnotateKey::Play => {
                 let at_end = self.reel.as_ref().is_ok_and(|reel| self.shot >= reel.film.last());
-                self.is_playing = self.reel.is_ok() && !(self.is_playing && !self.shows_strip);
+                self.is_playing = self.reel.is_ok() && (self.shows_strip || !self.is_playing);
                 if self.is_playing && at_end {
                     self.shot = 0;
                 }
@@ -286,7 +288,7 @@ impl AnnotateState {
         }
     }
 
-    fn to_shot(&mut self, shot: impl FnOnce(&Film, usize) -> usize) -> Vec<AnnotateEffect> {
+    fn show_shot(&mut self, shot: impl FnOnce(&Film, usize) -> usize) -> Vec<AnnotateEffect> {
         let Ok(reel) = &self.reel else { return Vec::new() };
         self.shot = shot(&reel.film, self.shot);
         self.is_playing = false;
