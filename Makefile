@@ -1,6 +1,6 @@
 # `make explore` and `make test` do everything on a fresh machine; `make help` lists the rest.
 .DEFAULT_GOAL := help
-.PHONY: explore test test-python setup build fmt lint lint-tools typos cargo-machete cargo-deny bench help
+.PHONY: explore test test-python python-packages setup build fmt lint lint-tools typos cargo-machete cargo-deny bench help
 
 TOOLS := $(CURDIR)/target/tools
 export PATH := $(TOOLS)/bin:$(PATH)
@@ -22,6 +22,8 @@ test: setup ## set up, and run all tests
 PYTHON_TESTS := target/python
 test-python: $(PYTHON_TESTS)/installed ## install environments in Python, and test sprint_env with them
 	cd assets/python && SPRINT=$(wildcard $(CURDIR)/target/release/sprint) $(CURDIR)/$(PYTHON_TESTS)/bin/python -B -m unittest -q
+
+python-packages: $(PYTHON_TESTS)/installed
 
 $(PYTHON_TESTS)/installed: assets/python/tests/requirements.txt
 	python3 -m venv $(PYTHON_TESTS)

@@ -233,9 +233,9 @@ fn a_bad_task_file_is_one_clear_error() {
 }
 
 #[test]
-fn the_readmes_task_by_hand_is_sound_and_the_expert_solves_it() {
-    let readme = include_str!("../README.md");
-    let (_, after) = readme.split_once("A task by hand:\n\n```json\n").expect("the README has a task by hand");
+fn the_pages_task_by_hand_is_sound_and_the_expert_solves_it() {
+    let page = include_str!("../assets/docs/evaluation.md");
+    let (_, after) = page.split_once("by number:\n\n  ```json\n").expect("the page has a task by hand");
     let (task, _) = after.split_once("```").unwrap();
     let sprint = Sprint::new();
     std::fs::write(sprint.path("mine.json"), task).unwrap();
