@@ -95,7 +95,7 @@ fn in_words(report: &BenchReport) -> String {
     if let Some(train) = &report.train {
         let (steps, samples) = (train.steps_per_s, train.samples_per_s);
         let with = format!("updates with {}", train.preset);
-        lines.push(format!("{with:<34} {steps:>12.2} /s, {samples:.0} samples/s, {} threads", train.threads));
+        lines.push(format!("{with:<34} {steps:>12.2} /s, {samples:.0} samples/s, threads: {}", train.threads));
     }
     lines.push(String::new());
     lines.push(format!("in copies of a mebibyte ({:.3} ms here), and times as long as stored:", report.copy_ms));
