@@ -1,14 +1,12 @@
 //! `labels.jsonl`: what composite spans are called, a line a label with where it comes from, appended as they are made.
 
 use std::collections::{BTreeSet, HashMap};
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::bail;
 use serde::{Deserialize, Serialize};
 
-use super::text_file;
+use super::line_log::{self, LineLog};
 use crate::language::maker::Maker;
 use crate::language::passage::Passage;
 
@@ -41,51 +39,18 @@ pub struct SpanSummary {
     pub malformed: Option<String>,
 }
 
-/// The file's first line.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SummariesHeader {
-    format_version: u32,
-}
-
 /// The format version this program reads and writes.
 const FORMAT: u32 = 1;
 
 /// The file's name in a dataset's folder.
 const NAME: &str = "labels.jsonl";
 
-/// The lines of a dataset's file and the length in bytes of its whole lines. A torn last line is left out.
-fn read(folder: &Path) -> anyhow::Result<(Vec<SpanSummary>, usize)> {
-    let path = folder.join(NAME);
-    let bytes = match std::fs::read(&path) {
-        Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok((Vec::new(), 0)),
-        Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
-    };
-    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
-    let mut lines = bytes[..whole].split_inclusive(|&byte| byte == b'\n');
-    if let Some(first) = lines.next() {
-        let header: SummariesHeader = serde_json::from_slice(text_file::content(first)?)
-            .with_context(|| format!("{}, line 1", path.display()))?;
-        ensure!(
-            header.format_version == FORMAT,
-            "{}: format_version: {}, but this program reads {FORMAT}",
-            path.display(),
-            header.format_version
-        );
-    }
-    let parse = |(number, line): (usize, &[u8])| {
-        serde_json::from_slice(line).with_context(|| format!("{}, line {}", path.display(), number + 2))
-    };
-    Ok((lines.enumerate().map(parse).collect::<anyhow::Result<_>>()?, whole))
-}
-
 /// All labels in a dataset's folder, as they were added.
 ///
 /// # Errors
 /// When the file is malformed; the line is named.
 pub(crate) fn lines(folder: &Path) -> anyhow::Result<Vec<SpanSummary>> {
-    Ok(read(folder)?.0)
+    Ok(line_log::read(&folder.join(NAME), FORMAT)?.0)
 }
 
 /// The labels of datasets, to be looked up.
@@ -105,7 +70,7 @@ impl Summaries {
         let mut by_input = HashMap::new();
         for folder in folders {
             let path = folder.join(NAME);
-            let lines = read(folder)?.0;
+            let lines = lines(folder)?;
             let sources: BTreeSet<String> = lines.iter().map(|line| line.source.clone()).collect();
             let listed = || sources.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
             let wanted: Vec<&str> = match (source, sources.first()) {
@@ -153,10 +118,7 @@ impl Summaries {
 }
 
 /// A dataset's label file, opened to be added to. One process at a time.
-pub struct Ledger {
-    path: PathBuf,
-    file: File,
-}
+pub struct Ledger(LineLog);
 
 impl Ledger {
     /// Opens or begins the file, mends a torn last line, and returns what it holds.
@@ -164,20 +126,8 @@ impl Ledger {
     /// # Errors
     /// When it is malformed, in use, or cannot be written to.
     pub fn open(folder: &Path) -> anyhow::Result<(Ledger, Vec<SpanSummary>)> {
-        let path = folder.join(NAME);
-        let context = || format!("{} cannot be written", path.display());
-        let mut file = OpenOptions::new().create(true).append(true).open(&path).with_context(context)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
-            Err(TryLockError::Error(error)) => return Err(error).with_context(context),
-            Ok(()) => {}
-        }
-        let (lines, whole) = read(folder)?;
-        file.set_len(whole as u64).with_context(context)?;
-        if whole == 0 {
-            file.write_all(&line(&SummariesHeader { format_version: FORMAT })?).with_context(context)?;
-        }
-        Ok((Ledger { path, file }, lines))
+        let (log, lines) = LineLog::open(&folder.join(NAME), FORMAT)?;
+        Ok((Ledger(log), lines))
     }
 
     /// Adds labels in one write.
@@ -185,18 +135,8 @@ impl Ledger {
     /// # Errors
     /// When the disk is full.
     pub fn append(&mut self, labels: &[SpanSummary]) -> anyhow::Result<()> {
-        let mut bytes = Vec::new();
-        for label in labels {
-            bytes.extend(line(label)?);
-        }
-        self.file.write_all(&bytes).with_context(|| format!("{} cannot be written", self.path.display()))
+        self.0.append(labels)
     }
-}
-
-fn line(value: &impl Serialize) -> anyhow::Result<Vec<u8>> {
-    let mut bytes = serde_json::to_vec(value)?;
-    bytes.push(b'\n');
-    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -229,7 +169,7 @@ mod tests {
         let (mut ledger, lines) = Ledger::open(folder.path()).unwrap();
         assert_eq!(lines, [summary("a", "One.", "rules")]);
         ledger.append(&[summary("b", "Two.", "rules")]).unwrap();
-        assert_eq!(read(folder.path()).unwrap().0.len(), 2);
+        assert_eq!(super::lines(folder.path()).unwrap().len(), 2);
         let summaries = Summaries::read(&[folder.path()], None).unwrap();
         assert_eq!((summaries.len(), summaries.by_input["b"].as_str()), (2, "Two."));
     }

@@ -8,6 +8,7 @@ pub(crate) mod choices;
 pub(crate) mod elsewhere;
 pub mod episode_source;
 pub mod exploration;
+mod explored_run;
 pub(crate) mod example_wishes;
 pub(crate) mod inspect;
 pub(crate) mod kept_session;

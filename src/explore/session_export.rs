@@ -7,20 +7,16 @@ use std::sync::Arc;
 use anyhow::{Context, ensure};
 use sha2::{Digest, Sha256};
 
-use crate::agent::{DecisionOverride, ExpertPolicy};
-use crate::data::{atomic_file, json, taskset};
+use super::explored_run::{self, SCENES};
+use crate::agent::ExpertPolicy;
+use crate::data::{json, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
 use crate::episode::record::Episode;
-use crate::episode::rollout::{End, EndedBy, Rollout};
+use crate::episode::rollout::{End, Rollout};
 use crate::episode::scenes::Scenes;
 use crate::house::House;
 use crate::house::grading::{Grader, Grading};
-use crate::report::summary::RunSummary;
-use crate::report::summary_files;
-use crate::run_dir::layout::{MANIFEST, TASKS};
-use crate::run_dir::manifest::RunManifest;
-use crate::run_dir::writer::RunWriter;
 
 /// The tasks and episodes of an exploration, a branch each.
 #[derive(Clone, Debug)]
@@ -32,8 +28,6 @@ pub(crate) struct SessionExport {
     pub(crate) episodes: Vec<Episode>,
 }
 
-/// The folder with its scenes, where they come from a dataset.
-const SCENES: &str = "scenes";
 /// The most steps that the expert is given for a task.
 const MOST: u32 = 1000;
 
@@ -42,7 +36,6 @@ const MOST: u32 = 1000;
 /// # Errors
 /// When the folder holds something else, or cannot be written to.
 pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()> {
-    ensure!(!path.join(MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let named = explored.tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let set = TaskSet {
         format_version: TaskSet::FORMAT,
@@ -50,38 +43,8 @@ pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()>
         scenes: named.then(|| SCENES.to_string()),
         tasks: explored.tasks.clone(),
     };
-    let mut bytes = serde_json::to_vec_pretty(&set)?;
-    bytes.push(b'\n');
-    let mut scenes_digest = Sha256::new();
-    scenes_digest.update(serde_json::to_vec(&*explored.scene)?);
-    let manifest = RunManifest {
-        format_version: RunManifest::FORMAT,
-        sprint_version: env!("CARGO_PKG_VERSION").into(),
-        task_set: set.name.clone(),
-        task_set_hash: json::hex(&Sha256::digest(&bytes)),
-        scenes_hash: json::hex(&scenes_digest.finalize()),
-        policy: RunManifest::EXPLORED.into(),
-        checkpoint_hash: None,
-        tasks: set.tasks.len(),
-        seeds: 1,
-        grader: Grading::Class,
-        end: EndedBy::Grader,
-        step_by_step: false,
-        sampling: false,
-        deciding: DecisionOverride::default(),
-        instruction_variants: false,
-        all_start_subtasks: false,
-        shard: None,
-    };
-    let mut folder = RunWriter::open(path, &manifest)?;
-    atomic_file::write(&path.join(TASKS), &bytes)?;
-    if named {
-        json::write(&path.join(SCENES).join(format!("{}.json", explored.scene.name)), &*explored.scene)?;
-    }
-    for episode in &explored.episodes {
-        folder.append(episode)?;
-    }
-    summary_files::write(&RunSummary::of(&manifest, &set.tasks, &explored.episodes, false), folder.path())
+    let scenes_hash = json::hex(&Sha256::digest(serde_json::to_vec(&*explored.scene)?));
+    explored_run::write(path, &set, scenes_hash, named.then_some(&*explored.scene), &explored.episodes)
 }
 
 /// A task without subtasks: nobody grades what a person made up.

@@ -3,22 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::ensure;
 use sha2::{Digest, Sha256};
 
 use super::exploration::OwnExploration;
-use crate::agent::DecisionOverride;
-use crate::data::{atomic_file, json};
+use crate::data::json;
 use crate::domain::{Task, TaskSet};
 use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::EndedBy;
-use crate::house::grading::Grading;
-use crate::report::summary::RunSummary;
-use crate::report::summary_files;
+use crate::explore::explored_run;
 use crate::run_dir::default_path;
-use crate::run_dir::layout::{MANIFEST, TASKS};
-use crate::run_dir::manifest::RunManifest;
-use crate::run_dir::writer::RunWriter;
 
 impl OwnExploration {
     /// Writes every branch as an episode of a run, into `path` or a new folder.
@@ -37,39 +30,12 @@ impl OwnExploration {
     }
 
     fn write(&self, path: &Path) -> anyhow::Result<()> {
-        ensure!(!path.join(MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
         let branches = 0..self.tree.branches().len();
         let episodes: Vec<Episode> = branches.map(|branch| self.episode(branch)).collect();
         let task = |branch: &super::tree::Branch| Task::elsewhere(branch.name.clone(), self.name.clone(), self.seed);
         let tasks = self.tree.branches().iter().map(task).collect();
         let set = TaskSet { format_version: TaskSet::FORMAT, name: "explored".into(), scenes: None, tasks };
-        let mut bytes = serde_json::to_vec_pretty(&set)?;
-        bytes.push(b'\n');
-        let manifest = RunManifest {
-            format_version: RunManifest::FORMAT,
-            sprint_version: env!("CARGO_PKG_VERSION").into(),
-            task_set: set.name.clone(),
-            task_set_hash: json::hex(&Sha256::digest(&bytes)),
-            scenes_hash: json::hex(&Sha256::digest(self.name.to_string())),
-            policy: RunManifest::EXPLORED.into(),
-            checkpoint_hash: None,
-            tasks: set.tasks.len(),
-            seeds: 1,
-            grader: Grading::Class,
-            end: EndedBy::Grader,
-            step_by_step: false,
-            sampling: false,
-            deciding: DecisionOverride::default(),
-            instruction_variants: false,
-            all_start_subtasks: false,
-            shard: None,
-        };
-        let mut folder = RunWriter::open(path, &manifest)?;
-        atomic_file::write(&path.join(TASKS), &bytes)?;
-        for episode in &episodes {
-            folder.append(episode)?;
-        }
-        summary_files::write(&RunSummary::of(&manifest, &set.tasks, &episodes, false), folder.path())
+        explored_run::write(path, &set, json::hex(&Sha256::digest(self.name.to_string())), None, &episodes)
     }
 
     /// A branch as the record of an episode.
