@@ -10,6 +10,9 @@ use serde_json::Value;
 use crate::program::{Sprint, wait_for};
 use crate::terminal::Session;
 
+/// Seeds enough for an evaluation that lasts until it is stopped, however busy the machine is.
+const ENDLESS: u32 = 4_000;
+
 /// The program in a folder of its own, with a folder of its own for sockets.
 struct Steered {
     sprint: Sprint,
@@ -28,8 +31,9 @@ impl Steered {
         command
     }
 
-    fn eval(&self, run: &str) -> Child {
-        let line = format!("eval --tasks tasks.json --policy random --seeds 20 --jobs 1 --json --out {run}");
+    /// An evaluation of five tasks, `seeds` times each.
+    fn eval(&self, run: &str, seeds: u32) -> Child {
+        let line = format!("eval --tasks tasks.json --policy random --seeds {seeds} --jobs 1 --json --out {run}");
         self.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
@@ -63,8 +67,8 @@ impl Steered {
 fn an_evaluation_that_was_paused_comes_to_the_same_bytes() {
     let steered = Steered::new();
     steered.sprint.sample("tasks.json", 1, 5);
-    assert!(steered.eval("whole").wait().unwrap().success());
-    let mut paused = steered.eval("paused");
+    assert!(steered.eval("whole", 60).wait().unwrap().success());
+    let mut paused = steered.eval("paused", 60);
     wait_for(|| !steered.list().is_empty());
     assert!(steered.text("pause").contains("paused"));
     let status = || serde_json::from_str::<Value>(&steered.text("status --json --of paused")).unwrap();
@@ -91,7 +95,7 @@ fn an_evaluation_that_was_paused_comes_to_the_same_bytes() {
 fn two_of_a_kind_are_told_apart_one_is_stopped_and_what_a_killed_one_left_is_cleared_away() {
     let steered = Steered::new();
     steered.sprint.sample("tasks.json", 1, 5);
-    let (mut one, mut other) = (steered.eval("one"), steered.eval("other"));
+    let (mut one, mut other) = (steered.eval("one", ENDLESS), steered.eval("other", ENDLESS));
     wait_for(|| steered.list().len() == 2);
     for which in ["one", "other"] {
         steered.text(&format!("pause --of {which}"));
@@ -119,7 +123,7 @@ fn two_of_a_kind_are_told_apart_one_is_stopped_and_what_a_killed_one_left_is_cle
 fn only_the_user_himself_is_obeyed() {
     let steered = Steered::new();
     steered.sprint.sample("tasks.json", 1, 5);
-    let mut child = steered.eval("run");
+    let mut child = steered.eval("run", ENDLESS);
     wait_for(|| !steered.list().is_empty());
     let socket = steered.sockets().pop().unwrap();
     let folder = socket.parent().unwrap();
