@@ -124,7 +124,7 @@ fn a_child_that_cannot_serve_is_refused_before_anything_is_written() {
     let sprint = Sprint::new();
     let ended = with_child(&sprint, "eval --env gym:none --policy expert --out run");
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-    assert!(ended.stderr.contains("expert acts in House only, and has no use for the actions of gym:none"));
+    assert!(ended.stderr.contains("expert: it acts in House only, and has no use for the actions of gym:none"));
 }
 
 #[test]

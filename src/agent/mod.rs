@@ -8,6 +8,7 @@ pub(crate) mod decision;
 pub(crate) mod decision_rule;
 pub(crate) mod experts;
 pub(crate) mod epsilon_greedy;
+pub(crate) mod exported;
 pub(crate) mod frame_history;
 pub(crate) mod learned;
 pub(crate) mod logit_adjustment;

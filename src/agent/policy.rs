@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::decision::Decision;
 use super::decision_rule::DecisionOverride;
+use super::exported::FrameStack;
 use super::frame_history::FrameHistory;
 use super::memory_agent::Recollection;
 use super::served::ServedState;
@@ -23,6 +24,13 @@ pub struct Observation<'a> {
     pub(crate) step: u32,
     /// The action that was taken last, whoever chose it; `None` at the start, and where the episode was entered anew.
     pub(crate) last: Option<Action>,
+}
+
+impl Observation<'_> {
+    /// Where an episode begins, with nothing told yet.
+    pub(crate) fn start(environment: &mut dyn Environment) -> Observation<'_> {
+        Observation { environment, instruction: "", step: 0, last: None }
+    }
 }
 
 /// A decision for each slot, `None` where there was no observation. A slot's own failure is in its place.
@@ -62,6 +70,8 @@ pub enum PolicyState {
     Frames(Box<FrameHistory>),
     /// All that it remembers.
     Recollection(Box<Recollection>),
+    /// The last frames of an exported policy, and its random numbers.
+    Exported(Box<FrameStack>),
     /// What a policy server carries, as far as it says.
     Served(Box<ServedState>),
 }
@@ -95,9 +105,14 @@ pub trait Policy: Send {
     /// Whether it draws its actions by chance instead of taking the likeliest, where it can do either.
     fn set_sampling(&mut self, _samples: bool) {}
 
-    /// Whether it can act where an environment's actions are its own in place of ALFRED's 12.
-    fn takes_own_actions(&self) -> bool {
-        false
+    /// Checks that it has a use for an environment's actions and frames, where an episode begins.
+    ///
+    /// # Errors
+    /// Says what it has no use for.
+    fn check_fits(&self, start: &mut Observation<'_>) -> anyhow::Result<()> {
+        let (environment, name) = (&start.environment, start.environment.name());
+        anyhow::ensure!(environment.own().is_none(), "it acts in House only, and has no use for the actions of {name}");
+        Ok(())
     }
 
     /// Decides from now on as asked, and where nothing is asked as its checkpoint says, where it is one of a checkpoint.

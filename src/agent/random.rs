@@ -55,8 +55,8 @@ impl Policy for RandomPolicy {
         each_alone(observations, |_, here| self.decide(here))
     }
 
-    fn takes_own_actions(&self) -> bool {
-        true
+    fn check_fits(&self, _start: &mut Observation<'_>) -> anyhow::Result<()> {
+        Ok(())
     }
 
     fn state(&self, _slot: usize) -> PolicyState {

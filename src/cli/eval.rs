@@ -18,8 +18,7 @@ use super::{jobs, progress, stop, streams};
 use crate::control::{Kind, Progress as Place, RunControl};
 use crate::data::json::Document;
 use crate::data::{json, taskset};
-use crate::domain::{Task, TaskSet};
-use crate::env::remote::Sessions;
+use crate::domain::TaskSet;
 use crate::episode::rollout::EndedBy;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
@@ -113,11 +112,13 @@ impl Eval {
             Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
                 .with_context(|| format!("{}", file.display()))?
                 .reaching(self.environment.reach());
-        // An environment that cannot be reached is no reason to begin a run.
-        if let Some((name, _)) = evaluation.tasks().iter().find_map(Task::played_elsewhere) {
-            Sessions::new(self.environment.reach()).get(0, name)?;
-        } else if let Some(name) = self.environment.elsewhere() {
+        let is_elsewhere = evaluation.tasks().iter().any(|task| task.env.is_some());
+        if let Some(name) = self.environment.elsewhere().filter(|_| !is_elsewhere) {
             anyhow::bail!("{}: its tasks play in House, not in {name}: leave out --env", file.display());
+        }
+        // An environment that cannot be reached, or is of no use, is no reason to begin a run. House's own policies fit House.
+        if is_elsewhere || self.policy.is_from_elsewhere() {
+            evaluation.check_policy(&chosen)?;
         }
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunWriter::open(&path, evaluation.manifest())?;

@@ -251,13 +251,6 @@ impl Explore {
             Some(PolicyName::Expert) => PolicyKind::Expert,
             Some(PolicyName::Random) => PolicyKind::Random,
         };
-        if let Some(open) = self.from.elsewhere(kind)? {
-            if matches!(self.policy, Some(PolicyName::Agent)) {
-                bail!("the trained agents act in House only: name --policy random or manual with --env");
-            }
-            let agent = self.from.policy_elsewhere(kind)?;
-            return self.display.show_elsewhere(manual || self.policy.is_none(), open, agent);
-        }
         let is_named = self.policy.is_some() || self.from.is_named();
         let Explore { display, mut from, policy, elsewhere, .. } = self;
         if let Some(PolicyName::Elsewhere(named)) = &policy {
@@ -267,6 +260,9 @@ impl Explore {
             from.other_policy = Some((named.clone(), elsewhere));
         }
         if let Some(open) = from.elsewhere(kind)? {
+            if matches!(policy, Some(PolicyName::Agent)) {
+                bail!("the trained agents act in House only: name --policy random or manual with --env");
+            }
             let agent = from.policy_elsewhere(kind)?;
             return display.show_elsewhere(manual || policy.is_none(), open, agent);
         }
@@ -318,7 +314,7 @@ impl Origin {
             return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false, self.deciding.asked());
         }
         if let Some((named, options)) = &self.other_policy {
-            return named.open(*options);
+            return named.open(*options, false);
         }
         match kind {
             PolicyKind::Expert => Ok(PolicySource::expert()),

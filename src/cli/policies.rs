@@ -59,6 +59,11 @@ impl Deciding {
 }
 
 impl PolicyChoice {
+    /// Whether the policy is none of the program's own.
+    pub(crate) fn is_from_elsewhere(&self) -> bool {
+        matches!(self.policy, PolicyName::Elsewhere(_))
+    }
+
     /// Opens what was chosen.
     ///
     /// # Errors
@@ -67,8 +72,10 @@ impl PolicyChoice {
         if self.policy != PolicyName::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
         }
-        if sampling && self.policy != PolicyName::Agent {
-            anyhow::bail!("--sample draws the actions of a trained agent; leave it out with another --policy");
+        if sampling && !self.policy.can_sample() {
+            anyhow::bail!(
+                "--sample draws the actions of a trained agent or of an exported policy; leave it out with another"
+            );
         }
         if !asked.is_none() && self.policy != PolicyName::Agent {
             anyhow::bail!("--decision and --loop-guard are for trained agents; leave them out with another --policy");
@@ -76,7 +83,7 @@ impl PolicyChoice {
         match &self.policy {
             PolicyName::Expert => Ok(PolicySource::expert()),
             PolicyName::Random => Ok(PolicySource::random()),
-            PolicyName::Elsewhere(elsewhere) => elsewhere.open(self.elsewhere),
+            PolicyName::Elsewhere(elsewhere) => elsewhere.open(self.elsewhere, sampling),
             PolicyName::Agent | PolicyName::Manual => {
                 let folder = match &self.checkpoint {
                     Some(named) => policy_source::folder_of(named),

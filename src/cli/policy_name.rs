@@ -1,12 +1,14 @@
 //! Who acts, as `--policy` names it.
 
 use std::ffi::OsStr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, Args, Command, Error};
 
+use crate::agent::exported::{ExportedPolicy, Format};
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::NamedAgent;
 use crate::agent::served::{PolicyAddress, ServedPolicy};
@@ -31,6 +33,15 @@ pub(crate) enum PolicyName {
 pub(crate) enum Elsewhere {
     /// A policy server.
     Server(PolicyAddress),
+    /// A policy that was exported to a file.
+    File(Format, PathBuf),
+}
+
+impl PolicyName {
+    /// Whether its actions can be drawn by chance instead of taking the likeliest.
+    pub(crate) fn can_sample(&self) -> bool {
+        matches!(self, PolicyName::Agent | PolicyName::Elsewhere(Elsewhere::File(..)))
+    }
 }
 
 /// How a policy from elsewhere is dealt with.
@@ -39,6 +50,9 @@ pub(crate) struct ElsewhereOptions {
     /// How long a policy server may take for an answer
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400), default_value_t = 60)]
     policy_timeout: u64,
+    /// Run the code that a TorchScript policy holds
+    #[arg(long)]
+    trust: bool,
 }
 
 impl Elsewhere {
@@ -46,8 +60,14 @@ impl Elsewhere {
     ///
     /// # Errors
     /// When it cannot be used; says what to do.
-    pub(crate) fn open(&self, options: ElsewhereOptions) -> anyhow::Result<PolicySource> {
+    pub(crate) fn open(&self, options: ElsewhereOptions, sampling: bool) -> anyhow::Result<PolicySource> {
         match self {
+            Elsewhere::File(Format::TorchScript, path) if !options.trust => anyhow::bail!(
+                "{}: a TorchScript file is a program that runs with your rights: add --trust where you trust its maker, or \
+                 export the policy as ONNX",
+                path.display()
+            ),
+            Elsewhere::File(format, path) => ExportedPolicy::source(path, *format, sampling),
             Elsewhere::Server(address) => ServedPolicy::source(address, Duration::from_secs(options.policy_timeout)),
         }
     }
@@ -55,7 +75,7 @@ impl Elsewhere {
     /// The same for an explorer, which opens it when it is to act.
     pub(crate) fn agent(&self, options: ElsewhereOptions) -> NamedAgent {
         let (name, own) = (self.to_string(), self.clone());
-        policy_source::agent_of(name, move || own.open(options))
+        policy_source::agent_of(name, move || own.open(options, false))
     }
 }
 
@@ -63,6 +83,7 @@ impl std::fmt::Display for Elsewhere {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Elsewhere::Server(address) => address.fmt(f),
+            Elsewhere::File(format, path) => write!(f, "{}:{}", format.name(), path.display()),
         }
     }
 }
@@ -99,8 +120,20 @@ impl PolicyNameParser {
         if text.starts_with("ws:") || text.starts_with("wss:") {
             return text.parse().map(|address| PolicyName::Elsewhere(Elsewhere::Server(address)));
         }
+        for format in [Format::Onnx, Format::TorchScript] {
+            let file = text.strip_prefix(format.name()).and_then(|rest| rest.strip_prefix(':'));
+            if let Some(file) = file {
+                return match file {
+                    "" => Err(format!("{text}FILE: the file is missing")),
+                    file => Ok(PolicyName::Elsewhere(Elsewhere::File(format, file.into()))),
+                };
+            }
+        }
         let known: Vec<&str> = self.names().map(|(name, _, _)| *name).collect();
-        Err(format!("{text:?} is no policy: it is {}, or ws:HOST:PORT for a policy server", known.join(", ")))
+        Err(format!(
+            "{text:?} is no policy: it is {}, ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy",
+            known.join(", ")
+        ))
     }
 }
 
@@ -116,9 +149,12 @@ impl TypedValueParser for PolicyNameParser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let own = self.names().map(|(name, help, _)| PossibleValue::new(*name).help(*help));
-        let elsewhere =
-            PossibleValue::new("ws:HOST:PORT").help("A policy server that speaks vla-eval's or openpi's protocol");
-        Some(Box::new(own.chain(std::iter::once(elsewhere))))
+        let elsewhere = [
+            ("ws:HOST:PORT", "A policy server that speaks vla-eval's or openpi's protocol"),
+            ("onnx:FILE", "A policy exported to ONNX, with FILE.json beside it (sprint schema policy)"),
+            ("torchscript:FILE", "The same as TorchScript, which runs code: only with --trust"),
+        ];
+        Some(Box::new(own.chain(elsewhere.map(|(name, help)| PossibleValue::new(name).help(help)))))
     }
 }
 
@@ -131,13 +167,17 @@ mod tests {
         let read = |text: &str| PolicyNameParser::HEADLESS.read(text);
         assert_eq!(read("expert"), Ok(PolicyName::Expert));
         assert!(matches!(read("ws:127.0.0.1:8000"), Ok(PolicyName::Elsewhere(Elsewhere::Server(_)))));
+        let file = |format| Ok(PolicyName::Elsewhere(Elsewhere::File(format, "a/b.onnx".into())));
+        assert_eq!(read("onnx:a/b.onnx"), file(Format::Onnx));
+        assert_eq!(read("torchscript:a/b.onnx"), file(Format::TorchScript));
+        assert!(read("onnx:").unwrap_err().contains("the file is missing"));
         assert_eq!(PolicyNameParser::EXPLORER.read("manual"), Ok(PolicyName::Manual));
     }
 
     #[test]
     fn what_is_no_policy_is_refused_with_what_there_is() {
         let refusal = PolicyNameParser::HEADLESS.read("manual").unwrap_err();
-        assert!(refusal.contains("agent, expert, random, or ws:HOST:PORT"), "{refusal}");
+        assert!(refusal.contains("agent, expert, random, ws:HOST:PORT"), "{refusal}");
         assert!(PolicyNameParser::HEADLESS.read("wss:host:1").unwrap_err().contains("ssh -L"));
     }
 }

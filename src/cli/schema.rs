@@ -11,7 +11,7 @@ use crate::eval::schemas;
 /// Prints a JSON Schema.
 #[derive(Args)]
 pub(crate) struct Schema {
-    /// Whose: tasks, manifest, episode, summary, comparison or progress
+    /// Whose: tasks, manifest, episode, summary, comparison, progress, or policy (the description beside an exported one)
     #[arg(value_name = "NAME", value_parser = schemas::NAMES)]
     name: String,
 }

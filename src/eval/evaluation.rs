@@ -4,15 +4,18 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use anyhow::Context;
+
 use super::earlier::check_earlier;
 use super::options::Options;
 use super::plan::EvaluationPlan;
-use super::worker_pool;
-use crate::agent::policy_source::MakePolicy;
+use super::{worker, worker_pool};
+use crate::agent::Observation;
+use crate::agent::policy_source::{MakePolicy, PolicySource};
 use crate::control::RunningClock;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
-use crate::env::remote::Elsewhere;
+use crate::env::remote::{Elsewhere, Sessions};
 use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::{Scenes, Setting};
@@ -106,6 +109,25 @@ impl Evaluation {
     pub(crate) fn reaching(mut self, elsewhere: Elsewhere) -> Evaluation {
         self.plan.elsewhere = elsewhere;
         self
+    }
+
+    /// Checks that a policy has a use for each environment that is played in, where the first task there begins.
+    ///
+    /// # Errors
+    /// When an environment cannot be reached, or the policy has no use for it.
+    pub(crate) fn check_policy(&self, policy: &PolicySource) -> anyhow::Result<()> {
+        let made = (policy.make)()?;
+        let mut sessions = Sessions::new(self.plan.elsewhere.clone());
+        let mut seen = Vec::new();
+        for task in self.plan.tasks.iter() {
+            if seen.contains(&task.env.as_ref()) {
+                continue;
+            }
+            seen.push(task.env.as_ref());
+            let mut environment = worker::environment_of(&self.plan, &mut sessions, 0, task)?;
+            made.check_fits(&mut Observation::start(&mut *environment)).with_context(|| policy.name.clone())?;
+        }
+        Ok(())
     }
 
     /// What identifies this run.

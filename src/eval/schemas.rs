@@ -4,6 +4,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use super::progress_event::ProgressEvent;
+use crate::agent::exported::spec::PolicySpec;
 use crate::domain::TaskSet;
 use crate::episode::record::Episode;
 use crate::report::compare::Comparison;
@@ -11,7 +12,7 @@ use crate::report::summary::RunSummary;
 use crate::run_dir::manifest::RunManifest;
 
 /// The files and lines that have a schema, as `sprint schema` names them.
-pub(crate) const NAMES: [&str; 6] = ["tasks", "manifest", "episode", "summary", "comparison", "progress"];
+pub(crate) const NAMES: [&str; 7] = ["tasks", "manifest", "episode", "summary", "comparison", "progress", "policy"];
 
 /// The schema of that name.
 pub fn schema(name: &str) -> Option<Schema> {
@@ -22,6 +23,7 @@ pub fn schema(name: &str) -> Option<Schema> {
         "summary" => written::<RunSummary>(),
         "comparison" => written::<Comparison>(),
         "progress" => written::<ProgressEvent>(),
+        "policy" => schemars::schema_for!(PolicySpec),
         _ => return None,
     })
 }

@@ -8,7 +8,9 @@ use anyhow::Context;
 
 use super::executor::{Executor, Message};
 use super::in_flight::{InFlight, Watchdog, guarded};
+use super::plan::EvaluationPlan;
 use crate::agent::{Decision, ExpertPolicy, Policy};
+use crate::domain::Task;
 use crate::env::remote::{RemoteEnvironment, Sessions};
 use crate::env::{Environment, HouseEnvironment};
 use crate::episode::record::{Episode, TraceStep};
@@ -239,6 +241,24 @@ impl Worker {
     }
 }
 
+/// The environment of a task, where it begins.
+///
+/// # Errors
+/// When another process does not serve it.
+pub(super) fn environment_of(
+    evaluation: &EvaluationPlan,
+    sessions: &mut Sessions,
+    slot: usize,
+    task: &Task,
+) -> anyhow::Result<Box<dyn Environment>> {
+    if let Some((name, seed)) = task.played_elsewhere() {
+        return Ok(Box::new(RemoteEnvironment::begin(sessions.get(slot, name)?, seed)?));
+    }
+    let setting = evaluation.scenes.setting(task)?;
+    let house = House::new(setting.scene, setting.world);
+    Ok(Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading)))
+}
+
 /// Sets an episode to its start.
 fn start(
     executor: &Executor,
@@ -249,22 +269,14 @@ fn start(
 ) -> anyhow::Result<AnyRollout> {
     let evaluation = &executor.evaluation;
     let task = &evaluation.tasks[spec.task];
-    if let Some((name, seed)) = task.played_elsewhere() {
-        let env = RemoteEnvironment::begin(sessions.get(slot, name)?, seed)?;
-        episode.start_hash = env.fingerprint().unwrap_or_default();
+    let env = environment_of(evaluation, sessions, slot, task)?;
+    episode.start_hash = env.fingerprint().unwrap_or_default();
+    if task.env.is_some() {
         episode.of = env.grading().map_or(0, |(_, of)| of as u32);
         if let (true, Some(view)) = (task.instruction.is_empty(), env.own()) {
             episode.instruction = view.mission();
         }
-        let mut rollout =
-            Rollout::new(Box::new(env) as Box<dyn Environment>, episode.instruction.clone(), Some(task.horizon));
-        rollout.ended_by = evaluation.options.end;
-        return Ok(rollout);
     }
-    let setting = evaluation.scenes.setting(task)?;
-    let house = House::new(setting.scene, setting.world);
-    let env: Box<dyn Environment> = Box::new(HouseEnvironment::of_task(task, house, evaluation.options.grading));
-    episode.start_hash = env.fingerprint().unwrap_or_default();
     let mut rollout = Rollout::new(env, episode.instruction.clone(), Some(task.horizon));
     rollout.ended_by = evaluation.options.end;
     if spec.start_subtask > 0 {

@@ -50,10 +50,6 @@ pub(crate) fn play(
         return Ok(());
     };
     let first = make_policy()?;
-    let elsewhere = wanted.iter().find_map(|spec| evaluation.tasks[spec.task].env.as_ref());
-    if let Some(env) = elsewhere.filter(|_| !first.takes_own_actions()) {
-        anyhow::bail!("{} acts in House only, and has no use for the actions of {env}", first.name());
-    }
     let slots = first.slots().max(1);
     // No more workers than can be filled.
     let count = jobs.min(wanted.len().div_ceil(slots)).max(if slots == 1 { jobs } else { 1 });

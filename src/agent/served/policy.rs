@@ -126,8 +126,8 @@ impl Policy for ServedPolicy {
         1
     }
 
-    fn takes_own_actions(&self) -> bool {
-        true
+    fn check_fits(&self, _start: &mut Observation<'_>) -> anyhow::Result<()> {
+        Ok(())
     }
 
     fn reset(&mut self, _slot: usize, seed: u64) {

@@ -8,7 +8,7 @@ use super::breakpoint::OwnCondition;
 use super::tree::{MOST, OwnTree, State, Taken};
 use crate::agent::DecisionOverride;
 use crate::agent::policy_source::PolicySource;
-use crate::agent::{Decision, Policy, PolicyState};
+use crate::agent::{Decision, Observation, Policy, PolicyState};
 use crate::domain::{Action, EnvironmentName};
 use crate::env::Environment;
 use crate::env::own_view::{OwnView, Possible};
@@ -85,8 +85,8 @@ impl OwnExploration {
         told: Option<&str>,
     ) -> anyhow::Result<OwnExploration> {
         let mut sessions = Sessions::new(elsewhere);
-        let env = RemoteEnvironment::begin(sessions.get(0, name)?, seed)?;
-        let acting = Acting::new(source, seed, name)?;
+        let mut env = RemoteEnvironment::begin(sessions.get(0, name)?, seed)?;
+        let acting = Acting::new(source, seed, &mut env)?;
         let rollout = Rollout::new(env, String::new(), None);
         let tree = OwnTree::new(start_state(&rollout, &acting)?);
         let mut exploration = OwnExploration {
@@ -215,7 +215,7 @@ impl OwnExploration {
     /// # Errors
     /// When it cannot be made, or has no use for the environment's actions.
     pub(crate) fn choose(&mut self, source: PolicySource) -> anyhow::Result<()> {
-        self.acting = Acting::new(source, self.seed, &self.name)?;
+        self.acting = Acting::new(source, self.seed, &mut self.rollout.env)?;
         self.redirected = true;
         Ok(())
     }
@@ -347,13 +347,9 @@ impl OwnExploration {
 }
 
 impl Acting {
-    fn new(source: PolicySource, seed: u64, name: &EnvironmentName) -> anyhow::Result<Acting> {
+    fn new(source: PolicySource, seed: u64, environment: &mut RemoteEnvironment) -> anyhow::Result<Acting> {
         let mut policy = (source.make)()?;
-        anyhow::ensure!(
-            policy.takes_own_actions(),
-            "{} acts in House only, and has no use for the actions of {name}",
-            source.name
-        );
+        policy.check_fits(&mut Observation::start(environment)).with_context(|| source.name.clone())?;
         policy.reset(0, seed);
         let author = author_of(&source, seed);
         Ok(Acting { policy, author, decided: None })

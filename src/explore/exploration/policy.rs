@@ -1,8 +1,10 @@
 //! Who decides: which policy, which checkpoint, which chance.
 
+use anyhow::Context;
+
 use super::Exploration;
 use crate::agent::registry::{Loaded, PolicyIdentity, PolicyKind};
-use crate::agent::{DecisionOverride, Policy};
+use crate::agent::{DecisionOverride, Observation, Policy};
 use crate::episode::record::Author;
 
 impl Exploration {
@@ -12,6 +14,7 @@ impl Exploration {
     /// When it cannot be loaded; the one before stays.
     pub fn choose(&mut self, kind: PolicyKind) -> anyhow::Result<()> {
         let Loaded { policy, checkpoint } = self.policies.make(kind)?;
+        policy.check_fits(&mut Observation::start(&mut self.rollout.env)).with_context(|| policy.name().to_owned())?;
         let before = self.acting.policy.as_ref().map(|_| self.acting.author.clone());
         self.acting.author.policy = policy.name().to_string();
         self.acting.author.checkpoint = checkpoint;
