@@ -58,6 +58,13 @@ pub(crate) fn add(path: &Path, instruction: Option<&str>) -> io::Result<()> {
     file.write_all(format!("{head}{line}").as_bytes())
 }
 
+/// Keeps an instruction; where that cannot be, the log says why and the session goes on.
+pub(crate) fn keep(path: &Path, instruction: Option<&str>) {
+    if let Err(error) = add(path, instruction) {
+        tracing::info!("{}: {error}", path.display());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

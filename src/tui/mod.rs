@@ -1,6 +1,6 @@
 //! The explorer: a house, an agent in it, and a person at a terminal who tells it what to do.
 //!
-//! A [`update::Msg`] changes the [`app::App`] by [`update::update`], which is pure and returns effects; `screen` performs them. One
+//! A [`update::Msg`] changes the [`app::App`] by [`update::update`], which is pure and returns effects; [`screen_loop`] performs them. One
 //! worker thread owns house and policy; a second one encodes pictures. [`view`] draws the state and nothing else.
 
 pub(crate) mod annotate;
@@ -21,7 +21,9 @@ pub(crate) mod log;
 pub(crate) mod opening;
 mod paced_display;
 mod pacing;
-pub mod screen;
+pub(crate) mod screen;
+pub mod screen_loop;
+mod session_worker;
 mod signals;
 mod start_page;
 mod steering;

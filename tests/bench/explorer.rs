@@ -27,7 +27,7 @@ use sprint_explorer::tui::graphics::encoder::PictureEncoder;
 use sprint_explorer::tui::graphics::letters::{self, Letters};
 use sprint_explorer::tui::graphics::overlay::Overlay;
 use sprint_explorer::tui::graphics::{Job, Picture, Protocol};
-use sprint_explorer::tui::screen::ScreenLoop;
+use sprint_explorer::tui::screen_loop::ScreenLoop;
 use sprint_explorer::tui::terminal::{Counted, WRITTEN};
 use sprint_explorer::tui::theme::Ability;
 use sprint_explorer::tui::update::Msg;
