@@ -19,14 +19,18 @@ const TELLING: u64 = 1000;
 const SHARE: f64 = 0.25;
 
 impl LinkSpeed {
+    /// The way there and back takes so long.
+    pub(crate) fn is_so_far(&mut self, took: Duration) {
+        self.quickest = Some(self.quickest.map_or(took, |quickest| quickest.min(took)));
+    }
+
     /// A frame of so many bytes was taken in.
     pub(crate) fn observe(&mut self, bytes: u64, took: Duration) {
-        let quickest = self.quickest.map_or(took, |quickest| quickest.min(took));
-        self.quickest = Some(quickest);
+        self.is_so_far(took);
         if bytes < TELLING {
             return;
         }
-        let over = took.saturating_sub(quickest);
+        let over = took.saturating_sub(self.quickest.unwrap_or(took));
         self.bytes_per_second = match (over > QUICK, self.bytes_per_second) {
             (false, _) => None,
             (true, before) => {
@@ -45,6 +49,14 @@ impl LinkSpeed {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_frame_tells_the_speed_where_the_way_was_measured_before_it() {
+        let mut link = LinkSpeed::default();
+        link.is_so_far(Duration::from_millis(200));
+        link.observe(3000, Duration::from_millis(800));
+        assert_eq!(link.affords(), Some(1250));
+    }
 
     #[test]
     fn a_slow_link_is_known_by_large_frames_and_a_long_way_alone_is_none() {

@@ -24,6 +24,8 @@ pub(crate) struct PacedDisplay<W: Write> {
     link: LinkSpeed,
     /// The frame that is on its way, and its bytes.
     on_its_way: Option<(Instant, u64)>,
+    /// When the terminal was asked for the first time, ahead of the first frame: its answer takes the way there and back alone.
+    first_asked: Option<Instant>,
     /// The bytes of the newest frame.
     cost: u64,
     /// The program was stopped, and has not been let go on yet: the terminal is another's.
@@ -38,6 +40,7 @@ impl<W: Write> PacedDisplay<W> {
             pacer: Pacer::new(first_answer()),
             link: LinkSpeed::default(),
             on_its_way: None,
+            first_asked: None,
             cost: 0,
             is_stopped: false,
         }
@@ -67,6 +70,11 @@ impl<W: Write> PacedDisplay<W> {
         Write::flush(self.display.backend_mut())
     }
 
+    /// How long the next frame has to wait, unless an answer comes first.
+    pub(crate) fn waits(&mut self) -> Option<Duration> {
+        if self.is_stopped { None } else { self.pacer.waits(Instant::now()) }
+    }
+
     /// The same where the terminal has taken in what was drawn before; asks it to say when it has taken in this. Returns how long that
     /// has to wait otherwise.
     ///
@@ -79,6 +87,12 @@ impl<W: Write> PacedDisplay<W> {
         }
         if let Some(left) = self.pacer.waits(now) {
             return Ok(Some(left));
+        }
+        if self.pacer.is_unused() {
+            self.first_asked = Some(now);
+            self.display.backend_mut().write_all(pacing::QUESTION)?;
+            // On its own, so that it is on its way before the frame is.
+            Write::flush(self.display.backend_mut())?;
         }
         let before = terminal::WRITTEN.load(Ordering::Relaxed);
         self.show(screen)?;
@@ -94,10 +108,19 @@ impl<W: Write> PacedDisplay<W> {
 
     /// The terminal has taken in all that was sent.
     pub(crate) fn answered(&mut self) {
+        if let Some(asked) = self.first_asked.take() {
+            self.link.is_so_far(asked.elapsed());
+            return;
+        }
         self.pacer.answered();
         if let Some((sent, bytes)) = self.on_its_way.take() {
             self.link.observe(bytes, sent.elapsed());
         }
+    }
+
+    /// Nothing is known of the link yet, as the first answer is still out: what is large had better wait.
+    pub(crate) fn is_new(&self) -> bool {
+        self.pacer.awaits_first()
     }
 
     /// The bytes of the newest frame.
@@ -141,7 +164,7 @@ impl<W: Write> PacedDisplay<W> {
     pub(crate) fn go_on(&mut self) -> io::Result<()> {
         terminal::take_again()?;
         self.is_stopped = false;
-        self.pacer = Pacer::new(first_answer());
+        (self.pacer, self.first_asked) = (Pacer::new(first_answer()), None);
         self.repaint()
     }
 }

@@ -51,6 +51,16 @@ impl Pacer {
         None
     }
 
+    /// The terminal was never asked.
+    pub(crate) fn is_unused(&self) -> bool {
+        self.habit == Habit::Unknown && self.asked.is_none()
+    }
+
+    /// It was asked for the first time, and has not answered yet.
+    pub(crate) fn awaits_first(&self) -> bool {
+        self.habit == Habit::Unknown && self.asked.is_some()
+    }
+
     /// A frame is sent; whether the question belongs behind it.
     pub(crate) fn sends(&mut self, now: Instant) -> bool {
         let asks = self.habit != Habit::Silent;

@@ -131,7 +131,9 @@ impl<W: Write> ScreenLoop<W> {
             match msg {
                 Msg::Ready => self.display.answered(),
                 Msg::Key(_) | Msg::Session(SessionEvent::Running(_)) => self.is_urgent = true,
-                Msg::Picture(picture) if self.is_urgent && self.display.affords().is_some() => {
+                Msg::Picture(picture)
+                    if self.display.is_new() || (self.is_urgent && self.display.affords().is_some()) =>
+                {
                     self.waiting = Some(picture);
                     continue;
                 }
@@ -164,6 +166,7 @@ impl<W: Write> ScreenLoop<W> {
                 terminal::holds_pictures(inline::kitty_forget(job.in_tmux));
             }
             self.encoder.submit(job);
+            self.app.traffic.is_full = false;
         }
         self.meter();
         Ok(None)

@@ -81,6 +81,8 @@ fn frames(baselines: &mut CriterionBaselines) -> anyhow::Result<Vec<String>> {
                 frame: now.frame.clone(),
                 overlay: Overlay::Colour,
                 coarseness: 0,
+                budget: None,
+                in_blocks: false,
                 in_tmux: false,
                 recent: Vec::new(),
                 letters: Arc::new(Letters::of(&now.scene, &now.world)),

@@ -317,7 +317,8 @@ impl AnnotateState {
         }
         let shots = if self.shows_strip { reel.film.strip() } else { vec![self.shot] };
         let Graphics { protocol, cell_pixels, in_tmux, .. } = self.screen.graphics;
-        let coarseness = self.traffic.coarseness;
+        let (coarseness, budget) = (self.traffic.coarseness, self.traffic.budget());
+        let in_blocks = self.traffic.are_sequences_too_large();
         Some(move || {
             let Reel { film, camera } = reel;
             let mut camera = camera.lock().unwrap_or_else(PoisonError::into_inner);
@@ -329,6 +330,8 @@ impl AnnotateState {
                 frame: Arc::new(in_a_row(&frames.iter().collect::<Vec<_>>())),
                 overlay: Overlay::Colour,
                 coarseness,
+                budget,
+                in_blocks,
                 in_tmux,
                 recent: Vec::new(),
                 letters: Arc::new(last.map_or_else(Letters::default, |world| Letters::of(&film.scene, world))),

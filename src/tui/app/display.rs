@@ -55,6 +55,10 @@ pub struct Traffic {
     pub(crate) link: Option<u64>,
     /// Pictures of runs are left out: the coarsest cost more than the link can take in time.
     pub(crate) spares_runs: bool,
+    /// The next picture is asked for in full, whatever it costs.
+    pub(crate) is_full: bool,
+    /// The budget that even the coarsest picture as a sequence did not keep to, and was shown in block characters instead.
+    too_large: Option<u64>,
     /// How coarse pictures are to keep to that.
     pub(crate) coarseness: u8,
     /// What the newest step cost.
@@ -117,6 +121,39 @@ impl Traffic {
         }
     }
 
+    /// The most that a picture may cost where it is one escape sequence.
+    pub(crate) fn budget(&self) -> Option<u64> {
+        if self.is_full { Some(u64::MAX) } else { self.limit.into_iter().chain(self.link).min() }
+    }
+
+    /// Whether pictures are shown in block characters, as their sequences were too large. They are not tried again until the
+    /// link is much faster: pictures would go to and fro between the two.
+    pub(crate) fn are_sequences_too_large(&self) -> bool {
+        matches!((self.too_large, self.budget()), (Some(before), Some(now)) if now / FAR_TOO_MUCH < before)
+    }
+
+    /// Whether a picture was encoded before it was known how little the link takes.
+    pub(crate) fn refuses(&self, picture: &Picture) -> bool {
+        !picture.is_bounded && self.budget().is_some_and(|most| picture.sequence_bytes() > most)
+    }
+
+    /// Takes in a picture that is about to be shown; whether it is the first one in block characters.
+    pub(crate) fn take_in(&mut self, picture: &Picture) -> bool {
+        if !picture.protocol.floats() {
+            return false;
+        }
+        let is_in_blocks = picture.sequence_bytes() == 0;
+        let before = self.too_large;
+        match (is_in_blocks, before) {
+            (true, None) => self.too_large = self.budget(),
+            (true, Some(_)) => {}
+            // One that was asked for in full says nothing.
+            (false, _) if self.are_sequences_too_large() => {}
+            (false, _) => self.too_large = None,
+        }
+        is_in_blocks && before.is_none()
+    }
+
     /// Whether a run may show another picture.
     pub(crate) fn affords_picture(&self) -> bool {
         !self.spares_runs && (self.limit.is_none() || self.debt == 0)
@@ -126,6 +163,7 @@ impl Traffic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tui::graphics::Content;
 
     #[test]
     fn pictures_that_cost_too_much_are_coarser_and_then_rarer_until_steps_keep_to_their_limit() {
@@ -155,6 +193,33 @@ mod tests {
         assert_eq!((traffic.coarseness, traffic.affords_picture()), (COARSEST - 1, true));
         traffic.keep_to_link(9000, None);
         assert_eq!((traffic.coarseness, traffic.affords_picture()), (0, true), "the link got better");
+    }
+
+    #[test]
+    fn a_picture_from_before_the_link_was_known_is_encoded_anew_and_blocks_stay_until_it_is_much_faster() {
+        let picture = |content: Content, is_bounded| Picture {
+            protocol: Protocol::Sixel,
+            cells: Size::new(1, 1),
+            content,
+            is_bounded,
+            legend: Vec::new(),
+        };
+        let sixels = |bytes, is_bounded| picture(Content::Drawn("x".repeat(bytes)), is_bounded);
+        let mut traffic = Traffic::default();
+        assert!(!traffic.refuses(&sixels(9000, false)), "the link is fast");
+        traffic.keep_to_link(9000, Some(1250));
+        assert!(traffic.refuses(&sixels(9000, false)) && !traffic.refuses(&sixels(9000, true)));
+        let blocks = picture(Content::Cells(Vec::new()), true);
+        assert!(traffic.take_in(&blocks), "it is said once");
+        assert!(!traffic.take_in(&blocks) && traffic.are_sequences_too_large());
+        traffic.is_full = true;
+        assert!(!traffic.are_sequences_too_large() && traffic.budget() == Some(u64::MAX));
+        traffic.is_full = false;
+        assert!(!traffic.take_in(&sixels(9000, true)) && traffic.are_sequences_too_large(), "the next is in blocks");
+        traffic.keep_to_link(2000, Some(2000));
+        assert!(traffic.are_sequences_too_large());
+        traffic.keep_to_link(2000, Some(3000));
+        assert!(!traffic.are_sequences_too_large());
     }
 
     #[test]

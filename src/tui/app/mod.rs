@@ -210,6 +210,8 @@ impl App {
             frame,
             overlay,
             coarseness: self.traffic.coarseness,
+            budget: self.traffic.budget(),
+            in_blocks: self.traffic.are_sequences_too_large(),
             in_tmux: self.terminal.graphics.in_tmux,
             recent: now.recent.clone(),
             letters: self.frame.letters.clone(),

@@ -52,5 +52,11 @@ pub(super) fn shaded(frame: &Frame, cells: Size) -> Picture {
             content.push((char::from(shade), Style::new()));
         }
     }
-    Picture { protocol: Protocol::Ascii, cells, content: Content::Cells(content), legend: Vec::new() }
+    Picture {
+        protocol: Protocol::Ascii,
+        cells,
+        content: Content::Cells(content),
+        is_bounded: false,
+        legend: Vec::new(),
+    }
 }

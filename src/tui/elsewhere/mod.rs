@@ -9,30 +9,23 @@ mod worker;
 
 pub(crate) use worker::OwnEvent;
 
-use std::io::{self, BufWriter, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::io::Write;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use anyhow::Context;
-use crossterm::queue;
-use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
-use ratatui::Terminal;
-use ratatui::backend::{Backend, ClearType, CrosstermBackend};
 
-use super::capabilities::{ability, graphics};
 use super::graphics::{Protocol, inline};
-use super::keyboard::Keyboard;
+use super::paced_display::PacedDisplay;
 use super::screen::ScreenOptions;
-use super::signals;
-use super::terminal::{self, Counted};
+use super::taken_terminal::{QUEUE, TakenTerminal, TerminalOptions};
+use super::terminal;
 use super::update::{ExitReason, Msg};
 use crate::agent::policy_source::PolicySource;
 use crate::explore::elsewhere::OpenOwn;
 use keys::KeyAnswer;
 use state::OwnApp;
 
-/// Messages that may wait for the screen; beyond that their senders wait.
-const QUEUE: usize = 64;
 /// How often the screen tells how long it waits already.
 const TICK: Duration = Duration::from_millis(250);
 
@@ -41,20 +34,12 @@ const TICK: Duration = Duration::from_millis(250);
 /// # Errors
 /// When there is no terminal, or the environment cannot be opened.
 pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> anyhow::Result<ExitReason> {
-    crossterm::style::force_color_output(true);
-    let ability = ability();
-    terminal::catch_panics();
-    let (tell, messages) = sync_channel(QUEUE);
-    signals::watch(tell.clone())?;
-    let guard =
-        terminal::Guard::take(screen.log.as_ref()).context("the explorer needs a terminal; --plain does not")?;
-    let mut keyboard = Keyboard::default();
-    let graphics = graphics(screen.protocol, ability, screen.memory.as_deref(), &mut keyboard);
-    let mut display =
-        Terminal::new(CrosstermBackend::new(BufWriter::with_capacity(1 << 16, Counted::new(io::stdout()))))?;
-    keyboard.listen(tell.clone())?;
+    let options =
+        TerminalOptions { protocol: screen.protocol, memory: screen.memory.as_deref(), log: screen.log.as_ref() };
+    let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
     let commands = worker::start(open, agent, move |event| tell.send(Msg::Elsewhere(Box::new(event))).is_ok())?;
     let mut app = OwnApp::new(display.size()?, graphics, ability, screen.config.scheme, commands);
+    app.traffic.limit = screen.bandwidth;
     if screen.runs && !screen.manual {
         app.run_when_open();
     }
@@ -68,62 +53,61 @@ pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> 
 
 fn run_loop<W: Write>(
     app: &mut OwnApp,
-    display: &mut Terminal<CrosstermBackend<W>>,
+    display: &mut PacedDisplay<W>,
     messages: &Receiver<Msg>,
 ) -> anyhow::Result<ExitReason> {
+    // Something changed that is not drawn yet.
+    let mut is_stale = true;
     loop {
         let size = display.size()?;
         if size != app.size {
             app.resize(size);
+            is_stale = true;
         }
-        if !app.is_stopped {
-            queue!(display.backend_mut(), BeginSynchronizedUpdate)?;
-            display.draw(|frame| frame.render_widget(&*app, frame.area()))?;
-            queue!(display.backend_mut(), EndSynchronizedUpdate)?;
-            Write::flush(display.backend_mut())?;
+        let mut wait = None;
+        if is_stale {
+            wait = display.waits();
+            is_stale = wait.is_some();
+            if !is_stale {
+                // Only what is shown is encoded.
+                let is_picture_new = app.encode();
+                display.show_when_ready(&*app)?;
+                if is_picture_new {
+                    app.traffic.keep_to_link(display.cost(), display.affords());
+                }
+            }
         }
-        let first = match app.is_waiting() {
-            false => Some(messages.recv().context("all threads are gone")?),
-            true => match messages.recv_timeout(TICK) {
+        let tick = app.is_waiting().then_some(TICK);
+        let first = match wait.into_iter().chain(tick).min() {
+            None => Some(messages.recv().context("all threads are gone")?),
+            Some(wait) => match messages.recv_timeout(wait) {
                 Ok(msg) => Some(msg),
-                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Timeout) => {
+                    is_stale |= app.is_waiting();
+                    None
+                }
                 Err(RecvTimeoutError::Disconnected) => anyhow::bail!("all threads are gone"),
             },
         };
         let all: Vec<Msg> = first.into_iter().chain(messages.try_iter().take(4 * QUEUE)).collect();
         for msg in all {
+            is_stale |= !matches!(msg, Msg::Ready);
             match msg {
                 Msg::Key(key) => match app.on_key(key) {
                     KeyAnswer::Quit => return Ok(ExitReason::Asked),
-                    KeyAnswer::Stop => stop(app, display)?,
-                    KeyAnswer::Repaint => repaint(display)?,
+                    KeyAnswer::Stop => display.stop()?,
+                    KeyAnswer::Repaint => display.repaint()?,
                     KeyAnswer::Nothing => {}
                 },
                 Msg::Paste(text) => app.paste(&text),
-                Msg::Resize(_) => repaint(display)?,
+                Msg::Resize(_) => display.repaint()?,
                 Msg::Elsewhere(event) => app.on_event(*event)?,
                 Msg::Signal(number) => return Ok(ExitReason::Signal(number)),
-                Msg::StopAsked => stop(app, display)?,
-                Msg::Continued => {
-                    terminal::take_again()?;
-                    app.is_stopped = false;
-                    repaint(display)?;
-                }
-                Msg::Mouse(_) | Msg::Session(_) | Msg::Picture(_) | Msg::Ready | Msg::WorkerGone => {}
+                Msg::StopAsked => display.stop()?,
+                Msg::Continued => display.go_on()?,
+                Msg::Ready => display.answered(),
+                Msg::Mouse(_) | Msg::Session(_) | Msg::Picture(_) | Msg::WorkerGone => {}
             }
         }
     }
-}
-
-/// Gives the terminal back and stops; whoever lets the program go on says so by a signal.
-fn stop<W: Write>(app: &mut OwnApp, display: &mut Terminal<CrosstermBackend<W>>) -> io::Result<()> {
-    Write::flush(display.backend_mut())?;
-    app.is_stopped = true;
-    terminal::stop()
-}
-
-fn repaint<W: Write>(display: &mut Terminal<CrosstermBackend<W>>) -> io::Result<()> {
-    display.backend_mut().clear_region(ClearType::All)?;
-    display.swap_buffers();
-    Ok(())
 }

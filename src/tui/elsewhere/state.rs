@@ -11,7 +11,7 @@ use super::worker::{OwnEvent, Told};
 use crate::explore::elsewhere::command::OwnCommand;
 use crate::explore::elsewhere::view::{OwnChoice, OwnPicture};
 use crate::house::view::Frame;
-use crate::tui::app::Graphics;
+use crate::tui::app::{Graphics, Traffic};
 use crate::tui::graphics::letters::Letters;
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::graphics::{Job, Picture, Protocol};
@@ -53,6 +53,10 @@ pub(crate) struct OwnApp {
     pub(super) shown: Option<Box<OwnPicture>>,
     /// The picture, encoded for the terminal; nothing where there is none.
     pub(super) picture: Option<Picture>,
+    /// What is to be seen has changed since it was encoded.
+    is_picture_stale: bool,
+    /// What pictures cost.
+    pub(super) traffic: Traffic,
     pub(super) is_running: bool,
     pub(super) said: Option<(bool, String)>,
     pub(super) compared: Option<Vec<(String, Vec<OwnChoice>)>>,
@@ -62,7 +66,6 @@ pub(crate) struct OwnApp {
     pub(super) marked: usize,
     /// Since when the environment is waited for, and for how many commands.
     pub(super) waiting: Option<(Instant, usize)>,
-    pub(super) is_stopped: bool,
     runs: bool,
 }
 
@@ -82,6 +85,8 @@ impl OwnApp {
             commands,
             shown: None,
             picture: None,
+            is_picture_stale: false,
+            traffic: Traffic::default(),
             is_running: false,
             said: None,
             compared: None,
@@ -89,7 +94,6 @@ impl OwnApp {
             typed: String::new(),
             marked: 0,
             waiting: Some((Instant::now(), 1)),
-            is_stopped: false,
             runs: false,
         }
     }
@@ -131,7 +135,7 @@ impl OwnApp {
                 self.is_running = is_running;
                 self.marked = self.marked.min(shown.choices.len().saturating_sub(1));
                 self.shown = Some(shown);
-                self.encode();
+                self.is_picture_stale = true;
                 if std::mem::take(&mut self.runs) {
                     self.ask(OwnCommand::Run);
                 }
@@ -141,30 +145,37 @@ impl OwnApp {
     }
 
     pub(super) fn resize(&mut self, size: Size) {
-        self.size = size;
-        self.encode();
+        (self.size, self.picture, self.is_picture_stale) = (size, None, true);
     }
 
-    /// Encodes the picture for the place that it has.
-    fn encode(&mut self) {
-        self.picture = None;
-        let Some(seen) = self.shown.as_ref().and_then(|shown| shown.observation.picture.as_ref()) else { return };
+    /// Encodes the picture for the place that it has, where that is to be done; whether there is a new one.
+    pub(super) fn encode(&mut self) -> bool {
+        if std::mem::take(&mut self.is_picture_stale) {
+            self.picture = self.encoded();
+            return self.picture.is_some();
+        }
+        false
+    }
+
+    fn encoded(&mut self) -> Option<Picture> {
+        let seen = self.shown.as_ref()?.observation.picture.as_ref()?;
         let area = layout::picture_area(Rect::new(0, 0, self.size.width, self.size.height));
         let cells = fitting(area, (seen.width, seen.height), self.graphics.cell_pixels);
         if cells.width == 0 || cells.height == 0 {
-            return;
+            return None;
         }
         let (width, height, rgb) = (seen.width, seen.height, seen.rgb.clone());
         let frame = Arc::new(Frame { width, height, rgb, depth: Vec::new(), ids: Vec::new() });
         // Letters stand for House's classes; elsewhere they are shades.
         if self.graphics.protocol == Protocol::Ascii {
-            self.picture = Some(layout::shaded(&frame, cells));
-            return;
+            return Some(layout::shaded(&frame, cells));
         }
-        self.picture = Some(Picture::encode(&Job {
+        let picture = Picture::encode(&Job {
             frame,
             overlay: Overlay::Colour,
-            coarseness: 0,
+            coarseness: self.traffic.coarseness,
+            budget: self.traffic.budget(),
+            in_blocks: self.traffic.are_sequences_too_large(),
             in_tmux: self.graphics.in_tmux,
             recent: Vec::new(),
             letters: Arc::new(Letters::default()),
@@ -173,7 +184,9 @@ impl OwnApp {
             protocol: self.graphics.protocol,
             cells,
             cell_pixels: self.graphics.cell_pixels,
-        }));
+        });
+        self.traffic.take_in(&picture);
+        Some(picture)
     }
 }
 

@@ -4,7 +4,6 @@
 use ratatui::style::{Color, Style};
 
 use super::job::Job;
-use super::labels::over_cells;
 
 /// The eight ways to cut a cell's quarters in two, as bits (1 upper left, 2 upper right, 4 lower left, 8 lower right) that
 /// are foreground, and the character with foreground and background exchanged. Whole halves come first: on a tie they win.
@@ -36,7 +35,6 @@ pub(crate) fn draw(job: &Job) -> Vec<(char, Style)> {
             cells.push(nearest([at(0, 0), at(1, 0), at(0, 1), at(1, 1)], before));
         }
     }
-    over_cells(&job.labels, &job.frame, job.cells, &mut cells);
     cells
 }
 

@@ -3,7 +3,6 @@
 use ratatui::style::{Color, Style};
 
 use super::job::Job;
-use super::labels::over_cells;
 use super::letters::tint;
 use crate::house::view::decode;
 
@@ -37,7 +36,6 @@ pub(crate) fn draw(job: &Job) -> Vec<(char, Style)> {
             cells.push(cell(job, id, frame.depth.get(middle).copied().unwrap_or(f32::INFINITY) * below * HALF_VIEW));
         }
     }
-    over_cells(&job.labels, &job.frame, job.cells, &mut cells);
     cells
 }
 

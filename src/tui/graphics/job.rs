@@ -19,6 +19,10 @@ pub struct Job {
     pub overlay: Overlay,
     /// How coarse it may be, from 0.
     pub coarseness: u8,
+    /// The most bytes that it may take where it is one escape sequence: then it is as fine as that allows.
+    pub budget: Option<u64>,
+    /// It is shown in block characters whatever the protocol: its sequences are too large for the link.
+    pub in_blocks: bool,
     /// Sequences have to pass through tmux.
     pub in_tmux: bool,
     /// The frames before it, newest first, where the overlay shows them.

@@ -105,11 +105,18 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
             effects
         }
         Msg::Session(event) => on_event(app, event),
+        Msg::Picture(picture) if app.traffic.refuses(&picture) => vec![Effect::Encode],
         Msg::Picture(picture) => {
             let fits = app.picture_area().is_some_and(|area| area.as_size() == picture.cells);
             let spared =
                 app.session.run_mode.is_some() && !app.traffic.affords_picture() && app.frame.picture.is_some();
             if fits && !spared && picture.protocol == app.terminal.graphics.protocol {
+                if app.traffic.take_in(&picture) {
+                    app.note(
+                        Tone::Note,
+                        "the link is too slow for such pictures: block characters; F shows one in full",
+                    );
+                }
                 app.frame.picture = Some(picture);
             }
             vec![]

@@ -251,7 +251,7 @@ fn change_display(app: &mut App, verb: &Verb) -> Vec<Effect> {
             app.traffic.limit = (*kilobytes > 0).then(|| 1000 * u64::from(*kilobytes));
             app.traffic.coarseness = 0;
         }
-        _ => app.traffic.coarseness = 0,
+        _ => (app.traffic.is_full, app.traffic.coarseness) = (true, 0),
     }
     vec![Effect::Encode]
 }
