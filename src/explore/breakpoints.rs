@@ -50,9 +50,15 @@ impl Condition {
     /// Says what conditions there are.
     pub(crate) fn parse(text: &str) -> Result<Condition, String> {
         let (word, rest) = text.trim().split_once(' ').map_or((text.trim(), ""), |(word, rest)| (word, rest.trim()));
-        let number =
-            || rest.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or(format!("{word}: {rest:?} is not a number"));
+        let number = || match rest.parse::<f32>() {
+            Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+            Ok(number) if number.is_finite() => Err(format!("{word}: {rest} is not above 0")),
+            _ => Err(format!("{word}: {rest:?} is not a number")),
+        };
         match word {
+            "subtask" | "failed" if !rest.is_empty() => {
+                Err(format!("{word} stands alone: {rest:?} is nothing that it takes"))
+            }
             "subtask" => Ok(Condition::Subtask),
             "failed" => Ok(Condition::Failed),
             "drop" => Ok(Condition::ValueDrop(number()?)),

@@ -109,6 +109,9 @@ fn expert_steps(task: &Task, scene: &Arc<Scene>) -> anyhow::Result<u32> {
 /// # Errors
 /// When the file is no task file, or cannot be written.
 pub(crate) fn add_task(path: &Path, mut task: Task, scene: &Scene) -> anyhow::Result<(String, usize)> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        anyhow::bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
+    }
     let mut set = if path.exists() {
         taskset::read(path)?.value
     } else {

@@ -22,14 +22,21 @@ impl VerbLine<'_> {
         text.parse().map_err(|_| format!("{}: {text:?} is not a number", self.verb))
     }
 
-    /// A number, or one.
+    /// A number above 0, or one.
     pub(super) fn count(&self) -> Result<u32, String> {
-        if self.rest.is_empty() { Ok(1) } else { self.number() }
+        if self.rest.is_empty() { Ok(1) } else { self.count_in(self.rest) }
+    }
+
+    fn count_in(&self, text: &str) -> Result<u32, String> {
+        match self.number_in(text)? {
+            0 => Err(format!("{}: 0 times is nothing to do", self.verb)),
+            count => Ok(count),
+        }
     }
 
     /// A number, where there is one.
     pub(super) fn optional_count(&self) -> Result<Option<usize>, String> {
-        if self.rest.is_empty() { Ok(None) } else { Ok(Some(self.number()? as usize)) }
+        if self.rest.is_empty() { Ok(None) } else { Ok(Some(self.count_in(self.rest)? as usize)) }
     }
 
     /// A large number, which complaints call so.
@@ -56,14 +63,14 @@ impl VerbLine<'_> {
 
     /// `[TIMES]`
     pub(super) fn draws_of_all(&self) -> Result<Draws, String> {
-        Ok(Draws { times: if self.rest.is_empty() { DRAWS } else { self.number()? }, only: None })
+        Ok(Draws { times: if self.rest.is_empty() { DRAWS } else { self.count_in(self.rest)? }, only: None })
     }
 
     /// `N [TIMES]`
     pub(super) fn draws_of_one(&self) -> Result<Draws, String> {
         let (link, times) = self.rest.split_once(' ').unwrap_or((self.rest, ""));
         let only = self.number_in(link)?.checked_sub(1).ok_or("link: links are numbered from 1")?;
-        let times = if times.is_empty() { DRAWS } else { self.number_in(times.trim())? };
+        let times = if times.is_empty() { DRAWS } else { self.count_in(times.trim())? };
         Ok(Draws { times, only: Some(only as usize) })
     }
 }

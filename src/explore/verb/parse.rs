@@ -16,6 +16,10 @@ pub(crate) fn parse(line: &str) -> Result<Verb, String> {
         Some(meant) => format!("unknown verb {verb:?}; is {meant} meant? `help` lists the verbs"),
         None => format!("unknown verb {verb:?}; `help` lists the verbs"),
     })?;
+    // What is passed over in silence would be taken for understood.
+    if entry.arguments.is_empty() && !rest.is_empty() {
+        return Err(format!("{verb} stands alone: {rest:?} is nothing that it takes"));
+    }
     (entry.read)(&VerbLine { verb, rest })
 }
 
@@ -83,6 +87,14 @@ mod tests {
         assert!(!parse("zzz").unwrap_err().contains("meant"));
         assert!(parse("name").unwrap_err().contains("what?"));
         assert!(parse("select 1").is_err(), "keys alone do that");
+        for alone in ["mouse on", "quit now", "done 3", "greedy 4", "values north"] {
+            assert!(parse(alone).unwrap_err().contains("stands alone"), "{alone}");
+        }
+        for none in ["step 0", "back 0", "forward 0", "links 0", "link 2 0", "link 0", "open 0", "meant 0"] {
+            assert!(parse(none).is_err(), "{none}");
+        }
+        assert!(parse("event later").unwrap_err().contains("neither next nor before"));
+        assert!(parse("break gap -1").unwrap_err().contains("not above 0"));
     }
 
     #[test]

@@ -56,7 +56,11 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     verb("last", "", "to the end of the branch", |_| ask(Command::Seek(u32::MAX)))
         .on(&[key(Common, "", &["$", "end"], "to the end", "")]),
     verb("event", "next|before", "to a subtask, failure, instruction or fork",
-        |line| ask(Command::SeekEvent { forward: line.rest != "before" }))
+        |line| match line.rest {
+            "" | "next" => ask(Command::SeekEvent { forward: true }),
+            "before" => ask(Command::SeekEvent { forward: false }),
+            other => Err(format!("event: {other:?} is neither next nor before")),
+        })
         .on(&[
             key(Common, "[ ]", &["["], "to the event before, after", "before"),
             key(Common, "", &["]"], "to the next event", "next"),

@@ -136,11 +136,11 @@ impl Widget for StatusRow<'_> {
             Line::styled(fit_parts(WELCOME, usize::from(area.width)), THEME.note).render(area, buf);
             return;
         }
-        if let Some(notice) = app
-            .notice
-            .as_ref()
-            .filter(|_| app.input.mode == Mode::Watch && (app.page != ExplorerPage::Main || app.is_frame_alone()))
-        {
+        if let Some(notice) = app.notice.as_ref().filter(|notice| {
+            // The log of the main page has room for what went well; what did not has to be seen whole.
+            let has_log = app.page == ExplorerPage::Main && !app.is_frame_alone();
+            matches!(app.input.mode, Mode::Watch | Mode::Manual) && (!has_log || notice.tone == Tone::Bad)
+        }) {
             Line::styled(fit(&notice.text, usize::from(area.width)), tone(notice.tone)).render(area, buf);
             return;
         }
