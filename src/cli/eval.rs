@@ -14,6 +14,7 @@ use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::policies::{Deciding, PolicyChoice};
 use super::streams::say;
+use super::wish_reader::WishReaderArgs;
 use super::{jobs, progress, stop, streams};
 use crate::control::{Kind, Progress as Place, RunControl};
 use crate::data::json::Document;
@@ -26,6 +27,7 @@ use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
 use crate::eval::tasks::{elsewhere, sample};
 use crate::house::grading::Grading;
+use crate::language::count::counted;
 use crate::report::summary::RunSummary;
 use crate::report::threshold::Threshold;
 use crate::run_dir::default_path;
@@ -43,6 +45,8 @@ pub(crate) struct Eval {
     environment: EnvironmentChoice,
     #[command(flatten)]
     policy: PolicyChoice,
+    #[command(flatten)]
+    reader: WishReaderArgs,
     /// The run folder to write; one that the same run began is continued [default: runs/NAME-TIME]
     #[arg(long, value_name = "RUN")]
     out: Option<PathBuf>,
@@ -108,10 +112,14 @@ impl Eval {
         let (set, file) = self.task_set()?;
         let scenes = Scenes::of(&file, &set.value);
         let chosen = self.policy.open(self.sample, self.deciding.asked())?;
-        let evaluation =
-            Evaluation::prepare(&set, scenes, self.options(), &chosen.name, chosen.checkpoint_hash.clone())
-                .with_context(|| format!("{}", file.display()))?
-                .reaching(self.environment.reach());
+        let reader = self.reader.open()?;
+        let named = (chosen.name.as_str(), chosen.checkpoint_hash.clone());
+        let evaluation = Evaluation::prepare_read_by(&set, scenes, self.options(), named, reader.as_deref())
+            .with_context(|| format!("{}", file.display()))?
+            .reaching(self.environment.reach());
+        if let Some((many, why)) = evaluation.unasked() {
+            say(&format!("{} read by the program itself: {why}", counted(many, "instruction")));
+        }
         let is_elsewhere = evaluation.tasks().iter().any(|task| task.env.is_some());
         if let Some(name) = self.environment.elsewhere().filter(|_| !is_elsewhere) {
             anyhow::bail!("{}: its tasks play in House, not in {name}: leave out --env", file.display());

@@ -16,6 +16,7 @@ use super::policy_name::{Elsewhere, ElsewhereOptions, PolicyName, PolicyNamePars
 use super::recorded::recorded;
 use super::streams::Printable;
 use super::value_names;
+use super::wish_reader::WishReaderArgs;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset, text_file};
@@ -79,6 +80,8 @@ pub(crate) struct Origin {
     /// What is made of typed instructions: read ones are graded like tasks, or nothing is expected of them
     #[arg(long, value_enum, default_value = "read")]
     expect: ExpectName,
+    #[command(flatten)]
+    reader: WishReaderArgs,
     /// The seed of the house and of chance [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -221,15 +224,6 @@ enum ExpectName {
     None,
 }
 
-impl From<ExpectName> for Expect {
-    fn from(name: ExpectName) -> Expect {
-        match name {
-            ExpectName::Read => Expect::Read,
-            ExpectName::None => Expect::None,
-        }
-    }
-}
-
 /// The dataset folder where none is named.
 const DATA: &str = "data";
 /// Demonstrations of one scene that are kept at hand.
@@ -252,6 +246,8 @@ impl Explore {
             Some(PolicyName::Random) => PolicyKind::Random,
         };
         let is_named = self.policy.is_some() || self.from.is_named();
+        // What is wrong with it is said before there is a screen.
+        self.from.expect()?;
         let Explore { display, mut from, policy, elsewhere, .. } = self;
         if let Some(PolicyName::Elsewhere(named)) = &policy {
             if from.checkpoint.is_some() {
@@ -301,6 +297,7 @@ impl Default for Origin {
             deciding: Deciding::default(),
             instruction: None,
             expect: ExpectName::Read,
+            reader: WishReaderArgs::default(),
             seed: None,
             other_policy: None,
         }
@@ -345,6 +342,16 @@ impl Origin {
         Ok(Some(Box::new(move || OwnExploration::new(&name, reach, agent, seed, told.as_deref()))))
     }
 
+    /// What is made of what is typed.
+    fn expect(&self) -> anyhow::Result<Expect> {
+        match (self.expect, self.reader.open()?) {
+            (ExpectName::None, Some(_)) => bail!("--expect none reads nothing: leave out --reader"),
+            (ExpectName::None, None) => Ok(Expect::None),
+            (ExpectName::Read, Some(served)) => Ok(Expect::ReadBy(served)),
+            (ExpectName::Read, None) => Ok(Expect::Read),
+        }
+    }
+
     /// Whether the command line says where to start, or with whom.
     fn is_named(&self) -> bool {
         let texts = [&self.scene, &self.task, &self.instruction];
@@ -358,7 +365,7 @@ impl Origin {
 
     /// The same without what was named: where to look, and what is made of what is typed.
     fn unnamed(self) -> Origin {
-        Origin { data: self.data, expect: self.expect, ..Origin::default() }
+        Origin { data: self.data, expect: self.expect, reader: self.reader, ..Origin::default() }
     }
 
     /// Everything that there is to start with, and how it is opened.
@@ -381,7 +388,7 @@ impl Origin {
                 let kept = KeptSession::read(path)?;
                 let policies = Policies::new(policy_source::agents(None, kept.author.deciding));
                 let taken_up = Exploration::take_up(&kept, policies).context("the last session cannot be taken up")?;
-                return Ok(taken_up.reading_as(self.expect.into()));
+                return Ok(taken_up.reading_as(self.expect()?));
             }
             Start::Run { folder, number } => {
                 let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, None)?;
@@ -403,7 +410,7 @@ impl Origin {
         let agents = policy_source::agents(self.checkpoint.as_deref(), asked);
         let policies = Policies::new(elsewhere.chain(agents).collect());
         let exploration = Exploration::new(source, policies, kind, None)?.deciding(asked);
-        exploration.expecting(self.expect.into(), self.instruction.as_deref())
+        exploration.expecting(self.expect()?, self.instruction.as_deref())
     }
 
     fn start(&self) -> anyhow::Result<(EpisodeOrigin, Scenes)> {

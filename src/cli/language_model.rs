@@ -9,10 +9,10 @@ use anyhow::Context;
 use clap::Args;
 
 use crate::language::maker::Sampling;
-use crate::train::completion_server::{CompletionServer, Pace};
+use crate::nets::completion_server::{CompletionServer, Pace};
 
 /// Where a server's key is looked for: options can be read by whoever lists processes.
-const KEY: &str = "SPRINT_API_KEY";
+pub(super) const KEY: &str = "SPRINT_API_KEY";
 
 /// Which model is asked, and how its tokens are drawn.
 #[derive(Args)]

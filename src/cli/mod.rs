@@ -50,6 +50,7 @@ mod tasks;
 mod validate;
 mod value_names;
 mod verify;
+mod wish_reader;
 
 /// Explore, train and evaluate household agents that follow typed instructions.
 #[derive(Parser)]

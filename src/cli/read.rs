@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit_status::ExitStatus;
+use super::wish_reader::WishReaderArgs;
 use crate::data::{dataset, text_file};
 use crate::domain::{Class, Room};
 use crate::house::generate;
@@ -23,6 +24,8 @@ pub(crate) struct ReadArgs {
     /// The house that they are said in: ROOM:SEED for a generated one (kitchen:7), or a scene file
     #[arg(long, value_name = "ROOM:SEED|FILE")]
     scene: Option<String>,
+    #[command(flatten)]
+    reader: WishReaderArgs,
     /// Print each line's features instead, for training; the words that count as spelt right are in this file, a word a line
     #[arg(long, value_name = "FILE", hide = true)]
     features: Option<PathBuf>,
@@ -34,6 +37,9 @@ struct Line<'a> {
     text: &'a str,
     /// The reading in words.
     words: String,
+    /// Why the language model that was to read it did not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unasked: Option<String>,
     #[serde(flatten)]
     reading: &'a WishReading,
 }
@@ -71,6 +77,7 @@ impl ReadArgs {
             lies: &house.lies,
             ..Context::default()
         });
+        let served = self.reader.open()?;
         let reader = Reader::shipped().map_err(|error| anyhow!("{error}"))?;
         let mut out = std::io::stdout().lock();
         for (number, text) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
@@ -81,8 +88,16 @@ impl ReadArgs {
                 Ok(_) | Err(InstructionError::Empty) => {}
                 Err(error) => bail!("line {number}: {error}"),
             }
-            let reading = reader.read(text, &context);
-            serde_json::to_writer(&mut out, &Line { text, words: reading.words(), reading: &reading })?;
+            let own = || reader.read(text, &context);
+            let (reading, unasked) = match served.as_ref().filter(|_| !text.trim().is_empty()) {
+                None => (own(), None),
+                Some(served) => match served.read(text, &[], context.house) {
+                    Ok(reading) => (reading, None),
+                    Err(why) => (own(), Some(why)),
+                },
+            };
+            let line = Line { text, words: reading.words(), unasked, reading: &reading };
+            serde_json::to_writer(&mut out, &line)?;
             out.write_all(b"\n")?;
             out.flush()?;
         }

@@ -325,7 +325,7 @@ fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()
         writeln!(out, "subtask {number:<4} {}{sentence}", describe(&task.roles, subtask))?;
     }
     if task.subtasks.is_empty() {
-        match read_instruction(task, &setting) {
+        match read_instruction(task, &setting, None) {
             Ok(wish) => {
                 for (number, words) in (1..).zip(wish.subtasks_in_words()) {
                     writeln!(out, "subtask {number:<4} {words}   (as the instruction is read)")?;

@@ -20,7 +20,6 @@ pub enum SkillKind {
 
 impl SkillKind {
     /// Every kind.
-    #[cfg(test)]
     pub(crate) const ALL: [SkillKind; 7] = [
         SkillKind::Pickup,
         SkillKind::Put,

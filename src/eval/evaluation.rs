@@ -20,7 +20,7 @@ use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::{Scenes, Setting};
 use crate::episode::wish;
-use crate::episode::wish::Wish;
+use crate::episode::wish::{ServedReader, Wish};
 use crate::house::grading::Grading;
 use crate::language::instruction;
 use crate::report::summary::RunSummary;
@@ -69,10 +69,24 @@ impl Evaluation {
         policy: &str,
         checkpoint_hash: Option<String>,
     ) -> anyhow::Result<Evaluation> {
+        Evaluation::prepare_read_by(set, scenes, options, (policy, checkpoint_hash), None)
+    }
+
+    /// The same with a language model that says what instructions alone ask for.
+    ///
+    /// # Errors
+    /// As before; a model that does not answer is none.
+    pub(crate) fn prepare_read_by(
+        set: &Document<TaskSet>,
+        scenes: Scenes,
+        options: Options,
+        (policy, checkpoint_hash): (&str, Option<String>),
+        reader: Option<&ServedReader>,
+    ) -> anyhow::Result<Evaluation> {
         let mut tasks = set.value.tasks.clone();
         tasks.truncate(options.limit.unwrap_or(usize::MAX));
         let scenes_hash = scenes.check(&tasks)?;
-        let read = read_untold(&mut tasks, &scenes)?;
+        let read = read_untold(&mut tasks, &scenes, reader)?;
         check(&tasks, options)?;
         let manifest = RunManifest {
             format_version: RunManifest::FORMAT,
@@ -92,6 +106,7 @@ impl Evaluation {
             instruction_variants: options.language,
             all_start_subtasks: options.every_start,
             shard: options.shard,
+            reader: reader.map(|served| served.name().to_owned()),
         };
         manifest.check()?;
         let plan = EvaluationPlan {
@@ -145,6 +160,13 @@ impl Evaluation {
         &self.plan.tasks
     }
 
+    /// Instructions alone, which the program had to read in place of a language model: how many, and why the first.
+    pub(crate) fn unasked(&self) -> Option<(usize, &str)> {
+        let mut all = self.plan.read.values().filter_map(|wish| wish.unasked.as_deref());
+        let first = all.next()?;
+        Some((1 + all.count(), first))
+    }
+
     /// Where they play.
     pub fn scenes(&self) -> &Scenes {
         &self.plan.scenes
@@ -178,12 +200,16 @@ impl Evaluation {
 }
 
 /// Gives the tasks that only say an instruction the subtasks as which it is read; what was read, by the tasks' places.
-fn read_untold(tasks: &mut [Task], scenes: &Scenes) -> anyhow::Result<BTreeMap<usize, Wish>> {
+fn read_untold(
+    tasks: &mut [Task],
+    scenes: &Scenes,
+    reader: Option<&ServedReader>,
+) -> anyhow::Result<BTreeMap<usize, Wish>> {
     let mut found = BTreeMap::new();
     for (i, task) in tasks.iter_mut().enumerate().filter(|(_, task)| task.subtasks.is_empty() && task.env.is_none()) {
         let setting = scenes.setting(task)?;
-        let wish =
-            read_instruction(task, &setting).map_err(|problem| anyhow::anyhow!("tasks[{i}].subtasks: {problem}"))?;
+        let wish = read_instruction(task, &setting, reader)
+            .map_err(|problem| anyhow::anyhow!("tasks[{i}].subtasks: {problem}"))?;
         (task.roles, task.subtasks) = (wish.roles.clone(), wish.subtasks.clone());
         task.expert_steps = wish.expert_steps.unwrap_or(task.expert_steps);
         found.insert(i, wish);
@@ -195,9 +221,12 @@ fn read_untold(tasks: &mut [Task], scenes: &Scenes) -> anyhow::Result<BTreeMap<u
 ///
 /// # Errors
 /// When it cannot be graded as it is read; says why.
-pub(crate) fn read_instruction(task: &Task, setting: &Setting) -> Result<Wish, String> {
+pub(crate) fn read_instruction(task: &Task, setting: &Setting, reader: Option<&ServedReader>) -> Result<Wish, String> {
     let text = instruction::normalise(&task.instruction);
-    let wish = wish::read(&text, 0, std::iter::empty(), &setting.scene, &setting.world);
+    let wish = match reader {
+        None => wish::read(&text, 0, std::iter::empty(), &setting.scene, &setting.world),
+        Some(served) => wish::read_by(served, &text, 0, &[], &setting.scene, &setting.world),
+    };
     match &wish.ungraded {
         Some(why) => Err(format!("none, and {:?} cannot be graded as it is read: {why}", task.instruction)),
         None => Ok(wish),

@@ -52,6 +52,7 @@ pub(super) fn write(
         instruction_variants: false,
         all_start_subtasks: false,
         shard: None,
+        reader: None,
     };
     let mut folder = RunWriter::open(path, &manifest)?;
     atomic_file::write(&path.join(TASKS), &bytes)?;

@@ -1,6 +1,7 @@
 //! Networks: weights files, sentence encoders, the visual encoder, policy and critic, and where they compute.
 
 pub(crate) mod chooser;
+pub(crate) mod completion_server;
 pub(crate) mod critic;
 pub(crate) mod detector;
 pub mod device;

@@ -55,6 +55,9 @@ pub struct RunManifest {
     /// Which share of the run this is; nothing for a whole one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) shard: Option<Shard>,
+    /// Which language model said what instructions alone ask for; nothing where the program did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) reader: Option<String>,
 }
 
 impl RunManifest {
@@ -127,6 +130,7 @@ pub(crate) mod tests {
             instruction_variants: false,
             all_start_subtasks: false,
             shard: None,
+            reader: None,
         }
     }
 

@@ -6,12 +6,12 @@ use anyhow::Context;
 use serde::Deserialize;
 use serde_json::json;
 
-use super::completion_server::CompletionServer;
 use super::ranked_chains::ChainModel;
 use crate::language::instruction::visible;
 use crate::language::maker::{Maker, Sampling};
 use crate::language::passage::{Passage, Summarizer, Summary, TakeSummary};
 use crate::language::prompt;
+use crate::nets::completion_server::CompletionServer;
 
 /// A model on a server that sums passages up.
 pub(crate) struct HttpSummarizer {

@@ -1,7 +1,6 @@
 //! Training: presets, data, batches, the trainer, and the jobs that make data and checkpoints.
 
 pub mod batch_sampler;
-pub(crate) mod completion_server;
 pub mod collect;
 pub mod chaining_pool;
 pub(crate) mod chaining_value;

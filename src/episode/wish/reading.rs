@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::record::{Wish, WishGrading};
+use super::served_reader::ServedReader;
 use crate::domain::skill::SkillKind;
 use crate::domain::{Class, Scene, World};
 use crate::house::House;
@@ -12,11 +13,13 @@ use crate::house::grading::{Grader, Grading};
 use crate::language::reader::{Context, ReadSubtask, Reader, WishReading, lying};
 
 /// What is made of typed wishes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub(crate) enum Expect {
     /// Each is read, and graded as it was read.
     #[default]
     Read,
+    /// The same, by a language model first.
+    ReadBy(Arc<ServedReader>),
     /// Nothing: a person alone judges.
     None,
 }
@@ -32,6 +35,32 @@ const EXPERT: usize = 1000;
 fn classes_of(scene: &Scene, world: &World) -> BTreeSet<Class> {
     let fixtures = scene.fixtures.iter().map(|fixture| fixture.class);
     fixtures.chain(world.objects.iter().map(|object| object.class)).collect()
+}
+
+/// The same by a language model, where that can: what the program makes of it is then offered as another reading.
+pub(crate) fn read_by(
+    served: &ServedReader,
+    text: &str,
+    began: u32,
+    earlier: &[&str],
+    scene: &Arc<Scene>,
+    world: &World,
+) -> Wish {
+    let own = read(text, began, earlier.iter().copied(), scene, world);
+    let mut asked = match served.read(text, earlier, Some(&classes_of(scene, world))) {
+        Ok(asked) => asked,
+        Err(why) => return Wish { unasked: Some(why), ..own },
+    };
+    // What both make of it is as sure as the program is.
+    match own.readings.first() {
+        Some(first) if first.steps() == asked.steps() => {
+            asked = WishReading { read_by: asked.read_by, ..first.clone() }
+        }
+        _ => {}
+    }
+    let others = own.readings.into_iter().filter(|other| other.steps() != asked.steps() && !other.subtasks.is_empty());
+    let readings: Vec<WishReading> = std::iter::once(asked.clone()).chain(others).collect();
+    of_reading(text, began, readings, 0, scene, world)
 }
 
 /// Reads words in the state in which they are told, `began` steps into the episode; `earlier` are the instructions before.
@@ -74,7 +103,9 @@ fn of_reading(
         instruction: text.into(),
         began,
         understood: reading.words(),
-        confidence: Some(reading.confidence),
+        // How sure a language model may be that differs from the program is not known.
+        confidence: Some(reading.confidence).filter(|&sure| reading.read_by.is_none() || sure > 0.0),
+        read_by: reading.read_by.clone(),
         unread: reading.unread.clone(),
         absent: reading.absent.clone(),
         ..Wish::default()
@@ -121,7 +152,7 @@ fn graded(
     if let Some(open) = open {
         return Err(open.into());
     }
-    if reading.confidence < LEAST && !is_picked {
+    if reading.confidence < LEAST && reading.read_by.is_none() && !is_picked {
         return Err(format!("{:.0} % sure is too unsure to grade by", 100.0 * reading.confidence));
     }
     reading.task().ok_or_else(|| "it was not read to the end".into())

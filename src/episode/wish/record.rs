@@ -81,6 +81,12 @@ pub struct Wish {
     /// How likely the reading is right, from 0 to 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) confidence: Option<f32>,
+    /// Which language model understood it so; nothing where the program read it itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) read_by: Option<String>,
+    /// Why the language model that was to read it did not, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) unasked: Option<String>,
     /// Why nobody grades it, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) ungraded: Option<String>,

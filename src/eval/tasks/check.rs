@@ -112,7 +112,7 @@ fn meaning(path: &Path, document: &Value, found: &mut Vec<(String, String)>) {
                         found.push((format!("{place}.{field}"), problem.to_owned()));
                     }
                     Some(Ok(setting)) if task.subtasks.is_empty() => {
-                        let problem = read_instruction(&task, &setting).err();
+                        let problem = read_instruction(&task, &setting, None).err();
                         found.extend(problem.map(|problem| (format!("{place}.subtasks"), problem)));
                     }
                     Some(Ok(_)) | None => {}

@@ -7,7 +7,7 @@ use crate::agent::Decision;
 use crate::domain::Action;
 use crate::episode::record::{Author, Episode};
 use crate::episode::rollout::End;
-use crate::episode::wish::{Expect, NOTHING_ASKED, Wish, WishGrading, WishVerdict, explain, read, repick};
+use crate::episode::wish::{Expect, NOTHING_ASKED, Wish, WishGrading, WishVerdict, explain, read, read_by, repick};
 use crate::house::Outcome;
 use crate::house::grading::{Grader, Grading, describe};
 use crate::language::instruction;
@@ -22,7 +22,7 @@ impl Exploration {
         self.task_aside = None;
         // What a task says without subtasks is read like anything that is typed.
         let is_told = self.episode.task.as_ref().is_some_and(|task| task.subtasks.is_empty());
-        if is_told && self.expect == Expect::Read {
+        if is_told && !matches!(self.expect, Expect::None) {
             self.tell(self.rollout.instruction.clone());
         }
         self.make_start();
@@ -70,15 +70,22 @@ impl Exploration {
         })
     }
 
+    /// Which language model is asked what a wish means.
+    pub(crate) fn asked_reader(&self) -> Option<&str> {
+        match &self.expect {
+            Expect::ReadBy(served) => Some(served.name()),
+            Expect::Read | Expect::None => None,
+        }
+    }
+
     /// A new wish, told in the present state.
     fn tell(&mut self, text: String) {
         let began = self.tree.at();
         let (scene, world) = (self.rollout.env.house.scene(), self.rollout.env.house.world());
-        let wish = match self.expect {
-            Expect::Read => {
-                let earlier = self.wishes.iter().map(|wish| wish.instruction.as_str());
-                read(&text, began, earlier, scene, world)
-            }
+        let earlier: Vec<&str> = self.wishes.iter().map(|wish| wish.instruction.as_str()).collect();
+        let wish = match &self.expect {
+            Expect::Read => read(&text, began, earlier.into_iter(), scene, world),
+            Expect::ReadBy(served) => read_by(served, &text, began, &earlier, scene, world),
             Expect::None => Wish::ungraded(&text, began, NOT_READ),
         };
         self.begin(wish);

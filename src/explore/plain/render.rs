@@ -16,7 +16,11 @@ use crate::explore::timeline::{BranchPosition, Divergence, Timeline};
 pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
     if !wish.understood.is_empty() {
         let sure = wish.confidence.map_or(String::new(), |confidence| format!(" ({:.0} % sure)", 100.0 * confidence));
-        writeln!(out, "understood: {}{sure}", wish.understood)?;
+        let by = wish.read_by.as_ref().map_or(String::new(), |name| format!(" (by {name})"));
+        writeln!(out, "understood{by}: {}{sure}", wish.understood)?;
+    }
+    if let Some(why) = &wish.unasked {
+        writeln!(out, "read by the program itself: {why}")?;
     }
     if !wish.unread.is_empty() {
         writeln!(out, "not understood: {}", wish.unread.join(" "))?;

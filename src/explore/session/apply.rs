@@ -218,7 +218,16 @@ impl Session {
     /// Tells the agent something else; whether that could be done.
     fn instruct(&mut self, text: &str) -> bool {
         let old = self.exploration.instruction().to_string();
-        match self.exploration.instruct(text) {
+        let asked = self.exploration.asked_reader().map(|name| format!("asking {name} what is meant"));
+        let is_asked = asked.is_some();
+        if is_asked {
+            self.emit(SessionEvent::Busy(asked));
+        }
+        let told = self.exploration.instruct(text);
+        if is_asked {
+            self.emit(SessionEvent::Busy(None));
+        }
+        match told {
             Ok(note) => {
                 let new = self.exploration.instruction().to_string();
                 self.emit(SessionEvent::Instructed { old, new, note });

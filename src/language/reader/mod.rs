@@ -1,5 +1,6 @@
 //! Reads a wish: typed text as an ordered list of subtasks, with how sure that is and what was not understood.
 
+pub(crate) mod asked;
 mod clause;
 pub mod clauses;
 pub mod features;

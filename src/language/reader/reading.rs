@@ -52,6 +52,9 @@ pub struct WishReading {
     pub unread: Vec<String>,
     /// Classes that are asked for and not in the house.
     pub absent: Vec<Class>,
+    /// Which language model read it; nothing where the program did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub read_by: Option<String>,
 }
 
 impl WishReading {
@@ -117,6 +120,11 @@ impl WishReading {
         other.absent.retain(named);
         other.confidence = alternative.probability.min(1.0 - self.confidence).max(0.0);
         other
+    }
+
+    /// What is done with what, without the looks and places of things: whether two readings are graded alike.
+    pub(crate) fn steps(&self) -> Vec<(SkillKind, Option<Class>, Option<Class>, bool)> {
+        self.subtasks.iter().map(|one| (one.skill, one.object, one.receptacle, one.slice)).collect()
     }
 
     /// What was most likely meant if not this: at most three readings with one other class, the likeliest first.

@@ -135,7 +135,7 @@ impl Reader {
         let nothing = path.read.is_empty() || open || !rest.is_empty();
         let confidence = if nothing { 0.0 } else { self.model.calibrated(path.probability * left) };
         unread.extend(rest);
-        WishReading { subtasks: path.read, confidence, unread, absent: path.absent }
+        WishReading { subtasks: path.read, confidence, unread, absent: path.absent, read_by: None }
     }
 
     /// Passes over clauses that ask for nothing: walking, doors, remarks.

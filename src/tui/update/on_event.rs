@@ -198,7 +198,11 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
 fn reading(wish: &Wish) -> Vec<(Tone, String)> {
     let mut lines = Vec::new();
     if !wish.understood.is_empty() {
-        lines.push((Tone::Note, format!("understood: {}", wish.understood)));
+        let by = wish.read_by.as_ref().map_or(String::new(), |name| format!(" by {name}"));
+        lines.push((Tone::Note, format!("understood{by}: {}", wish.understood)));
+    }
+    if let Some(why) = &wish.unasked {
+        lines.push((Tone::Bad, format!("read by the program itself: {why}")));
     }
     if let Some(why) = &wish.ungraded {
         lines.push((Tone::Bad, format!("not graded: {why}")));

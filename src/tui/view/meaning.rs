@@ -67,8 +67,12 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
     }
     let sure = wish.confidence.filter(|&confidence| confidence < CERTAIN && wish.picked == 0);
     let sure = sure.map_or(String::new(), |confidence| format!(" ({:.0} % sure)", 100.0 * confidence));
-    let head = format!("  understood{sure}: ");
+    let by = wish.read_by.as_ref().map_or(String::new(), |name| format!(" by {name}"));
+    let head = format!("  understood{by}{sure}: ");
     let mut parts = vec![(head, THEME.quiet), (wish.understood.clone(), THEME.note)];
+    if wish.unasked.is_some() {
+        parts.push(("  by the program itself: the language model gave no reading (log)".into(), THEME.bad));
+    }
     if !wish.unread.is_empty() {
         parts.push((format!("  not understood: {}", wish.unread.join(" ")), THEME.bad));
     }

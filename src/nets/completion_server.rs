@@ -155,7 +155,8 @@ impl CompletionServer {
             let first = failed.is_connection && !self.has_answered.load(Ordering::Relaxed);
             let tries = if first { self.pace.tries.min(FIRST_TRIES) } else { self.pace.tries };
             if attempt >= tries {
-                bail!("{}: {} ({attempt} tries)", self.url, failed.why);
+                let tries = if attempt == 1 { String::new() } else { format!(" ({attempt} tries)") };
+                bail!("{}: {}{tries}", self.url, failed.why);
             }
             tracing::warn!("{}: {}; try {attempt} of {tries}", self.url, failed.why);
             if !self.sleep(failed.asked_wait.unwrap_or(wait)) {
