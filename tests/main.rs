@@ -32,5 +32,6 @@ mod slow_link;
 mod start;
 mod terminal;
 mod terminal_habits;
+mod wish_reader;
 mod wishes;
 mod workbench;

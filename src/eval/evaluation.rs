@@ -228,7 +228,10 @@ pub(crate) fn read_instruction(task: &Task, setting: &Setting, reader: Option<&S
         Some(served) => wish::read_by(served, &text, 0, &[], &setting.scene, &setting.world),
     };
     match &wish.ungraded {
-        Some(why) => Err(format!("none, and {:?} cannot be graded as it is read: {why}", task.instruction)),
+        Some(why) => {
+            let unasked = wish.unasked.as_ref().map_or(String::new(), |why| format!("; by the program, as {why}"));
+            Err(format!("none, and {:?} cannot be graded as it is read: {why}{unasked}", task.instruction))
+        }
         None => Ok(wish),
     }
 }

@@ -12,6 +12,7 @@ use crate::explore::session::{RunMode, SessionCommand};
 use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
+use crate::tui::log::Tone;
 use crate::tui::theme::THEME;
 
 /// The first row.
