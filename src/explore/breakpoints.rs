@@ -51,8 +51,8 @@ impl Condition {
     pub(crate) fn parse(text: &str) -> Result<Condition, String> {
         let (word, rest) = text.trim().split_once(' ').map_or((text.trim(), ""), |(word, rest)| (word, rest.trim()));
         let number = || match rest.parse::<f32>() {
-            Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
-            Ok(number) if number.is_finite() => Err(format!("{word}: {rest} is not above 0")),
+            Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
+            Ok(number) if number.is_finite() => Err(format!("{word}: {rest} is below 0")),
             _ => Err(format!("{word}: {rest:?} is not a number")),
         };
         match word {

@@ -94,7 +94,7 @@ mod tests {
             assert!(parse(none).is_err(), "{none}");
         }
         assert!(parse("event later").unwrap_err().contains("neither next nor before"));
-        assert!(parse("break gap -1").unwrap_err().contains("not above 0"));
+        assert!(parse("break gap -1").unwrap_err().contains("is below 0"));
     }
 
     #[test]

@@ -127,7 +127,7 @@ mod tests {
         assert_eq!(answers.len(), 4);
         let words: Vec<String> =
             answers.iter().map(|answer| reading(answer, "a b", None, "m").unwrap().words()).collect();
-        assert_eq!(words[1], "slice an apple, heat a slice of apple, put it on the plate");
+        assert_eq!(words[1], "slice an apple, heat it, put it on the plate");
         assert_eq!(reading(answers[3], "sing me", None, "m").unwrap().unread, ["sing", "me"]);
     }
 

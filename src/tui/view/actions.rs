@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::widgets::Widget;
 
-use super::panel::{panel, put};
+use super::panel::{panel, put, wrap};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -19,7 +19,10 @@ impl Widget for ActionsView<'_> {
         let lines = &app.actions.lines;
         let inner = panel(buf, area, "Actions", &format!("{} on this branch, * is in hand", lines.len()));
         if lines.is_empty() {
-            put(buf, inner, 0, "nothing was done yet: space lets the agent act, n takes one step", THEME.quiet);
+            let nothing = "nothing was done yet: space lets the agent act, n takes one step";
+            for (row, line) in (0..).zip(wrap(nothing, usize::from(inner.width), "")) {
+                put(buf, inner, row, line, THEME.quiet);
+            }
         }
         let first = (app.actions.selected + 1).saturating_sub(usize::from(inner.height));
         for (row, (at, line)) in (0..inner.height).zip(lines.iter().enumerate().skip(first)) {

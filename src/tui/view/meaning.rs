@@ -71,7 +71,7 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
     let head = format!("  understood{by}{sure}: ");
     let mut parts = vec![(head, THEME.quiet), (wish.understood.clone(), THEME.note)];
     if wish.unasked.is_some() {
-        parts.push(("  by the program itself: the language model gave no reading (log)".into(), THEME.bad));
+        parts.push(("  by the program itself, as the log says".into(), THEME.bad));
     }
     if !wish.unread.is_empty() {
         parts.push((format!("  not understood: {}", wish.unread.join(" ")), THEME.bad));

@@ -41,6 +41,21 @@ pub(crate) fn fit(text: &str, width: usize) -> String {
     short
 }
 
+/// The end of a text in `width` columns, the cut marked: of a path, its name.
+pub(super) fn fit_end(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_string();
+    }
+    let mut from = text.len();
+    for (at, _) in text.char_indices().rev() {
+        if text[at..].width() + 1 > width {
+            break;
+        }
+        from = at;
+    }
+    if width > 0 { format!("…{}", &text[from..]) } else { String::new() }
+}
+
 /// A cut text of fewer columns says nothing.
 const STUMP: usize = 6;
 
@@ -106,6 +121,13 @@ pub(crate) fn put(buf: &mut Buffer, area: Rect, row: u16, text: impl Into<String
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_a_path_the_end_is_seen() {
+        assert_eq!(fit_end("in /a/long/way/checkpoints", 13), "…/checkpoints");
+        assert_eq!((fit_end("runs", 4), fit_end("runs", 0)), ("runs".into(), String::new()));
+        assert_eq!(fit_end("ü漢字", 4), "…字", "wide letters are whole");
+    }
 
     #[test]
     fn parts_that_do_not_fit_whole_are_left_out() {

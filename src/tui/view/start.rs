@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget, Wrap};
 use unicode_width::UnicodeWidthStr;
 
-use super::panel::{fit, put, wrap};
+use super::panel::{fit, fit_end, put, wrap};
 use crate::tui::start_page::StartPage;
 use crate::tui::theme::{Ability, Scheme, THEME};
 
@@ -68,7 +68,8 @@ fn entries(page: &StartPage, area: Rect, buf: &mut Buffer) {
         let is_selected = at == page.selected;
         let (mark, style) = if is_selected { ("> ", THEME.chosen) } else { ("  ", Style::new()) };
         let name = fit(format!("{} {}", entry.name, entry.choice()).trim_end(), names);
-        let note = fit(&entry.note, width.saturating_sub(KIND + names + 4));
+        let room = width.saturating_sub(KIND + names + 4);
+        let note = if entry.note.contains('/') { fit_end(&entry.note, room) } else { fit(&entry.note, room) };
         Line::from(vec![
             Span::styled(mark, style),
             Span::styled(format!("{:<KIND$} ", entry.start.kind()), THEME.quiet),

@@ -146,7 +146,15 @@ impl Widget for StatusRow<'_> {
             return;
         }
         let hints: &[(&str, &str)] = match (app.input.mode, app.page) {
-            (Mode::Watch, ExplorerPage::Main | ExplorerPage::Frame) => &[
+            (Mode::Watch, ExplorerPage::Frame) => &[
+                ("space", "run"),
+                ("n", "step"),
+                ("h l", "back, forward"),
+                ("i", "instruct"),
+                ("esc", "panels"),
+                ("?", "keys"),
+            ],
+            (Mode::Watch, ExplorerPage::Main) => &[
                 ("space", "run"),
                 ("n", "step"),
                 ("h l", "back, forward"),
@@ -154,9 +162,14 @@ impl Widget for StatusRow<'_> {
                 ("m", "take over"),
                 ("?", "keys"),
             ],
-            (Mode::Watch, ExplorerPage::Branches) => {
-                &[("j k", "select"), ("enter", "go there"), ("R", "name"), ("T", "save as task"), ("esc", "panels")]
-            }
+            (Mode::Watch, ExplorerPage::Branches) => &[
+                ("j k", "select"),
+                ("enter", "go there"),
+                ("R", "name"),
+                ("T", "save as task"),
+                ("esc", "panels"),
+                ("?", "keys"),
+            ],
             (Mode::Watch, ExplorerPage::Actions) => {
                 &[("j k", "select"), ("enter", "go there"), ("h l", "back, forward"), ("esc", "panels"), ("?", "keys")]
             }
@@ -166,14 +179,18 @@ impl Widget for StatusRow<'_> {
             (Mode::Watch, ExplorerPage::World) => {
                 &[("j k", "select"), ("V", "value map"), ("v", "heading"), ("esc", "panels"), ("?", "keys")]
             }
-            (Mode::Watch, ExplorerPage::Compare) => &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels")],
+            (Mode::Watch, ExplorerPage::Compare) => {
+                &[("enter", "other instruction"), ("s", "swap"), ("esc", "panels"), ("?", "keys")]
+            }
             (Mode::Watch, ExplorerPage::Chain) => &[
                 ("enter", "new chain"),
-                ("w", "which link breaks"),
+                ("w", "which breaks"),
                 ("x", "this one"),
-                ("A", "against"),
                 ("O", "open"),
                 ("G", "terms"),
+                ("A", "against"),
+                ("esc", "panels"),
+                ("?", "keys"),
             ],
             (Mode::Manual, _) => &[
                 ("arrows", "move"),
@@ -192,12 +209,15 @@ impl Widget for StatusRow<'_> {
         };
         let mut spans = Vec::new();
         let mut used = 0;
-        // How to find all keys is said wherever it can be; of the others those that fit whole.
-        let kept: usize =
-            hints.iter().filter(|(key, _)| *key == "?").map(|(key, word)| key.width() + word.width() + 3).sum();
-        for (key, word) in hints {
-            let word = if *key == "space" && app.session.run_mode.is_some() { "pause" } else { word };
-            let kept = if *key == "?" { 0 } else { kept };
+        // The way out and how to find all keys are said wherever that can be; of the others those that fit whole.
+        let is_kept = |key: &str| key == "?" || key == "esc";
+        let room_of = |(key, word): &(&str, &str)| key.width() + word.width() + 3;
+        let mut kept: usize = hints.iter().filter(|hint| is_kept(hint.0)).map(room_of).sum();
+        for (key, said) in hints {
+            let word = if *key == "space" && app.session.run_mode.is_some() { "pause" } else { said };
+            if is_kept(key) {
+                kept -= room_of(&(*key, *said));
+            }
             if used + key.width() + word.width() + 1 + kept > usize::from(area.width) {
                 continue;
             }

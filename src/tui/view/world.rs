@@ -8,7 +8,7 @@ use ratatui::widgets::Widget;
 use unicode_width::UnicodeWidthStr;
 
 use super::map;
-use super::panel::{fit, panel, put};
+use super::panel::{fit, panel, put, wrap};
 use crate::explore::inspect::{Thing, things};
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
@@ -58,7 +58,8 @@ impl WorldView<'_> {
                 (false, true, false) => THEME.quiet,
             };
             let verdict = match (thing.possible.is_empty(), thing.seen) {
-                (true, false) => "not in view".into(),
+                (true, false) if room < UNSEEN.width() => "unseen".into(),
+                (true, false) => UNSEEN.into(),
                 _ => thing.verdict(),
             };
             Line::from(vec![
@@ -74,6 +75,8 @@ impl WorldView<'_> {
     }
 }
 
+/// What is said of a thing that cannot be seen.
+const UNSEEN: &str = "not in view";
 /// A reason of fewer columns says nothing.
 const REASON: usize = 24;
 
@@ -94,7 +97,14 @@ fn details(thing: &Thing, area: Rect, buf: &mut Buffer) {
     put(buf, inner, 0, words, Style::new());
     let possible = thing.possible.iter().map(|kind| (kind, "possible now".to_string(), THEME.good));
     let impossible = thing.impossible.iter().map(|(kind, reason)| (kind, reason.clone(), THEME.quiet));
-    for (row, (kind, text, style)) in (first..).zip(possible.chain(impossible)) {
-        put(buf, inner, row, format!("{:<10} {text}", kind.name()), style);
+    let width = usize::from(inner.width);
+    let lines = possible.chain(impossible).flat_map(|(kind, text, style)| {
+        // Room for the longest kind, and the reason in as many lines as it needs.
+        let lines = wrap(&text, width.saturating_sub(11), "");
+        let kinds = std::iter::once(kind.name()).chain(std::iter::repeat(""));
+        kinds.zip(lines).map(|(kind, line)| (format!("{kind:<10} {line}"), style)).collect::<Vec<_>>()
+    });
+    for (row, (line, style)) in (first..).zip(lines) {
+        put(buf, inner, row, line, style);
     }
 }
