@@ -25,6 +25,7 @@ mod environments;
 mod evaluator;
 mod faults;
 mod finetune;
+mod hub;
 mod scenarios;
 mod serve;
 mod training;

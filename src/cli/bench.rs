@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::exit_status::ExitStatus;
-use super::streams;
+use super::{checkpoint, streams};
 use crate::analysis::bench::{self, Baselines, BenchOptions, BenchReport, Part};
 
 /// Measures the simulator, an agent, the sentence encoder and a training.
@@ -18,7 +18,8 @@ pub(crate) struct Bench {
     /// What is measured [default: all]
     #[arg(long, value_enum, value_delimiter = ',')]
     only: Vec<PartName>,
-    /// The trained agent whose decisions are timed: its folder, or its name among checkpoints/ [default: the shipped one]
+    /// The trained agent whose decisions are timed: its folder, its name among checkpoints/, or ORG/NAME[@REVISION] on the
+    /// Hub [default: the shipped one]
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// The preset whose updates are timed
@@ -63,7 +64,12 @@ impl Bench {
             only => only.iter().map(|name| name.part()).collect(),
         };
         let baselines = self.baselines.as_deref().map_or_else(Baselines::shipped, Baselines::read)?;
-        let options = BenchOptions { parts, checkpoint: self.checkpoint, preset: self.preset, baselines };
+        let options = BenchOptions {
+            parts,
+            checkpoint: self.checkpoint.as_deref().map(checkpoint::folder).transpose()?,
+            preset: self.preset,
+            baselines,
+        };
         let report = bench::run(options, &|part| streams::say(&format!("measuring {part}")))?;
         if let Some(path) = &self.store {
             Baselines::store(&report.baselines, path)?;

@@ -7,10 +7,9 @@ use clap::Args;
 
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
-use super::stop;
 use super::streams::say;
-use super::value_names;
-use crate::agent::{policy_source, sentence_encoders};
+use super::{checkpoint, stop, value_names};
+use crate::agent::sentence_encoders;
 use crate::data::taskset;
 use crate::episode::scenes::Scenes;
 use crate::house::expert::TurnTiming;
@@ -50,7 +49,8 @@ pub(crate) struct Collect {
     /// Phrasings of each demonstration
     #[arg(long, default_value_t = 4)]
     annotations: usize,
-    /// A checkpoint that acts, while the demonstrator only says what it would do: its folder, or its name among checkpoints/
+    /// A checkpoint that acts, while the demonstrator only says what it would do: its folder, its name among checkpoints/, or
+    /// ORG/NAME[@REVISION] on the Hub
     #[arg(long, value_name = "DIR|NAME")]
     learner: Option<PathBuf>,
 }
@@ -66,7 +66,7 @@ impl Collect {
         ensure!(lengths && !self.lengths.is_empty(), "--lengths must lie between 1 and 16");
         let learner = match self.learner {
             Some(named) => {
-                let folder = policy_source::folder_of(&named);
+                let folder = checkpoint::folder(&named)?;
                 let sentences = sentence_encoders::open_for(&folder, best_device())?;
                 Some((folder, sentences))
             }

@@ -7,10 +7,10 @@ use anyhow::Context;
 use clap::Args;
 
 use super::exit_status::ExitStatus;
-use super::streams;
+use super::{checkpoint, streams};
 use crate::agent::checkpoint::Networks;
 use crate::agent::config::CheckpointConfig;
-use crate::agent::{policy_source, sentence_encoders};
+use crate::agent::sentence_encoders;
 use crate::data::Dataset;
 use crate::data::items::{ItemSource, Items};
 use crate::data::selection::{Composites, DataSelection};
@@ -50,7 +50,7 @@ impl CriticArgs {
     /// # Errors
     /// When data or checkpoint cannot be read, or there is no critic.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let folder = policy_source::folder_of(&self.checkpoint);
+        let folder = checkpoint::folder(&self.checkpoint)?;
         let config = CheckpointConfig::read(&folder)?;
         let device = best_device();
         let networks = Networks::load(&folder, &config, device)?;

@@ -10,13 +10,12 @@ use etcetera::BaseStrategy;
 
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
-use super::logging;
 use super::policies::Deciding;
 use super::policy_name::{Elsewhere, ElsewhereOptions, PolicyName, PolicyNameParser};
 use super::recorded::recorded;
 use super::streams::Printable;
-use super::value_names;
 use super::wish_reader::WishReaderArgs;
+use super::{checkpoint, logging, value_names};
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::data::{dataset::Dataset, taskset, text_file};
@@ -55,7 +54,8 @@ pub(crate) struct Explore {
 /// Where the explorer starts.
 #[derive(Args, Clone)]
 pub(crate) struct Origin {
-    /// The agent's checkpoint: its folder, or its name among checkpoints/ [default: the shipped one]
+    /// The agent's checkpoint: its folder, its name among checkpoints/, or ORG/NAME[@REVISION] on the Hub [default: the
+    /// shipped one]
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// Start where a demonstration of this scene of the dataset began
@@ -249,6 +249,7 @@ impl Explore {
         // What is wrong with it is said before there is a screen.
         self.from.expect()?;
         let Explore { display, mut from, policy, elsewhere, .. } = self;
+        from.checkpoint = from.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
         if let Some(PolicyName::Elsewhere(named)) = &policy {
             if from.checkpoint.is_some() {
                 bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");

@@ -9,9 +9,8 @@ use clap::Args;
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
 use super::streams::say;
-use super::{stop, streams};
+use super::{checkpoint, stop, streams};
 use crate::agent::learned::SharedEmbedder;
-use crate::agent::policy_source;
 use crate::data::taskset;
 use crate::house::grading::Grading;
 use crate::nets::device::best_device;
@@ -71,8 +70,8 @@ impl Finetune {
         let folder = self.encoder.unwrap_or_else(default_folder);
         let embedder: SharedEmbedder = Arc::new(Mutex::new(Embedder::open(&folder, device)?));
         let finetuning = Finetuning {
-            checkpoint: policy_source::folder_of(&self.checkpoint),
-            critic_from: self.critic_from.as_deref().map(policy_source::folder_of),
+            checkpoint: checkpoint::folder(&self.checkpoint)?,
+            critic_from: self.critic_from.as_deref().map(checkpoint::folder).transpose()?,
             tasks,
             only: only.map(str::to_owned),
             grading: self.grader,

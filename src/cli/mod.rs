@@ -10,6 +10,7 @@ mod annotate;
 mod average;
 mod bench;
 mod chains;
+mod checkpoint;
 mod collect;
 mod compare;
 mod controlled;

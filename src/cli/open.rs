@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::checkpoint;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::explore::{Display, Origin};
@@ -18,7 +19,7 @@ pub(crate) struct Open {
     /// The task file that the run was made from, where the folder does not hold it
     #[arg(long, value_name = "FILE")]
     tasks: Option<PathBuf>,
-    /// The checkpoint of the run's agent: its folder, or its name [default: the one of the run's hash among checkpoints/]
+    /// The checkpoint of the run's agent: its folder or its name [default: the one of the run's hash among checkpoints/]
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     #[command(flatten)]
@@ -37,7 +38,8 @@ impl Open {
         if let Some((open, agent)) = elsewhere {
             return self.display.paused().show_elsewhere(true, open, agent);
         }
-        let (kind, open) = recorded(&self.episode, self.tasks.as_deref(), self.checkpoint)?;
+        let checkpoint = self.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
+        let (kind, open) = recorded(&self.episode, self.tasks.as_deref(), checkpoint)?;
         self.display.paused().show(kind, false, &Origin::default(), open)
     }
 }

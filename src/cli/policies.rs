@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::checkpoint;
 use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::{DecisionOverride, DecisionRule};
@@ -11,7 +12,8 @@ use crate::agent::{DecisionOverride, DecisionRule};
 /// Which policy acts.
 #[derive(Args)]
 pub(crate) struct PolicyChoice {
-    /// The trained agent that acts: its folder, or its name among checkpoints/ [default: the shipped one]
+    /// The trained agent that acts: its folder, its name among checkpoints/, or ORG/NAME[@REVISION] on the Hub [default: the
+    /// shipped one]
     #[arg(long, value_name = "DIR|NAME")]
     checkpoint: Option<PathBuf>,
     /// Who acts
@@ -86,7 +88,7 @@ impl PolicyChoice {
             PolicyName::Elsewhere(elsewhere) => elsewhere.open(self.elsewhere, sampling),
             PolicyName::Agent | PolicyName::Manual => {
                 let folder = match &self.checkpoint {
-                    Some(named) => policy_source::folder_of(named),
+                    Some(named) => checkpoint::folder(named)?,
                     None => policy_source::shipped()?,
                 };
                 PolicySource::checkpoint(folder, sampling, asked)

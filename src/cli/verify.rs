@@ -8,7 +8,7 @@ use clap::Args;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
-use super::{jobs, streams};
+use super::{checkpoint, jobs, streams};
 use crate::agent::policy_source;
 use crate::episode::record::Author;
 use crate::eval::verify::{Difference, Mismatch, verify};
@@ -43,12 +43,13 @@ impl Verify {
     /// When the run or its tasks cannot be read.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let run = RecordedRun::open(&self.run, self.tasks.as_deref())?;
+        let checkpoint = self.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
         let mut find = |author: &Author| {
             policy_source::find(
                 author.policy.as_str(),
                 author.checkpoint.as_deref(),
                 (author.sampling, author.deciding),
-                self.checkpoint.as_deref(),
+                checkpoint.as_deref(),
             )
         };
         let (mut progress, total) = (Progress::new(), run.episodes.len() as u64);

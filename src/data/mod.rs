@@ -8,6 +8,7 @@ pub mod alfred;
 pub mod dataset;
 pub mod features;
 pub(crate) mod folder_lock;
+pub(crate) mod hub;
 pub mod items;
 pub mod json;
 pub(crate) mod line_log;

@@ -1,6 +1,7 @@
 //! Policies that were exported to one file, ONNX or TorchScript, with a description beside it.
 
 mod answer;
+mod format;
 mod frame_stack;
 mod house;
 mod inputs;
@@ -14,6 +15,6 @@ mod torchscript;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use format::Format;
 pub(crate) use frame_stack::FrameStack;
-pub(crate) use model::Format;
 pub(crate) use policy::ExportedPolicy;

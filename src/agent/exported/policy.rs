@@ -7,9 +7,10 @@ use anyhow::{Context, anyhow, ensure};
 use sha2::{Digest, Sha256};
 
 use super::answer::Answer;
+use super::format::{self, Format};
 use super::frame_stack::FrameStack;
 use super::inputs::{planes, stack, tokens};
-use super::model::{self, Format, Input, Model};
+use super::model::{Input, Model};
 use super::spec::{InstructionSpec, PolicySpec};
 use super::{house, own};
 use crate::agent::decision::Decision;
@@ -53,7 +54,7 @@ impl ExportedPolicy {
         let make = {
             let (path, name, chosen) = (path.to_owned(), name.clone(), chosen.clone());
             move || -> anyhow::Result<Box<dyn Policy>> {
-                let model = model::open(&path, format, &spec)?;
+                let model = format::open(&path, format, &spec)?;
                 // What was opened is what the run's manifest names.
                 ensure!(hash(&path)? == chosen, "{}: it was replaced while the run was under way", path.display());
                 let (name, spec, sentences) = (name.clone(), spec.clone(), sentences.clone());
@@ -76,7 +77,7 @@ impl ExportedPolicy {
         self.state.look(planes, here.step, self.spec.frames.history);
         let frames = Input::Floats(stack(&self.state.seen, &self.spec.frames));
         let inputs = std::iter::once(frames).chain(self.instruction(here.instruction)?).collect();
-        let answer = Answer::read(model::run(self.model.as_mut(), &self.spec, inputs)?, &self.spec)?;
+        let answer = Answer::read(format::run(self.model.as_mut(), &self.spec, inputs)?, &self.spec)?;
         let selection = if self.samples { Selection::Sample(&mut self.state.rng) } else { Selection::Greedy };
         let candidates = here.environment.legal_actions()?;
         let decision = match here.environment.own() {
