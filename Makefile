@@ -22,6 +22,7 @@ test: setup ## set up, and run all tests
 PYTHON_TESTS := target/python
 test-python: $(PYTHON_TESTS)/installed ## install environments in Python, and test sprint_env with them
 	cd assets/python && SPRINT=$(wildcard $(CURDIR)/target/release/sprint) $(CURDIR)/$(PYTHON_TESTS)/bin/python -B -m unittest -q
+	$(if $(wildcard target/release/sprint),SPRINT_REQUIRE_DATA=python cargo test --release --locked --test sprint -- babyai::)
 
 python-packages: $(PYTHON_TESTS)/installed
 

@@ -5,6 +5,7 @@
 
 mod alfred;
 mod annotation;
+mod babyai;
 mod circles;
 mod completions;
 mod explore;

@@ -2,7 +2,7 @@
 //! test fails.
 //!
 //! `SPRINT_REQUIRE_DATA` lists what is required, for instance `shared encoder agents slurm`. Unset, a machine that sets `CI`
-//! requires all but Slurm.
+//! requires all but Slurm and Python's packages.
 
 // Unit tests and the tests of the program both include this file, and each uses a part of it.
 #![allow(dead_code)]
@@ -19,6 +19,8 @@ pub(crate) enum Need {
     Agents,
     /// A Slurm to start on this machine.
     Slurm,
+    /// Environments in Python.
+    Python,
 }
 
 impl Need {
@@ -28,6 +30,7 @@ impl Need {
             Need::Encoder => "encoder",
             Need::Agents => "agents",
             Need::Slurm => "slurm",
+            Need::Python => "python",
         }
     }
 
@@ -38,6 +41,7 @@ impl Need {
             }
             Need::Encoder => "run `make setup`",
             Need::Agents => "check out `checkpoints` whole",
+            Need::Python => "run `make python-packages`",
             Need::Slurm => "install slurmctld, slurmd, slurm-client and munge, and run the tests as root",
         }
     }
@@ -46,7 +50,7 @@ impl Need {
 fn is_required(need: Need, listed: Option<&str>, ci: bool) -> bool {
     match listed {
         Some(list) => list.split_whitespace().any(|word| word == need.word()),
-        None => ci && need != Need::Slurm,
+        None => ci && ![Need::Slurm, Need::Python].contains(&need),
     }
 }
 
@@ -111,10 +115,11 @@ pub(crate) fn alfred() -> Option<PathBuf> {
 }
 
 #[test]
-fn what_is_listed_is_required_and_a_ci_machine_requires_all_but_slurm() {
+fn what_is_listed_is_required_and_a_ci_machine_requires_all_but_slurm_and_python() {
     assert!(is_required(Need::Encoder, Some("encoder slurm"), false));
     assert!(!is_required(Need::Shared, Some("encoder slurm"), true));
     assert!(!is_required(Need::Shared, Some(""), true));
     assert!(is_required(Need::Shared, None, true) && !is_required(Need::Slurm, None, true));
+    assert!(is_required(Need::Python, Some("python"), false) && !is_required(Need::Python, None, true));
     assert!(!is_required(Need::Agents, None, false));
 }

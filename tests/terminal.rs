@@ -42,7 +42,18 @@ impl Session {
     }
 
     /// With settings and state in a folder that stays.
-    pub(crate) fn open(state: &Path, (cols, rows): (u16, u16), command: &str, arguments: &[&str]) -> Session {
+    pub(crate) fn open(state: &Path, size: (u16, u16), command: &str, arguments: &[&str]) -> Session {
+        Session::open_where(state, size, command, arguments, &[])
+    }
+
+    /// The same, with these environment variables.
+    pub(crate) fn open_where(
+        state: &Path,
+        (cols, rows): (u16, u16),
+        command: &str,
+        arguments: &[&str],
+        variables: &[(&str, &Path)],
+    ) -> Session {
         let pair = native_pty_system().openpty(size(cols, rows)).unwrap();
         let mut line = CommandBuilder::new(env!("CARGO_BIN_EXE_sprint"));
         line.arg(command);
@@ -62,6 +73,9 @@ impl Session {
         line.env("XDG_RUNTIME_DIR", runtime);
         if let Some(home) = encoder_home() {
             line.env("SPRINT_HOME", home);
+        }
+        for (name, value) in variables {
+            line.env(name, value);
         }
         let child = pair.slave.spawn_command(line).unwrap();
         drop(pair.slave);

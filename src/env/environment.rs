@@ -91,6 +91,11 @@ pub(crate) trait Environment: Send {
         None
     }
 
+    /// The seed by which the episode was reset, where one says how it starts.
+    fn seed(&self) -> Option<u64> {
+        None
+    }
+
     /// How many subtasks are done and of how many, where the environment grades.
     fn grading(&self) -> Option<(usize, usize)> {
         None
@@ -151,6 +156,10 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
 
     fn fingerprint(&self) -> Option<String> {
         (**self).fingerprint()
+    }
+
+    fn seed(&self) -> Option<u64> {
+        (**self).seed()
     }
 
     fn grading(&self) -> Option<(usize, usize)> {

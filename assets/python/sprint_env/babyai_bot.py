@@ -1,81 +1,89 @@
-"""BabyAI's own bot as a policy.
+"""BabyAI's own bot behind `--policy ws:HOST:PORT`, for environments `gym:BabyAI-...`:
 
-The bot plans on the level itself, which no picture shows whole, so it plays in a copy of its own. Which level that has to be
-a copy of is recognised by the pictures: those of every seed that it is told to expect are compared with what it sees.
+    python -m sprint_env.babyai_bot --port 8000
+
+The bot plans on the level itself, which no picture shows whole, so it plays in a copy of its own: that of the seed by which the
+environment was reset. What was done since then it gives along with every answer, so that it finds its way wherever an explorer
+goes back to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import argparse
 from typing import Any
 
 from minigrid.utils.baby_ai_bot import BabyAIBot
 
 from .environment import CannotDo
-from .gym_environment import frame_of
 from .make_gym import make
 from .minigrid_environment import MinigridEnvironment
 
+#: How `--env` names environments of Gymnasium.
+GYM = "gym:"
+
 
 class BabyAIBotPolicy:
-    """Call `begin` where an episode begins, then the policy itself with what is seen at each step."""
+    """The bot, told of episodes and observations as a policy server is."""
 
-    def __init__(self, level: str, seeds: Iterable[int], tile: int = 8):
-        self.level = level
-        self.tile = tile
-        #: The seeds of the levels that begin with a picture and a mission.
-        self.known: dict[tuple[bytes, str], list[int]] = {}
-        environment = self._make()
-        self.actions = environment.action_names
-        for seed in seeds:
-            seen = environment.reset(seed, None)
-            self.known.setdefault((seen.frame.rgb, seen.mission), []).append(seed)
-        self.copies: list[_Copy] | None = None
+    def __init__(self) -> None:
+        self.level: MinigridEnvironment | None = None
+        self.name = ""
+        self.seed: int | None = None
+        self.copy: _Copy | None = None
 
-    def begin(self) -> None:
-        """Forgets the last episode."""
-        self.copies = None
+    def begin(self, episode: dict[str, Any]) -> None:
+        """An episode begins in the level of that name and seed."""
+        name, self.seed = episode["task"]["environment"], episode["task"].get("environment_seed")
+        if not name.startswith(f"{GYM}BabyAI-"):
+            raise CannotDo(f"{name} is no level of BabyAI, such as {GYM}BabyAI-GoToLocal-v0")
+        if name != self.name:
+            level = make(name.removeprefix(GYM), 8, {})
+            if not isinstance(level, MinigridEnvironment):
+                raise CannotDo(f"{name} is no level of BabyAI")
+            self.name, self.level = name, level
+        self.copy = None
 
-    def __call__(self, pixels: Any, mission: str, last_action: str | None = None) -> str:
-        """What the bot would do, by name. `last_action` is what was done where that was not what it said."""
-        seen = frame_of(pixels).rgb
-        if self.copies is None:
-            seeds = self.known.get((seen, mission), [])
-            self.copies = [_Copy(self._make(), seed) for seed in seeds]
-        else:
-            # Levels that look alike at first part ways later.
-            alike = (copy for copy in self.copies if copy.step(last_action) == seen)
-            self.copies = list(alike)
-        if not self.copies:
-            raise CannotDo(f"no level of {self.level} with an expected seed looks like this one ({mission!r})")
-        for copy in self.copies[1:]:
-            copy.advise()
-        return self.copies[0].advise()
-
-    def _make(self) -> MinigridEnvironment:
-        environment = make(self.level, self.tile, {})
-        if not isinstance(environment, MinigridEnvironment):
-            raise CannotDo(f"{self.level} is no level of BabyAI")
-        return environment
+    def act(self, observation: dict[str, Any]) -> dict[str, Any]:
+        """What the bot would do, and what was done before."""
+        if self.seed is None or self.level is None:
+            raise CannotDo("the bot has to be told the seed of the level")
+        done = list(observation["state"] or [])
+        # Asked twice at one step it has been told of the last action already.
+        if observation["step"] > len(done):
+            done.append(observation["last_action"])
+        if len(done) != observation["step"] or None in done:
+            raise CannotDo("the bot has to see an episode from its start")
+        if self.copy is None or self.copy.done not in (done, done[:-1]):
+            self.copy = _Copy(self.level, self.seed)
+        for action in done[len(self.copy.done) :]:
+            self.copy.step(action)
+        return {"action": self.copy.advice, "state": done}
 
 
 class _Copy:
     """A level of one seed, with the bot in it."""
 
-    def __init__(self, environment: MinigridEnvironment, seed: int):
-        self.environment = environment
-        self.names = environment.action_names
-        environment.reset(seed, None)
-        self.bot = BabyAIBot(environment.level)
-        self.advice: str | None = None
-        self.taken: str | None = None
+    def __init__(self, level: MinigridEnvironment, seed: int):
+        self.environment = level
+        level.reset(seed, None)
+        self.bot = BabyAIBot(level.level)
+        self.done: list[str] = []
+        self.advice = self._advise(None)
 
-    def step(self, action: str | None) -> bytes:
-        """Does what was done, or what was advised; what is seen then."""
-        self.taken = action or self.advice
-        return self.environment.step(self.taken, None).frame.rgb
+    def step(self, action: str) -> None:
+        """Does what was done, and asks the bot what it would do then."""
+        self.environment.step(action, None)
+        self.done.append(action)
+        self.advice = self._advise(action)
 
-    def advise(self) -> str:
-        taken = None if self.taken is None else self.environment.level.actions[self.taken]
-        self.advice = self.names[int(self.bot.replan(taken))]
-        return self.advice
+    def _advise(self, taken: str | None) -> str:
+        action = None if taken is None else self.environment.level.actions[taken]
+        return self.environment.action_names[int(self.bot.replan(action))]
+
+
+if __name__ == "__main__":
+    from .policy_server import serve
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--port", type=int, default=8000)
+    serve(BabyAIBotPolicy, parser.parse_args().port, "babyai-bot")

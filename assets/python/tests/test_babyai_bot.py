@@ -1,49 +1,71 @@
-"""BabyAI's own bot as a policy that is told pictures and missions alone."""
+"""BabyAI's own bot as a policy server is told of levels."""
 
 import unittest
 
-import numpy
-
 from sprint_env.babyai_bot import BabyAIBotPolicy
-from sprint_env.environment import CannotDo, Observation
+from sprint_env.environment import CannotDo
 from sprint_env.make_gym import make
 
 LEVEL = "BabyAI-GoToLocal-v0"
 
 
-def pixels(seen: Observation) -> numpy.ndarray:
-    return numpy.frombuffer(seen.frame.rgb, numpy.uint8).reshape(seen.frame.height, seen.frame.width, 3)
+class Episode:
+    """An episode as the program plays it: what the bot gave as its state comes back."""
+
+    def __init__(self, bot: BabyAIBotPolicy, seed: int):
+        self.bot = bot
+        self.environment = make(LEVEL, 8, {})
+        self.seen = self.environment.reset(seed, None)
+        self.step, self.state, self.last = 0, None, None
+        bot.begin({"task": {"environment": f"gym:{LEVEL}", "environment_seed": seed, "seed": 0, "step": 0}})
+
+    def ask(self) -> str:
+        answer = self.bot.act({"step": self.step, "state": self.state, "last_action": self.last})
+        self.state = answer["state"]
+        return answer["action"]
+
+    def take(self, action: str) -> None:
+        self.seen = self.environment.step(action, None)
+        self.step, self.last = self.step + 1, action
 
 
 class BabyAIBotTest(unittest.TestCase):
-    def test_it_solves_every_level_that_it_expects(self) -> None:
-        bot = BabyAIBotPolicy(LEVEL, range(40))
-        environment = make(LEVEL, 8, {})
+    def test_it_solves_every_level(self) -> None:
+        bot = BabyAIBotPolicy()
         for seed in range(40):
-            seen = environment.reset(seed, None)
-            bot.begin()
-            while not seen.done:
-                seen = environment.step(bot(pixels(seen), seen.mission), None)
-            self.assertTrue(seen.success, f"seed {seed}")
+            episode = Episode(bot, seed)
+            while not episode.seen.done:
+                episode.take(episode.ask())
+            self.assertTrue(episode.seen.success, f"seed {seed}")
 
     def test_it_finds_its_way_from_where_others_led_it(self) -> None:
-        bot = BabyAIBotPolicy(LEVEL, range(5))
-        environment = make(LEVEL, 8, {})
-        seen = environment.reset(3, None)
-        bot(pixels(seen), seen.mission)
+        episode = Episode(BabyAIBotPolicy(), 3)
         for _ in range(2):
-            seen = environment.step("left", None)
-            advice = bot(pixels(seen), seen.mission, "left")
-        while not seen.done:
-            seen = environment.step(advice, None)
-            advice = None if seen.done else bot(pixels(seen), seen.mission)
-        self.assertTrue(seen.success)
+            episode.ask()
+            episode.take("left")
+        while not episode.seen.done:
+            episode.take(episode.ask())
+        self.assertTrue(episode.seen.success)
 
-    def test_an_unexpected_level_is_refused(self) -> None:
-        bot = BabyAIBotPolicy(LEVEL, range(5))
-        seen = make(LEVEL, 8, {}).reset(99, None)
-        with self.assertRaisesRegex(CannotDo, "no level of BabyAI-GoToLocal-v0"):
-            bot(pixels(seen), seen.mission)
+    def test_going_back_gives_the_same_advice_again(self) -> None:
+        episode = Episode(BabyAIBotPolicy(), 5)
+        advice, carried = [], [(episode.step, episode.state, episode.last)]
+        for _ in range(3):
+            advice.append(episode.ask())
+            self.assertEqual(episode.ask(), advice[-1], "asked twice it says the same")
+            episode.take(advice[-1])
+            carried.append((episode.step, episode.state, episode.last))
+        episode.step, episode.state, episode.last = carried[1]
+        self.assertEqual(episode.ask(), advice[1])
+
+    def test_what_it_cannot_play_is_refused(self) -> None:
+        bot = BabyAIBotPolicy()
+        with self.assertRaisesRegex(CannotDo, "no level of BabyAI"):
+            bot.begin({"task": {"environment": "gym:CartPole-v1", "environment_seed": 1}})
+        episode = Episode(bot, 1)
+        episode.step = 2
+        with self.assertRaisesRegex(CannotDo, "from its start"):
+            episode.ask()
 
 
 if __name__ == "__main__":

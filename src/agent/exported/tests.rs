@@ -6,6 +6,9 @@ use super::{ExportedPolicy, Format};
 use crate::agent::{Decision, Observation, Policy};
 use crate::domain::{Action, ActionType};
 use crate::env::HouseEnvironment;
+use crate::env::remote::testing::{Fault, serve};
+use crate::env::remote::{Elsewhere, RemoteEnvironment, Sessions};
+use crate::episode::rollout::{End, Rollout};
 use crate::house::testing::kitchen_house;
 
 /// A protobuf field of bytes.
@@ -40,17 +43,19 @@ fn node(kind: &str, inputs: &[&str], output: &str) -> Vec<u8> {
     [inputs, bytes(2, output.as_bytes()), bytes(4, kind.as_bytes())].concat()
 }
 
-/// An ONNX file: frames [1, 3, 2, 2] times weights [12, 3] are the logits of three actions.
+/// An ONNX file: frames of that shape times weights, a row a number, are the logits of actions.
 fn onnx(weights: &[f32], input: &str, frames: &[u64]) -> Vec<u8> {
     let data: Vec<u8> = weights.iter().flat_map(|weight| weight.to_le_bytes()).collect();
-    let tensor = [number(1, 12), number(1, 3), number(2, 1), bytes(8, b"weights"), bytes(9, &data)].concat();
+    let rows: u64 = frames[1..].iter().product();
+    let columns = weights.len() as u64 / rows;
+    let tensor = [number(1, rows), number(1, columns), number(2, 1), bytes(8, b"weights"), bytes(9, &data)].concat();
     let graph = [
         bytes(1, &node("Flatten", &[input], "flat")),
         bytes(1, &node("MatMul", &["flat", "weights"], "actions")),
         bytes(2, b"policy"),
         bytes(5, &tensor),
         bytes(11, &port(input, frames)),
-        bytes(12, &port("actions", &[1, 3])),
+        bytes(12, &port("actions", &[1, columns])),
     ]
     .concat();
     [number(1, 8), bytes(7, &graph), bytes(8, &number(2, 17))].concat()
@@ -166,6 +171,29 @@ fn actions_and_classes_that_house_has_not_are_named() {
     assert_eq!(fits(json!({})), Ok(()));
     let told = fits(json!({"actions": ["LookDown", "left", "MoveAhead"]})).unwrap_err();
     assert!(told.contains("its action \"left\" is none of House's: MoveAhead"), "{told}");
+}
+
+#[test]
+fn a_model_acts_in_an_environment_with_actions_of_its_own_and_is_refused_where_it_does_not_fit() {
+    let env = || {
+        let session = Sessions::new(Elsewhere::default()).get(0, &serve(Fault::None)).unwrap();
+        RemoteEnvironment::begin(session, 2).unwrap()
+    };
+    let policy = |(width, height): (u64, u64), actions: [&str; 2]| {
+        let spec = json!({"format_version": 1, "frames": {"height": height, "width": width}, "actions": actions});
+        let weights = [1.0, 0.5].repeat((3 * width * height) as usize);
+        let (_folder, path) = described(&onnx(&weights, "frames", &[1, 3, height, width]), &spec);
+        (ExportedPolicy::source(&path, Format::Onnx, false).unwrap().make)().unwrap()
+    };
+    let refusal =
+        |policy: Box<dyn Policy>| policy.check_fits(&mut Observation::start(&mut env())).unwrap_err().to_string();
+    assert_eq!(refusal(policy((4, 3), ["right", "up"])), "its action \"up\" is none of the environment's: left, right");
+    assert!(refusal(policy((2, 2), ["right", "left"])).contains("the frames are 4 x 3, and the policy takes 2 x 2"));
+    let mut policy = policy((4, 3), ["right", "left"]);
+    policy.check_fits(&mut Observation::start(&mut env())).unwrap();
+    let mut rollout = Rollout::new(env(), "go to the right end".into(), Some(9));
+    rollout.run(&mut *policy, &mut ()).unwrap();
+    assert_eq!((rollout.end(), rollout.steps()), (Some(End::Success), 5));
 }
 
 #[test]

@@ -40,6 +40,7 @@ pub(super) fn episode(here: &Observation<'_>, seed: u64) -> Value {
     let task = [
         ("name", here.instruction.into()),
         ("environment", here.environment.name().into()),
+        ("environment_seed", here.environment.seed().map_or(Value::Nil, Value::from)),
         ("seed", seed.into()),
         ("step", here.step.into()),
     ];

@@ -90,6 +90,10 @@ impl Environment for RemoteEnvironment {
         Some(self.present.digest.clone())
     }
 
+    fn seed(&self) -> Option<u64> {
+        Some(self.seed).filter(|_| self.session.capabilities.seeds != Some(false))
+    }
+
     fn grading(&self) -> Option<(usize, usize)> {
         self.present.grading()
     }
