@@ -211,6 +211,19 @@ fn a_served_environment_is_explored_on_a_screen() {
     session.see("seed 3");
     session.press(" ");
     session.see("over: done");
+    session.press(":run on\r");
+    session.see("run stands alone");
+    session.press(":goto 999\r");
+    session.see("there is no step 999");
+    // Nothing is lost unasked.
+    session.press("N");
+    session.see("S saves, the same again forgets them");
+    session.press("q");
+    session.see("S saves, the same again leaves");
+    session.press("h");
+    session.miss("the same again");
+    session.press(":quit\r");
+    session.see("S saves, the same again leaves");
     session.press("q");
     assert_eq!(session.end(), 0);
     session.is_restored();

@@ -22,7 +22,7 @@ const LIBRARIES: [(&str, &[&str]); 10] = [
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("indicatif", &["cli"]),
-    ("ureq", &["data", "train"]),
+    ("ureq", &["data", "nets"]),
 ];
 
 /// The commands that use a screen: those that open one, and the one that says what the terminal can draw.

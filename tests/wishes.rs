@@ -173,3 +173,21 @@ fn a_task_that_only_says_an_instruction_is_evaluated_as_it_is_read() {
     let error = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(!refused.status.success() && error.contains("tasks[0].subtasks: none"), "{error}");
 }
+
+#[test]
+fn an_opened_episode_failed_for_the_reason_that_its_evaluation_gave() {
+    let sprint = crate::program::Sprint::new();
+    sprint.sample("tasks.json", 1, 6);
+    assert_eq!(sprint.run("eval --tasks tasks.json --policy random --out run").code, Some(0));
+    let mut failed = 0;
+    for (number, line) in (1..).zip(sprint.read("run/episodes.jsonl").lines()) {
+        let record: serde_json::Value = serde_json::from_str(line).unwrap();
+        let mut open = assert_cmd::Command::from_std(sprint.command(&format!("open run#{number} --plain")));
+        let output = open.write_stdin("last\nwishes\n").output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let wish = text.lines().find_map(|line| serde_json::from_str::<serde_json::Value>(line).ok()).unwrap();
+        assert_eq!(wish["failure"], record["failure"], "episode {number}: {text}");
+        failed += usize::from(!record["failure"].is_null());
+    }
+    assert!(failed > 2, "chance hardly ever does what is asked");
+}

@@ -65,6 +65,15 @@ impl OwnCommand {
         };
         let needed = || rest.parse::<u64>().map_err(|_| format!("{word}: {rest:?} is not a number"));
         let text = || if rest.is_empty() { Err(format!("{word} needs words after it")) } else { Ok(rest.to_owned()) };
+        // What is passed over in silence would be taken for understood.
+        let stands_alone =
+            matches!(word, "run" | "chance" | "agent" | "next" | "reset" | "branches" | "look" | "quit" | "q");
+        if stands_alone && !rest.is_empty() {
+            return Err(format!("{word} stands alone: {rest:?} is nothing that it takes"));
+        }
+        if matches!(word, "step" | "n" | "back" | "h" | "forward" | "l") && number(1)? == 0 {
+            return Err(format!("{word}: 0 times is nothing to do"));
+        }
         match word {
             "step" | "n" => Ok(OwnCommand::Step(number(1)?)),
             "run" => Ok(OwnCommand::Run),
@@ -101,9 +110,14 @@ mod tests {
         assert_eq!(OwnCommand::parse("act open red door"), Ok(OwnCommand::Act("open red door".into())));
         assert_eq!(OwnCommand::parse("instruct"), Ok(OwnCommand::Instruct(String::new())));
         assert_eq!(OwnCommand::parse("break reward"), Ok(OwnCommand::Break(OwnCondition::Reward)));
-        for (line, told) in
-            [("dance", "none of: step"), ("goto x", "not a number"), ("act", "needs words"), ("break it", "sees NAME")]
-        {
+        for (line, told) in [
+            ("dance", "none of: step"),
+            ("goto x", "not a number"),
+            ("act", "needs words"),
+            ("run on", "stands alone"),
+            ("step 0", "nothing to do"),
+            ("break it", "sees NAME"),
+        ] {
             assert!(OwnCommand::parse(line).unwrap_err().contains(told), "{line}");
         }
     }

@@ -34,6 +34,8 @@ pub(crate) struct OwnExploration {
     instruction: Arc<str>,
     /// Who acts or what is told was changed since the state in hand was reached.
     redirected: bool,
+    /// How many states a run folder holds already.
+    pub(super) saved: usize,
     /// When a run stops.
     pub(crate) conditions: Vec<OwnCondition>,
 }
@@ -101,6 +103,7 @@ impl OwnExploration {
             acting,
             instruction: Arc::from(""),
             redirected: false,
+            saved: 1,
             conditions: Vec::new(),
         };
         exploration.instruction = exploration.mission().into();
@@ -127,10 +130,15 @@ impl OwnExploration {
         self.acting.decided = None;
         self.acting.policy.reset(0, seed);
         self.tree = OwnTree::new(start_state(&rollout, &self.acting)?);
-        (self.rollout, self.seed, self.real) = (rollout, seed, 0);
+        (self.rollout, self.seed, self.real, self.saved) = (rollout, seed, 0, 1);
         (self.differs_at, self.was_retraced, self.redirected) = (None, false, false);
         self.instruction = self.mission().into();
         Ok(())
+    }
+
+    /// Steps that no run folder holds: they would be lost.
+    pub(crate) fn unsaved(&self) -> usize {
+        self.tree.len().saturating_sub(self.saved)
     }
 
     /// The environment's name.

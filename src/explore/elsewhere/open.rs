@@ -57,6 +57,7 @@ impl OwnExploration {
         }
         exploration.was_retraced = true;
         exploration.seek(step);
+        exploration.saved = exploration.tree.len();
         Ok(exploration)
     }
 }

@@ -18,12 +18,13 @@ impl OwnExploration {
     ///
     /// # Errors
     /// When the folder holds something else, or cannot be written to.
-    pub(crate) fn save(&self, path: Option<PathBuf>) -> anyhow::Result<String> {
+    pub(crate) fn save(&mut self, path: Option<PathBuf>) -> anyhow::Result<String> {
         let path = path.unwrap_or_else(|| {
             let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
             default_path::default_path("explored", since, &|path| path.exists())
         });
         self.write(&path)?;
+        self.saved = self.tree.len();
         let many = self.tree.branches().len();
         let what = if many == 1 { "branch".to_string() } else { format!("{many} branches") };
         Ok(format!("wrote the {what} as {}; sprint open shows it again", path.display()))

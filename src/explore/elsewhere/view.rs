@@ -42,6 +42,8 @@ pub(crate) struct OwnPicture {
     pub(crate) exactness: String,
     pub(crate) policy: String,
     pub(crate) conditions: Vec<String>,
+    /// Steps that no run folder holds.
+    pub(crate) unsaved: usize,
     /// What is worth seeing of each step of the branch in hand.
     pub(crate) marks: Vec<StepMark>,
 }
@@ -81,6 +83,7 @@ impl OwnExploration {
         };
         OwnPicture {
             marks: tree.story().into_iter().filter_map(mark).collect(),
+            unsaved: self.unsaved(),
             name: self.name().to_string(),
             seed: self.seed(),
             instruction: self.instruction().to_owned(),

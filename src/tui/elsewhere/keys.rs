@@ -42,17 +42,18 @@ impl OwnApp {
             return KeyAnswer::Nothing;
         }
         let control = key.modifiers.contains(KeyModifiers::CONTROL);
+        let is_command = !matches!(self.mode, OwnMode::Typing(_));
+        if is_command && !matches!(key.code, KeyCode::Char('q' | 'N' | 'c')) {
+            self.asked = None;
+        }
         match key.code {
-            KeyCode::Char('c') if control => return KeyAnswer::Quit,
+            KeyCode::Char('c') if control => return self.quit(),
             KeyCode::Char('z') if control => return KeyAnswer::Stop,
             KeyCode::Char('l') if control => return KeyAnswer::Repaint,
             _ => {}
         }
         match self.mode.clone() {
-            OwnMode::Typing(what) => {
-                self.type_key(key, what);
-                KeyAnswer::Nothing
-            }
+            OwnMode::Typing(what) => self.type_key(key, what),
             OwnMode::Help => {
                 self.mode = OwnMode::Watch;
                 KeyAnswer::Nothing
@@ -63,36 +64,55 @@ impl OwnApp {
 
     /// Takes in what was pasted.
     pub(super) fn paste(&mut self, text: &str) {
-        if matches!(self.mode, OwnMode::Typing(_)) {
-            self.typed.extend(text.chars().filter(|c| !c.is_control()));
+        // As in House: what is pasted elsewhere is an instruction that begins.
+        if !matches!(self.mode, OwnMode::Typing(_)) {
+            self.type_what(Typed::Instruction);
         }
+        self.editor.paste(text);
     }
 
-    fn type_key(&mut self, key: KeyEvent, what: Typed) {
+    fn type_what(&mut self, what: Typed) {
+        self.mode = OwnMode::Typing(what);
+        self.editor.open("");
+    }
+
+    fn quit(&mut self) -> KeyAnswer {
+        if self.is_sure(&OwnCommand::Quit) { KeyAnswer::Quit } else { KeyAnswer::Nothing }
+    }
+
+    fn type_key(&mut self, key: KeyEvent, what: Typed) -> KeyAnswer {
         match key.code {
-            KeyCode::Esc => {
-                self.typed.clear();
-                self.mode = OwnMode::Watch;
-            }
-            KeyCode::Backspace => drop(self.typed.pop()),
-            KeyCode::Char('u') if key.modifiers.contains(KeyModifiers::CONTROL) => self.typed.clear(),
-            KeyCode::Char(c) if !key.modifiers.contains(KeyModifiers::CONTROL) => self.typed.push(c),
+            KeyCode::Esc => self.mode = OwnMode::Watch,
+            KeyCode::Up => self.editor.travel(-1),
+            KeyCode::Down => self.editor.travel(1),
             KeyCode::Enter => {
-                let text = std::mem::take(&mut self.typed);
+                let text = self.editor.text().to_owned();
                 self.mode = OwnMode::Watch;
                 let command = match what {
-                    Typed::Instruction => Ok(OwnCommand::Instruct(text)),
-                    Typed::Comparison if text.trim().is_empty() => return,
-                    Typed::Comparison => Ok(OwnCommand::Compare(text)),
+                    Typed::Instruction => Ok(OwnCommand::Instruct(text.clone())),
+                    Typed::Comparison if text.trim().is_empty() => return KeyAnswer::Nothing,
+                    Typed::Comparison => Ok(OwnCommand::Compare(text.clone())),
                     Typed::Condition => OwnCondition::parse(&text).map(OwnCommand::Break),
                     Typed::Command => OwnCommand::parse(&text),
                 };
+                if !text.trim().is_empty() {
+                    self.editor.remember(&text);
+                }
                 match command {
-                    Ok(command) => self.ask(command),
+                    Ok(OwnCommand::Quit) => return self.quit(),
+                    Ok(command) => self.ask_surely(command),
                     Err(complaint) => self.said = Some((true, complaint)),
                 }
             }
-            _ => {}
+            _ => self.editor.key(key),
+        }
+        KeyAnswer::Nothing
+    }
+
+    /// Asks for something, where it loses nothing or is asked for again.
+    fn ask_surely(&mut self, command: OwnCommand) {
+        if !matches!(command, OwnCommand::Next | OwnCommand::Begin(_)) || self.is_sure(&command) {
+            self.ask(command);
         }
     }
 
@@ -100,7 +120,7 @@ impl OwnApp {
         let choosing = self.mode == OwnMode::Choosing;
         let many = self.shown.as_ref().map_or(0, |shown| shown.choices.len());
         match key.code {
-            KeyCode::Char('q') => return KeyAnswer::Quit,
+            KeyCode::Char('q') => return self.quit(),
             KeyCode::Esc => (self.mode, self.compared) = (OwnMode::Watch, None),
             KeyCode::Char('j') | KeyCode::Down if choosing => {
                 self.marked = (self.marked + 1).min(many.saturating_sub(1))
@@ -119,17 +139,17 @@ impl OwnApp {
             KeyCode::Char('$') | KeyCode::End => self.ask(OwnCommand::Goto(u32::MAX)),
             KeyCode::Char('x') => self.ask(OwnCommand::Chance),
             KeyCode::Char('a') => self.ask(OwnCommand::Agent),
-            KeyCode::Char('N') => self.ask(OwnCommand::Next),
+            KeyCode::Char('N') => self.ask_surely(OwnCommand::Next),
             KeyCode::Char('r') => self.ask(OwnCommand::Reset),
             KeyCode::Char('S') => self.ask(OwnCommand::Save(None)),
             KeyCode::Char('t') => {
                 let next = self.shown.as_ref().map_or(1, |shown| shown.branch.1 % shown.branch.2 + 1);
                 self.ask(OwnCommand::Branch(next));
             }
-            KeyCode::Char('i') => self.mode = OwnMode::Typing(Typed::Instruction),
-            KeyCode::Char('B') => self.mode = OwnMode::Typing(Typed::Comparison),
-            KeyCode::Char('b') => self.mode = OwnMode::Typing(Typed::Condition),
-            KeyCode::Char(':') => self.mode = OwnMode::Typing(Typed::Command),
+            KeyCode::Char('i') => self.type_what(Typed::Instruction),
+            KeyCode::Char('B') => self.type_what(Typed::Comparison),
+            KeyCode::Char('b') => self.type_what(Typed::Condition),
+            KeyCode::Char(':') => self.type_what(Typed::Command),
             KeyCode::Char('?') => self.mode = OwnMode::Help,
             _ => {}
         }

@@ -11,7 +11,9 @@ use super::worker::{OwnEvent, Told};
 use crate::explore::elsewhere::command::OwnCommand;
 use crate::explore::elsewhere::view::{OwnChoice, OwnPicture};
 use crate::house::view::Frame;
+use crate::language::count::counted;
 use crate::tui::app::{Graphics, Traffic};
+use crate::tui::editor::Editor;
 use crate::tui::graphics::letters::Letters;
 use crate::tui::graphics::overlay::Overlay;
 use crate::tui::graphics::{Job, Picture, Protocol};
@@ -61,7 +63,9 @@ pub(crate) struct OwnApp {
     pub(super) said: Option<(bool, String)>,
     pub(super) compared: Option<Vec<(String, Vec<OwnChoice>)>>,
     pub(super) mode: OwnMode,
-    pub(super) typed: String,
+    pub(super) editor: Editor,
+    /// What would lose steps, and was asked for once.
+    pub(super) asked: Option<OwnCommand>,
     /// Which choice is marked.
     pub(super) marked: usize,
     /// Since when the environment is waited for, and for how many commands.
@@ -91,7 +95,8 @@ impl OwnApp {
             said: None,
             compared: None,
             mode: OwnMode::Watch,
-            typed: String::new(),
+            editor: Editor::default(),
+            asked: None,
             marked: 0,
             waiting: Some((Instant::now(), 1)),
             runs: false,
@@ -115,6 +120,19 @@ impl OwnApp {
         let (since, many) = self.waiting.unwrap_or_else(|| (Instant::now(), 0));
         self.waiting = Some((since, many + 1));
         self.compared = None;
+    }
+
+    /// Whether something that would lose steps was asked for again: the first time it is said what would be lost.
+    pub(super) fn is_sure(&mut self, command: &OwnCommand) -> bool {
+        let unsaved = self.shown.as_ref().map_or(0, |shown| shown.unsaved);
+        if unsaved == 0 || self.asked.as_ref() == Some(command) {
+            return true;
+        }
+        self.asked = Some(command.clone());
+        let what = if *command == OwnCommand::Quit { "leaves" } else { "forgets them" };
+        let steps = counted(unsaved, "step");
+        self.said = Some((true, format!("Not saved: {steps}. S saves, the same again {what}")));
+        false
     }
 
     /// Takes in what the worker tells.

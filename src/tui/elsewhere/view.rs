@@ -80,7 +80,9 @@ impl OwnApp {
             _ => None,
         };
         if let Some(label) = typing {
-            line(buf, area, vec![Span::styled(label, THEME.key), Span::raw(self.typed.clone()), Span::raw("▏")]);
+            line(buf, area, vec![Span::styled(label, THEME.key)]);
+            let typed = area.width.saturating_sub(label.len() as u16);
+            self.editor.area().render(Rect { x: area.x + area.width - typed, width: typed, ..area }, buf);
             return;
         }
         let label = if shown.is_told { "told: " } else { "asked: " };

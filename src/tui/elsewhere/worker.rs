@@ -131,7 +131,11 @@ impl Worker {
                 let step = i64::from(exploration.tree().present().step) + by;
                 exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
             }
-            OwnCommand::Goto(step) => exploration.seek(step),
+            OwnCommand::Goto(step) => {
+                let last = exploration.tree().length();
+                anyhow::ensure!(step <= last || step == u32::MAX, "there is no step {step}: the branch ends at {last}");
+                exploration.seek(step);
+            }
             OwnCommand::Act(text) => {
                 let action = exploration.action(&text)?;
                 let taken = exploration.act(action)?;

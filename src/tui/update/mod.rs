@@ -10,7 +10,7 @@ mod pointer;
 pub(crate) use effect::{Effect, ExitReason};
 pub(crate) use on_action::on_action;
 
-use crossterm::event::{KeyEvent, KeyEventKind, MouseEvent};
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseEvent};
 use ratatui::layout::Size;
 
 use crate::explore::session::{SessionCommand, SessionEvent};
@@ -58,6 +58,14 @@ pub enum Msg {
 pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) if key.kind == KeyEventKind::Release => vec![],
+        // Over a slow link an Esc and the key after it come together, as Alt and that key. Nothing has such a key, unless a person
+        // set one.
+        Msg::Key(key) if is_escape_and_key(app, key) => {
+            let plain = KeyEvent { modifiers: key.modifiers.difference(KeyModifiers::ALT), ..key };
+            let mut effects = update(app, Msg::Key(KeyEvent::new(KeyCode::Esc, KeyModifiers::NONE)));
+            effects.extend(update(app, Msg::Key(plain)));
+            effects
+        }
         Msg::Mouse(event) => pointer::on_pointer(app, event),
         Msg::Key(key) => match key_after_notice(app, key).or_else(|| keys::verb(app.input.mode, app.page, key)) {
             // What cannot be seen is not begun.
@@ -134,6 +142,15 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
     }
 }
 
+/// Whether a key with Alt is an Esc and that key; where text is typed, Alt moves by words.
+fn is_escape_and_key(app: &App, key: KeyEvent) -> bool {
+    let is_text = matches!(app.input.mode, Mode::Typing | Mode::Palette);
+    key.modifiers.contains(KeyModifiers::ALT)
+        && matches!(key.code, KeyCode::Char(_))
+        && !is_text
+        && key_by_settings(app, key).is_none()
+}
+
 /// Whoever presses a key knows what keys are for, and has read what was noted.
 fn key_after_notice(app: &mut App, key: KeyEvent) -> Option<Verb> {
     app.input.newcomer = false;
@@ -150,8 +167,6 @@ fn key_by_settings(app: &App, key: KeyEvent) -> Option<Verb> {
 
 #[cfg(test)]
 mod tests {
-    use crossterm::event::{KeyCode, KeyModifiers};
-
     use super::pages::turn_to;
     use super::*;
     use crate::domain::{Action, ActionType};
@@ -258,6 +273,20 @@ mod tests {
             press(&mut app, KeyCode::Esc);
             assert_eq!(app.input.mode, Mode::Watch);
         }
+    }
+
+    #[test]
+    fn an_escape_that_comes_together_with_the_next_key_is_both() {
+        let mut app = app();
+        press(&mut app, KeyCode::Char('t'));
+        assert_eq!(app.page, ExplorerPage::Branches);
+        update(&mut app, Msg::Key(KeyEvent::new(KeyCode::Char('?'), KeyModifiers::ALT)));
+        assert_eq!((app.page, app.input.mode), (ExplorerPage::Main, Mode::Help));
+        press(&mut app, KeyCode::Esc);
+        press(&mut app, KeyCode::Char('i'));
+        type_text(&mut app, "one two");
+        update(&mut app, Msg::Key(KeyEvent::new(KeyCode::Char('b'), KeyModifiers::ALT)));
+        assert_eq!((app.input.mode, app.input.editor.text()), (Mode::Typing, "one two"), "a word back");
     }
 
     #[test]
