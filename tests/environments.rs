@@ -208,6 +208,8 @@ fn a_served_environment_is_explored_on_a_screen() {
     session.press("?");
     session.see("any key closes");
     session.press("?N");
+    session.see("Not saved: 2 steps");
+    session.press("N");
     session.see("seed 3");
     session.press(" ");
     session.see("over: done");

@@ -11,6 +11,7 @@ pub(crate) const TERMS: &[(&str, &str)] = &[
     ("Q, min Q", "value of one choice in this state; the lower one of the critics' estimates"),
     ("advantage", "Q less V: above 0 the choice is better than what is expected here"),
     ("masked", "left out of the choices because it is impossible now; the reason stands beside it"),
+    ("tried here", "masked: the agent did it already where it saw just the same; it may again once a thing was moved"),
     ("greedy", "the likeliest choice; `sample` draws by chance instead"),
     ("done .07", "how sure the agent is that it has done what it was told"),
     ("expert", "a planner that knows the house and the subtasks; it does not read the instruction"),

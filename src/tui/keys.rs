@@ -65,6 +65,16 @@ pub(crate) fn bindings(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &
     scopes.into_iter().flat_map(|scope| BINDINGS.iter().filter(move |binding| binding.scope == scope))
 }
 
+/// The same without those that mean something else on this page.
+pub(crate) fn bindings_in_force(mode: Mode, page: ExplorerPage) -> impl Iterator<Item = &'static Binding> {
+    let mut taken: Vec<KeyCode> = Vec::new();
+    bindings(mode, page).filter(move |binding| {
+        let is_taken = binding.codes.iter().all(|code| taken.contains(code));
+        taken.extend(&binding.codes);
+        !is_taken
+    })
+}
+
 /// What a key means in `mode` on `page`; `None` for nothing, or for text while typing.
 pub(crate) fn verb(mode: Mode, page: ExplorerPage, key: KeyEvent) -> Option<Verb> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ratatui::layout::{Rect, Size};
 
@@ -44,6 +44,9 @@ pub(super) enum Typed {
     /// It is a command.
     Command,
 }
+
+/// Waiting is told once it is worth telling.
+const PATIENT: Duration = Duration::from_millis(400);
 
 /// The state of the screen.
 pub(crate) struct OwnApp {
@@ -113,6 +116,11 @@ impl OwnApp {
         self.waiting.is_some()
     }
 
+    /// Whether it is waited for so long that this is worth telling.
+    pub(super) fn waits_long(&self) -> bool {
+        self.waiting.is_some_and(|(since, _)| since.elapsed() > PATIENT)
+    }
+
     /// Asks for something.
     pub(super) fn ask(&mut self, command: OwnCommand) {
         // A worker that is gone has said why.
@@ -125,7 +133,9 @@ impl OwnApp {
     /// Whether something that would lose steps was asked for again: the first time it is said what would be lost.
     pub(super) fn is_sure(&mut self, command: &OwnCommand) -> bool {
         let unsaved = self.shown.as_ref().map_or(0, |shown| shown.unsaved);
-        if unsaved == 0 || self.asked.as_ref() == Some(command) {
+        // While the environment is waited for nothing can be saved, and the screen says that one key leaves.
+        let is_stuck = *command == OwnCommand::Quit && self.waits_long();
+        if unsaved == 0 || is_stuck || self.asked.as_ref() == Some(command) {
             return true;
         }
         self.asked = Some(command.clone());

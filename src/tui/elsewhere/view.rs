@@ -13,9 +13,6 @@ use crate::explore::elsewhere::view::{OwnChoice, OwnPicture, StepMark};
 use crate::tui::theme::THEME;
 use crate::tui::view::panel::{fit, panel, wrap};
 
-/// Waiting is told once it is worth telling.
-const PATIENT: f32 = 0.4;
-
 impl Widget for &OwnApp {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let places = areas(area);
@@ -145,8 +142,8 @@ impl OwnApp {
 
     fn waits(&self, places: &Areas, buf: &mut Buffer) {
         let Some((since, _)) = self.waiting else { return };
-        let seconds = since.elapsed().as_secs_f32();
-        if seconds > PATIENT {
+        if self.waits_long() {
+            let seconds = since.elapsed().as_secs_f32();
             let words = format!("waiting for the environment, {seconds:.0} s; q leaves");
             let area = Rect { y: places.keys.y, ..places.keys };
             Clear.render(area, buf);

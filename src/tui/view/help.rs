@@ -49,7 +49,7 @@ fn content(app: &App, screen: Size) -> Content {
         return Content { lines: lines.collect(), columns: 1, names: TERM, width };
     }
     // A key that the one before it speaks for has no line of its own.
-    let bindings = keys::bindings(under(app), app.page).filter(|binding| !binding.label.is_empty());
+    let bindings = keys::bindings_in_force(under(app), app.page).filter(|binding| !binding.label.is_empty());
     let own = app.config.keys.iter().map(|key| (key.name.clone(), format!("{} (your own)", key.line)));
     let lines: Vec<_> =
         bindings.map(|binding| (binding.label.to_string(), binding.help.to_string())).chain(own).collect();

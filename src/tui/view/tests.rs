@@ -14,7 +14,7 @@ use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::{ExplorerPage, Verb};
 use crate::tui::app::App;
 use crate::tui::graphics::Protocol;
-use crate::tui::keys::{Mode, bindings};
+use crate::tui::keys::{Mode, bindings_in_force};
 use crate::tui::testing::{app, chained, decided, exploration, screen, snapshot, values};
 use crate::tui::theme::Ability;
 use crate::tui::update::{Effect, ExitReason, Msg, on_action, update};
@@ -178,7 +178,7 @@ fn help_is_whole_on_every_page_of_a_small_screen() {
             }
             on_action(&mut app, Verb::Help);
             let text = screen(&mut app);
-            let bindings = bindings(app.input.under, app.page).filter(|binding| !binding.label.is_empty());
+            let bindings = bindings_in_force(app.input.under, app.page).filter(|binding| !binding.label.is_empty());
             for binding in bindings {
                 let help = binding.help;
                 assert!(

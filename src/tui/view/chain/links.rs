@@ -52,7 +52,8 @@ impl Widget for Links<'_> {
                 ),
             ];
             for side in self.sides {
-                spans.extend([outcome(side.by_link.as_ref(), at), outcome(side.as_one.as_ref(), at)]);
+                spans.push(outcome(side.by_link.as_ref(), at));
+                spans.extend(columns.as_one.then(|| outcome(side.as_one.as_ref(), at)));
             }
             if columns.rates {
                 let rate = |rates: fn(&LinkSuccess) -> &Vec<LinkRate>| {
@@ -80,6 +81,7 @@ impl Widget for Links<'_> {
 /// Which columns there is room for, and what is left for the instruction.
 struct Columns {
     link: usize,
+    as_one: bool,
     rates: bool,
     values: bool,
 }
@@ -92,10 +94,17 @@ impl Columns {
             link -= if fits { columns } else { 0 };
             fits
         };
-        let rates = take(2 * RATE);
+        let mut rates = take(2 * RATE);
+        // On a small screen what was asked for last takes the place of what was found before.
+        let is_alone = sides.len() == 1 && sides[0].trials.is_some();
+        let as_one = rates || !is_alone;
+        if !as_one {
+            (rates, link) = (true, link + OUTCOME - 2 * RATE);
+            return Columns { link: link.max(1), as_one, rates, values: false };
+        }
         let has_values = sides[0].by_link.as_ref().is_some_and(|play| play.by_value);
         let values = has_values && take(3 * VALUE);
-        Columns { link: link.max(1), rates, values }
+        Columns { link: link.max(1), as_one, rates, values }
     }
 
     /// The names of the columns, and where there are two policies theirs above.
@@ -105,7 +114,10 @@ impl Columns {
         let mut head = format!("   {:<width$}", "link");
         for side in sides {
             names.push_str(&format!("{:<w$}", fit(&side.who.name, 2 * OUTCOME - 2), w = 2 * OUTCOME));
-            head.push_str(&format!("{:<OUTCOME$}{:<OUTCOME$}", "by link", "as one"));
+            head.push_str(&format!("{:<OUTCOME$}", "by link"));
+            if self.as_one {
+                head.push_str(&format!("{:<OUTCOME$}", "as one"));
+            }
         }
         if self.rates {
             let entry =
@@ -123,7 +135,7 @@ impl Columns {
 /// What the columns of values are, or why there are none.
 fn about(play: Option<&ChainRun>, shown: bool) -> &'static str {
     match play {
-        Some(play) if !play.by_value => "chaining targets (eq. 4, eq. 5): this checkpoint has no critic",
+        Some(play) if !play.by_value => "no chaining targets (eq. 4, eq. 5): there is no critic",
         Some(_) if shown => {
             "target: V for the next link where one ends, in 0 to 1; eq. 4 draws min Q for the next link to it, eq. 5 that for both"
         }

@@ -20,6 +20,13 @@ fn a_chain_shows_each_link_and_which_one_breaks() {
         update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(chained.clone()))));
         check(&format!("chain-{width}x{height}"), &screen(&mut app));
     }
+    let (mut app, _) = forked(60, 20);
+    on_action(&mut app, Verb::Show(ExplorerPage::Chain));
+    update(&mut app, Msg::Session(SessionEvent::Chain(Box::new(chained))));
+    let text = screen(&mut app);
+    for part in ["expert's", "own entry", "6/8 75%", "1/8 12%", "link 2 breaks the chain"] {
+        assert!(text.contains(part), "no {part} on a small screen:\n{text}");
+    }
 }
 
 #[test]
