@@ -60,7 +60,7 @@ pub(crate) fn read_by(
     }
     let others = own.readings.into_iter().filter(|other| other.steps() != asked.steps() && !other.subtasks.is_empty());
     let readings: Vec<WishReading> = std::iter::once(asked.clone()).chain(others).collect();
-    of_reading(text, began, readings, 0, scene, world)
+    of_reading(text, began, readings, (0, false), scene, world)
 }
 
 /// Reads words in the state in which they are told, `began` steps into the episode; `earlier` are the instructions before.
@@ -86,15 +86,15 @@ pub(crate) fn read<'a>(
     let mut readings = vec![best];
     let others = readings[0].alternatives().into_iter().filter(|other| other.confidence >= OFFERED);
     readings.extend(others.collect::<Vec<_>>());
-    of_reading(text, began, readings, 0, scene, world)
+    of_reading(text, began, readings, (0, false), scene, world)
 }
 
-/// The wish of a reading; the others are kept, so that a person may pick one.
+/// The wish of a reading, by its place and whether a person picked it; the others are kept, so that a person may pick one.
 fn of_reading(
     text: &str,
     began: u32,
     readings: Vec<WishReading>,
-    picked: usize,
+    (picked, is_sure): (usize, bool),
     scene: &Arc<Scene>,
     world: &World,
 ) -> Wish {
@@ -110,7 +110,7 @@ fn of_reading(
         absent: reading.absent.clone(),
         ..Wish::default()
     };
-    let (roles, subtasks) = match graded(reading, picked > 0) {
+    let (roles, subtasks) = match graded(reading, is_sure) {
         Ok(task) => task,
         Err(why) => return Wish { ungraded: Some(why), readings, picked, ..wish },
     };
@@ -126,7 +126,7 @@ fn of_reading(
 
 /// The same words by another of their readings, told in another state.
 pub(crate) fn repick(wish: &Wish, picked: usize, began: u32, scene: &Arc<Scene>, world: &World) -> Wish {
-    of_reading(&wish.instruction, began, wish.readings.clone(), picked, scene, world)
+    of_reading(&wish.instruction, began, wish.readings.clone(), (picked, true), scene, world)
 }
 
 /// The parts and steps of a reading that is fit to be graded by; else why it is not. A person who picked it is sure.
@@ -153,7 +153,7 @@ fn graded(
         return Err(open.into());
     }
     if reading.confidence < LEAST && reading.read_by.is_none() && !is_picked {
-        return Err(format!("{:.0} % sure is too unsure to grade by", 100.0 * reading.confidence));
+        return Err(format!("only {:.0} % sure that it means: {}", 100.0 * reading.confidence, reading.words()));
     }
     reading.task().ok_or_else(|| "it was not read to the end".into())
 }
@@ -255,6 +255,18 @@ mod tests {
         }
         let lacking = told("Pick up the baseball bat.");
         assert_eq!(lacking.ungraded.as_deref(), Some("this house has no baseball bat"));
+    }
+
+    #[test]
+    fn a_guess_is_said_and_graded_once_a_person_says_that_it_is_meant() {
+        let (scene, world) = kitchen();
+        let guess = WishReading { confidence: 0.2, ..told("Pick up the mug.").readings.remove(0) };
+        let wish = of_reading("Do the mug.", 3, vec![guess], (0, false), &scene, &world);
+        assert_eq!(wish.ungraded.as_deref(), Some("only 20 % sure that it means: pick up a mug"));
+        assert!(wish.is_unsure());
+        let meant = repick(&wish, 0, 3, &scene, &world);
+        assert_eq!((meant.grading, meant.is_unsure()), (WishGrading::Read, false));
+        assert!(!told("Dance.").is_unsure());
     }
 
     #[test]

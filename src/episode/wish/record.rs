@@ -198,6 +198,12 @@ impl Wish {
         others.map(|(at, other)| (at + 1, difference(own, other))).collect()
     }
 
+    /// Whether there is a reading that nothing is graded by as it is too unsure: a person may say that it is meant.
+    pub(crate) fn is_unsure(&self) -> bool {
+        let is_whole = |reading: &WishReading| reading.task().is_some() && reading.absent.is_empty();
+        self.grading == WishGrading::Nobody && self.readings.get(self.picked).is_some_and(is_whole)
+    }
+
     /// Who says what of its end, in a few words: "done", "done, you say; the agent: done at step 12".
     pub(crate) fn verdict_in_words(&self) -> String {
         let own = match self.verdict {

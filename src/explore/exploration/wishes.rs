@@ -143,7 +143,8 @@ impl Exploration {
     /// When there is none such.
     pub(crate) fn mean(&mut self, wanted: Option<usize>) -> anyhow::Result<()> {
         let wish = self.wish().cloned().ok_or_else(|| anyhow::anyhow!("nothing was told yet"))?;
-        anyhow::ensure!(wish.readings.len() > 1, "there is no other reading of {:?}", wish.instruction);
+        let is_choice = wish.readings.len() > 1 || wish.is_unsure();
+        anyhow::ensure!(is_choice, "there is no other reading of {:?}", wish.instruction);
         let picked = match wanted {
             None => (wish.picked + 1) % wish.readings.len(),
             Some(number) => number.checked_sub(1).filter(|&at| at < wish.readings.len()).ok_or_else(|| {

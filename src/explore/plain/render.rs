@@ -26,7 +26,10 @@ pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
         writeln!(out, "not understood: {}", wish.unread.join(" "))?;
     }
     match &wish.ungraded {
-        Some(why) => writeln!(out, "not graded: {why}; say `done` or `failed` when it is")?,
+        Some(why) => {
+            let meant = if wish.is_unsure() { "`meant 1` if it does, or " } else { "" };
+            writeln!(out, "not graded: {why}; {meant}say `done` or `failed` when it is")?;
+        }
         None => {
             let expert = wish.expert_steps.map_or("sees no way".into(), |steps| format!("{steps} steps"));
             let limit = wish.limit().map_or(String::new(), |limit| format!(", at most {limit}"));

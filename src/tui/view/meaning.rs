@@ -63,7 +63,14 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
         let judge = if wish.is_told() { "; :done or :failed when it is" } else { ": i tells it something" };
         let style = if wish.is_told() { THEME.bad } else { THEME.quiet };
         let head = if wish.is_told() { "  not graded: " } else { "  " };
-        return vec![(format!("{head}{why}"), style), (judge.into(), THEME.quiet)];
+        let mut parts = vec![(format!("{head}{why}"), style)];
+        if wish.is_unsure() {
+            let meant = if wish.readings.len() == 1 { "z" } else { ":meant 1" };
+            parts.push((format!("; {meant}: it does"), THEME.key));
+        }
+        parts.extend(others(wish));
+        parts.push((judge.into(), THEME.quiet));
+        return parts;
     }
     let sure = wish.confidence.filter(|&confidence| confidence < CERTAIN && wish.picked == 0);
     let sure = sure.map_or(String::new(), |confidence| format!(" ({:.0} % sure)", 100.0 * confidence));
@@ -76,15 +83,18 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
     if !wish.unread.is_empty() {
         parts.push((format!("  not understood: {}", wish.unread.join(" ")), THEME.bad));
     }
-    let others: Vec<String> =
-        wish.alternatives().into_iter().map(|(number, words)| format!("{number} {words}")).collect();
-    if !others.is_empty() {
-        parts.push((format!("  or z: {}", others.join(", ")), THEME.key));
-    }
+    parts.extend(others(wish));
     if wish.expert_steps.is_none() {
         parts.push(("  the expert sees no way".into(), THEME.bad));
     }
     parts
+}
+
+/// What else it may mean.
+fn others(wish: &Wish) -> Option<(String, Style)> {
+    let others: Vec<String> =
+        wish.alternatives().into_iter().map(|(number, words)| format!("{number} {words}")).collect();
+    (!others.is_empty()).then(|| (format!("  or z: {}", others.join(", ")), THEME.key))
 }
 
 fn steps(many: u32) -> String {
