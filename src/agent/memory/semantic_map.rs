@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::eye;
 use super::percept::Percept;
 use crate::domain::{Cell, Class, Pose};
+use crate::house::camera::Camera;
 
 /// Beyond this depth, in metres, a glance counts for less.
 const NEAR: f32 = 3.0;
@@ -22,6 +23,12 @@ const MISSED: f32 = 0.6;
 const MISSED_WHERE_PUT: f32 = 0.93;
 /// The score of what the agent put somewhere itself.
 const OWN_HAND: f32 = 0.9;
+/// Within this distance over the floor, in metres, and so far inside the frame, in pixels, what can be acted on is offered.
+const AT_HAND: f32 = 1.25;
+const MARGIN: f32 = 15.0;
+/// What is left of the score of what turned out to be something else, and of the probability with which it is seen again.
+const REFUTED: f32 = 0.2;
+const SEEN_AGAIN: f32 = 0.3;
 /// Weaker evidence is dropped.
 const WEAKEST: f32 = 0.05;
 
@@ -76,6 +83,8 @@ struct Glimpse {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SemanticMap {
     evidence: BTreeMap<(Class, Cell), Evidence>,
+    /// Where something looked like a class and turned out to be something else.
+    refuted: BTreeSet<(Class, Cell)>,
 }
 
 impl SemanticMap {
@@ -90,8 +99,12 @@ impl SemanticMap {
             let away = eye::between(pose.cell, cell);
             let fresh = Evidence { score: 0.0, height, seen: step, open, near: away, put: false };
             let known = self.evidence.entry((class, cell)).or_insert(fresh);
+            let is_refuted = (-1..=1)
+                .flat_map(|dx| (-1..=1).map(move |dz| (dx, dz)))
+                .any(|(dx, dz)| self.refuted.contains(&(class, Cell::new(cell.x + dx, cell.z + dz))));
+            let probability = glimpse.probability * if is_refuted { SEEN_AGAIN } else { 1.0 };
             let towards = WEIGHTS[usize::from(glimpse.depth > NEAR)];
-            known.score += towards * (glimpse.probability - known.score);
+            known.score += towards * (probability - known.score);
             known.height += towards * (height - known.height);
             known.open += WEIGHTS[0] * (open - known.open);
             known.near = known.near.min(away);
@@ -117,6 +130,26 @@ impl SemanticMap {
             let again = seen.get(&class).is_some_and(|cells| cells.iter().any(|at| eye::between(*at, cell) <= DRIFT));
             if !hidden && !again {
                 known.score *= if known.put { MISSED_WHERE_PUT } else { MISSED };
+            }
+        }
+    }
+
+    /// Weakens what is in view and at hand and cannot be acted on: it only looks like a thing of its class. `would_be_offered`
+    /// tells whether the interactions that are possible now would hold one with a class, and do not.
+    pub(crate) fn refute(&mut self, pose: Pose, percept: &Percept, would_be_offered: impl Fn(Class) -> bool) {
+        let camera = eye::camera(pose);
+        let inside = |at: f32| (MARGIN..Camera::IMAGE - MARGIN).contains(&at);
+        for (&(class, cell), known) in &mut self.evidence {
+            // What the agent put there is somewhere near.
+            if known.put || eye::between(pose.cell, cell) > AT_HAND || !would_be_offered(class) {
+                continue;
+            }
+            let Some(place) = camera.project(eye::over(cell, known.height)) else { continue };
+            let Some(depth) = Percept::cell_at(place.x, place.y).and_then(|at| percept.depth.get(at)) else { continue };
+            let is_hidden = *depth < place.z - SLACK;
+            if inside(place.x) && inside(place.y) && !is_hidden {
+                known.score *= REFUTED;
+                self.refuted.insert((class, cell));
             }
         }
     }
@@ -154,6 +187,7 @@ impl SemanticMap {
     pub(crate) fn place(&mut self, class: Class, cell: Cell, height: f32, step: u32) {
         let near = Evidence { score: OWN_HAND, height, seen: step, open: 0.0, near: 0.0, put: true };
         self.evidence.insert((class, cell), near);
+        self.refuted.retain(|&(of, at)| of != class || at.apart(cell) > 2);
     }
 
     /// Multiplies the scores of a class around a cell, up to `radius` metres from it: it turned out not to be there.
@@ -286,6 +320,27 @@ mod tests {
             map.observe(Pose::default(), &nothing(4.0), None, step);
         }
         assert_eq!(map, SemanticMap::default());
+    }
+
+    #[test]
+    fn what_looks_like_a_mug_and_cannot_be_taken_at_hand_is_none_however_often_it_is_seen() {
+        let mut map = SemanticMap::default();
+        let mug = percept("Mug", MIDDLE, 0.9, 1.0);
+        let look = |map: &mut SemanticMap, percept: &Percept, is_offered: bool| {
+            map.observe(Pose::default(), percept, None, 0);
+            map.refute(Pose::default(), percept, |class| class.info().pickupable && !is_offered);
+            map.things(0.0).first().map_or(0.0, |thing| thing.score)
+        };
+        assert!(look(&mut map, &mug, true) > 0.6, "it can be taken");
+        let far = percept("Mug", MIDDLE, 0.9, 2.0);
+        assert!(look(&mut SemanticMap::default(), &far, false) > 0.6, "it is out of reach");
+        assert!(look(&mut map, &nothing(0.5), false) > 0.6, "something stands before it");
+        for _ in 0..5 {
+            assert!(look(&mut map, &mug, false) < 0.2, "it is something else");
+        }
+        let place = map.things(0.0)[0].best;
+        map.place(class("Mug"), place, 0.9, 1);
+        assert!(look(&mut map, &mug, true) > 0.8, "the agent put one there");
     }
 
     #[test]

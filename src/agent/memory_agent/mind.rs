@@ -80,6 +80,12 @@ impl Mind {
             percept: &moment.seen.percept,
             held: self.progress.held,
         });
+        let is_empty = self.progress.held.is_none();
+        let is_offered = |class: Class| moment.legal.iter().any(|candidate| candidate.class == class);
+        self.memory.map.refute(moment.pose, &moment.seen.percept, |class| {
+            let info = class.info();
+            (info.pickupable && is_empty || info.toggleable || info.openable) && !is_offered(class)
+        });
     }
 
     /// New goals: what was tried for others counts no more.
