@@ -20,9 +20,13 @@ complain() {
 [ $# -ge 3 ] || complain "$(sed -n '2,16s/^# \{0,1\}//p' "$0")"
 data=$1 encoder=$2 out=$3
 shift 3
-known=(sprint iql-primitive l-bc l-bc-transformer am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg)
+known=(sprint iql-primitive l-bc l-bc-transformer am sprint-no-chain sprint-no-agg sprint-concat-agg l-bc-agg sprint-llm-chain)
 methods=("$@")
-[ $# -gt 0 ] || methods=("${known[@]}")
+if [ $# -eq 0 ]; then
+    methods=("${known[@]}")
+    # A language model ranks its pairs first: `sprint chains`.
+    [ -f "$data/chains.jsonl" ] || unset 'methods[-1]'
+fi
 for method in "${methods[@]}"; do
     [[ " ${known[*]} " == *" $method "* ]] || complain "there is no method $method: name some of ${known[*]}"
 done

@@ -5,8 +5,8 @@ use std::ops::Range;
 use tch::{Kind, Tensor};
 
 use super::chain::Chaining;
-use crate::nets::observations::Observations;
 use crate::nets::precision::Precision;
+use crate::nets::shared_rows::SharedRows;
 use crate::nets::visual::SIDE;
 
 /// Transitions (s, a, s′) under an instruction or goal z, n of each.
@@ -19,7 +19,7 @@ pub(crate) struct Transitions {
     /// The rows of `observation` and `next` that are the items' `[n]`; absent where all are, in their order.
     pub(crate) rows: Option<Tensor>,
     /// z, as the networks take it.
-    pub(crate) conditioning: Tensor,
+    pub(crate) conditioning: SharedRows,
     /// Actions, by index [n].
     pub(crate) actions: Tensor,
     /// Object classes, by index `[n]`; 0 for navigation.
@@ -36,7 +36,7 @@ pub(crate) struct Transitions {
 
 impl Transitions {
     /// Some of the transitions, by their rows, under another conditioning. Observations are shared, not copied.
-    pub(crate) fn picked(&self, rows: &Tensor, conditioning: Tensor) -> Transitions {
+    pub(crate) fn picked(&self, rows: &Tensor, conditioning: SharedRows) -> Transitions {
         let of = |all: &Tensor| all.index_select(0, rows);
         Transitions {
             observation: self.observation.shallow_clone(),
@@ -76,7 +76,7 @@ pub(crate) struct ChainedPairs {
     /// 1 where equation 4 ends A, `[m]`.
     pub(crate) cut: Tensor,
     /// z of "A. B." for A, and B's transitions under the same; absent where equation 5 is off.
-    pub(crate) joint: Option<(Tensor, Transitions)>,
+    pub(crate) joint: Option<(SharedRows, Transitions)>,
 }
 
 /// What one update learns from.
@@ -104,7 +104,7 @@ struct SegmentSource<'a> {
     /// Where its observations begin among the distinct ones of all.
     first_observation: i64,
     transitions: &'a Transitions,
-    conditioning: &'a Tensor,
+    conditioning: &'a SharedRows,
     terminal: &'a Tensor,
 }
 
@@ -116,8 +116,9 @@ pub(super) struct Segment {
     len: i64,
     /// Its share of the loss.
     pub(crate) weight: f64,
-    /// Where its observations lie among the distinct ones of all.
+    /// Where its observations lie among the distinct ones of all, and what they are conditioned on.
     observations: Range<i64>,
+    conditionings: Range<i64>,
 }
 
 impl Segment {
@@ -152,14 +153,29 @@ pub(super) fn gather(segments: &[&Segment], all: &Tensor) -> Tensor {
 }
 
 /// The observations of several segments, out of the distinct ones of all items.
-pub(super) fn gather_observations(segments: &[&Segment], all: &Transitions) -> Observations {
-    let start = segments.iter().map(|segment| segment.observations.start).min().unwrap_or(0);
-    let end = segments.iter().map(|segment| segment.observations.end).max().unwrap_or(0);
-    let rows = all.rows.as_ref().map(|rows| gather(segments, rows) - start);
+pub(super) fn gather_observations(segments: &[&Segment], all: &Transitions) -> SharedRows {
+    gather_shared(segments, &all.observation, all.rows.as_ref(), |segment| &segment.observations)
+}
+
+/// What several segments are conditioned on, out of the distinct ones of all items.
+pub(super) fn gather_conditionings(segments: &[&Segment], all: &Transitions) -> SharedRows {
+    gather_shared(segments, &all.conditioning.distinct, all.conditioning.rows.as_ref(), |segment| {
+        &segment.conditionings
+    })
+}
+
+fn gather_shared(
+    segments: &[&Segment],
+    distinct: &Tensor,
+    rows: Option<&Tensor>,
+    of: fn(&Segment) -> &Range<i64>,
+) -> SharedRows {
+    let start = segments.iter().map(|segment| of(segment).start).min().unwrap_or(0);
+    let end = segments.iter().map(|segment| of(segment).end).max().unwrap_or(0);
+    let rows = rows.map(|rows| gather(segments, rows) - start);
     // Those of the base alone are its items in their order.
     let in_order = segments.iter().all(|segment| segment.name == BASE && segment.len == end - start);
-    let rows = rows.filter(|_| !in_order);
-    Observations { maps: all.observation.narrow(0, start, end - start), rows }
+    SharedRows { distinct: distinct.narrow(0, start, end - start), rows: rows.filter(|_| !in_order) }
 }
 
 impl Batch {
@@ -210,12 +226,14 @@ impl Batch {
                 network_input(&Tensor::cat(&owners.iter().map(|owner| of(owner)).collect::<Vec<_>>(), 0), precision)
             }
         };
+        let conditionings: Vec<&SharedRows> = sources.iter().map(|source| source.conditioning).collect();
+        let (conditioning, starts) = SharedRows::joined(&conditionings);
         let all = Transitions {
             observation: observations(|items| &items.observation),
             next: base.next.is_some().then(|| observations(|items| items.next.as_ref().unwrap_or(&items.observation))),
             rows: (sources.len() > 1 || base.rows.is_some())
                 .then(|| cat(&|source| source.transitions.row_numbers() + source.first_observation)),
-            conditioning: cat(&|source| source.conditioning.shallow_clone()),
+            conditioning,
             actions: own(|items| &items.actions),
             objects: own(|items| &items.objects),
             object_target: own(|items| &items.object_target),
@@ -224,7 +242,7 @@ impl Batch {
             executed: own(|items| &items.executed),
         };
         let mut start = 0;
-        let segments = sources.iter().map(|source| {
+        let segments = sources.iter().zip(starts).map(|(source, said)| {
             let len = source.terminal.size()[0];
             start += len;
             let first = source.first_observation;
@@ -234,6 +252,7 @@ impl Batch {
                 len,
                 weight: source.weight,
                 observations: first..first + source.transitions.distinct(),
+                conditionings: said..said + source.conditioning.count(),
             }
         });
         (all, segments.collect())

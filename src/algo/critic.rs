@@ -10,7 +10,7 @@ use super::iql::{self, Iql, PolyakTarget};
 use super::learner::{Learner, Optimisation};
 use super::loss_terms::LossTerms;
 use crate::nets::critic::{Critic, CriticValues};
-use crate::nets::observations::Observations;
+use crate::nets::shared_rows::SharedRows;
 use crate::nets::weights::{self, Tensors};
 
 /// Twin Q and V, their target and their optimiser.
@@ -75,8 +75,8 @@ impl<'a> CriticLearner<'a> {
 
     /// Its values of all items, with what V, both Q and the policy learn from them.
     pub(super) fn evaluate(&self, all: &Transitions, segments: &[Segment], chaining: Option<&Chaining>) -> CriticBatch {
-        let of_items = |maps: &Tensor| Observations {
-            maps: maps.shallow_clone(),
+        let of_items = |maps: &Tensor| SharedRows {
+            distinct: maps.shallow_clone(),
             rows: all.rows.as_ref().map(Tensor::shallow_clone),
         };
         let (seen, next) = (of_items(&all.observation), of_items(all.next.as_ref().unwrap_or(&all.observation)));

@@ -2,12 +2,12 @@
 
 use tch::{Kind, Tensor};
 
-use super::batch::{CHAIN, Segment, Transitions, gather, gather_observations};
+use super::batch::{CHAIN, Segment, Transitions, gather, gather_conditionings, gather_observations};
 use super::bc;
 use super::chain::{BatchNormStatistics, Chaining, PolicyExtraction};
 use super::loss_terms::LossTerms;
-use crate::nets::observations::Observations;
 use crate::nets::policy::Logits;
+use crate::nets::shared_rows::SharedRows;
 
 /// Segments that go through the policy in one forward pass.
 pub(super) struct ForwardPass<'a> {
@@ -33,8 +33,13 @@ impl<'a> ForwardPass<'a> {
     }
 
     /// The observations of its segments.
-    pub(crate) fn observations(&self, all: &Transitions) -> Observations {
+    pub(crate) fn observations(&self, all: &Transitions) -> SharedRows {
         gather_observations(&self.segments, all)
+    }
+
+    /// What its segments are conditioned on.
+    pub(crate) fn conditionings(&self, all: &Transitions) -> SharedRows {
+        gather_conditionings(&self.segments, all)
     }
 
     /// The items of its segments.

@@ -119,10 +119,10 @@ impl<'a> Update<'a> {
             Some(critic) if critic.is_warming_up() => (ForwardPass::all(segments, None), None),
             _ => (ForwardPass::all(segments, self.chaining.as_ref()), critic.map(|critic| &critic.weights)),
         };
-        let mut loss = Tensor::from(0.0f32).to_device(all.conditioning.device());
+        let mut loss = Tensor::from(0.0f32).to_device(all.actions.device());
         let mut first = None;
         for pass in &passes {
-            let (observations, conditioning) = (pass.observations(all), pass.of(&all.conditioning));
+            let (observations, conditioning) = (pass.observations(all), pass.conditionings(all));
             let logits = self.policy.forward_shared(&observations, &conditioning, pass.train);
             loss += policy_extraction::loss(&logits, all, pass, weights, terms);
             first.get_or_insert(logits);
@@ -208,8 +208,8 @@ mod tests {
     use crate::algo::iql::Iql;
     use crate::algo::schedule::Schedule;
     use crate::nets::critic::{Critic, CriticInputs, CriticSpec};
-    use crate::nets::observations::Observations;
     use crate::nets::policy::PolicySpec;
+    use crate::nets::shared_rows::SharedRows;
     use crate::nets::visual::SIDE;
 
     const STATES: i64 = 3;
@@ -320,7 +320,7 @@ mod tests {
             observation: look(&column(|row| row.0)),
             next: Some(look(&column(|row| row.3))),
             rows: None,
-            conditioning: say(&column(|row| row.1)),
+            conditioning: say(&column(|row| row.1)).into(),
             objects: Tensor::from_slice(&vec![0i64; rows.len()]),
             object_target: Tensor::from_slice(&vec![0i64; rows.len()]),
             actions: Tensor::from_slice(&actions),
@@ -335,9 +335,9 @@ mod tests {
         let (a, b) = ((0, 0, 0, 1, 1.0), (1, 1, 0, 2, 1.0));
         let many = |row| transitions(&[row; 4]);
         let base: Vec<_> = [a, b].into_iter().cycle().take(8).collect();
-        let first = Transitions { conditioning: say(&[1; 4]), ..many(a) };
+        let first = Transitions { conditioning: say(&[1; 4]).into(), ..many(a) };
         let cut = first.terminal.shallow_clone();
-        let joint = Some((say(&[2; 4]), Transitions { conditioning: say(&[2; 4]), ..many(b) }));
+        let joint = Some((say(&[2; 4]).into(), Transitions { conditioning: say(&[2; 4]).into(), ..many(b) }));
         Batch { base: transitions(&base), pairs: Some(ChainedPairs { of_base: false, first, cut, joint }) }
     }
 
@@ -372,10 +372,10 @@ mod tests {
         }
         let four = transitions(&CHAIN_OF_TWO);
         let (q, v, policy) = solution();
-        let seen = Observations::distinct(&four.observation);
+        let seen = SharedRows::own(&four.observation);
         let found = nets.target.0.min_q(&seen, &four.conditioning, &four.actions, &four.objects);
         let values = nets.online.0.value(&seen, &four.conditioning);
-        let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.conditioning, false));
+        let logits = tch::no_grad(|| nets.policy.forward(&four.observation, &four.conditioning.distinct, false));
         let shares = logits.actions.softmax(-1, Kind::Double);
         for (row, (state, action)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
             let row = row as i64;
@@ -397,7 +397,7 @@ mod tests {
         while !update.is_done() {
             numbers = update.update(&chained_skills(), true).unwrap();
         }
-        let values = nets.online.0.value(&Observations::distinct(&look(&[0, 0, 1])), &say(&[1, 2, 2]));
+        let values = nets.online.0.value(&SharedRows::own(&look(&[0, 0, 1])), &say(&[1, 2, 2]).into());
         for i in 0..3 {
             // The joint costs nothing, and each skill is one step: all are worth 1.
             assert!((values.double_value(&[i]) - 1.0).abs() < 0.05, "{values}");
@@ -520,10 +520,10 @@ mod tests {
             let one = Tensor::from_slice(&[action]);
             nets.target
                 .0
-                .min_q(&Observations::distinct(&look(&[state])), &say(&[0]), &one, &Tensor::from_slice(&[0i64]))
+                .min_q(&SharedRows::own(&look(&[state])), &say(&[0]).into(), &one, &Tensor::from_slice(&[0i64]))
                 .double_value(&[0])
         };
-        let v = nets.online.0.value(&Observations::distinct(&look(&[1])), &say(&[0])).double_value(&[0]);
+        let v = nets.online.0.value(&SharedRows::own(&look(&[1])), &say(&[0]).into()).double_value(&[0]);
         assert!((v - 0.35).abs() < 0.02, "the 0.7-expectile of 0.5 and 0: {v}");
         for (state, action, right) in [(0, 0, 0.5 + 0.9 * 0.35), (0, 1, 0.0), (1, 0, 0.5), (1, 1, 0.0)] {
             assert!((at(state, action) - right).abs() < 0.03, "Q of {state}, {action}: {}", at(state, action));
@@ -555,12 +555,12 @@ mod tests {
         };
         let twice = |of: &Transitions| {
             let rows: Vec<i64> = (0..of.actions.size()[0]).chain(0..of.actions.size()[0]).collect();
-            let conditioning = Tensor::cat(&[&of.conditioning, &of.conditioning], 0);
-            of.picked(&Tensor::from_slice(&rows), conditioning)
+            let rows = Tensor::from_slice(&rows);
+            of.picked(&rows, of.conditioning.picked(&rows))
         };
         let half = chained_skills();
         let pairs = half.pairs.as_ref().unwrap();
-        let joint = pairs.joint.as_ref().map(|(joint, second)| (Tensor::cat(&[joint, joint], 0), twice(second)));
+        let joint = pairs.joint.as_ref().map(|(joint, second)| (SharedRows::joined(&[joint, joint]).0, twice(second)));
         let cut = Tensor::cat(&[&pairs.cut, &pairs.cut], 0);
         let whole = Batch {
             base: twice(&half.base),

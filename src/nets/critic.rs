@@ -5,8 +5,8 @@ use tch::Tensor;
 use tch::nn::{self, Module};
 
 use super::bounds;
-use super::observations::Observations;
 use super::precision;
+use super::shared_rows::SharedRows;
 use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use super::value::ValueHead;
 use crate::domain::{ActionType, Class};
@@ -133,7 +133,7 @@ impl Critic {
     fn input(
         &self,
         head: usize,
-        observations: &Observations,
+        observations: &SharedRows,
         conditioning: &Tensor,
         earlier: Option<&Tensor>,
         train: bool,
@@ -151,12 +151,12 @@ impl Critic {
     /// (class indices, 0 for navigation).
     pub(crate) fn evaluate(
         &self,
-        observations: &Observations,
-        conditioning: &Tensor,
+        observations: &SharedRows,
+        conditioning: &SharedRows,
         actions: &Tensor,
         objects: &Tensor,
     ) -> CriticValues {
-        let conditioning = self.conditioner.forward(conditioning, observations.kind(), true);
+        let conditioning = self.conditioner.for_items(conditioning, observations.kind(), true);
         let first = self.input(0, observations, &conditioning, None, true);
         let second = self.input(1, observations, &conditioning, Some(&first), true);
         let third = self.input(2, observations, &conditioning, Some(&first), true);
@@ -170,13 +170,13 @@ impl Critic {
     /// min(Q1, Q2) [n], without dropout and without gradient.
     pub(crate) fn min_q(
         &self,
-        observations: &Observations,
-        conditioning: &Tensor,
+        observations: &SharedRows,
+        conditioning: &SharedRows,
         actions: &Tensor,
         objects: &Tensor,
     ) -> Tensor {
         tch::no_grad(|| {
-            let conditioning = self.conditioner.forward(conditioning, observations.kind(), false);
+            let conditioning = self.conditioner.for_items(conditioning, observations.kind(), false);
             let first = self.input(0, observations, &conditioning, None, false);
             let second = self.input(1, observations, &conditioning, Some(&first), false);
             let [one, other] =
@@ -186,9 +186,9 @@ impl Critic {
     }
 
     /// V [n], without dropout and without gradient.
-    pub(crate) fn value(&self, observations: &Observations, conditioning: &Tensor) -> Tensor {
+    pub(crate) fn value(&self, observations: &SharedRows, conditioning: &SharedRows) -> Tensor {
         tch::no_grad(|| {
-            let conditioning = self.conditioner.forward(conditioning, observations.kind(), false);
+            let conditioning = self.conditioner.for_items(conditioning, observations.kind(), false);
             self.value.forward(&self.input(2, observations, &conditioning, None, false), false)
         })
     }
@@ -206,7 +206,7 @@ impl Critic {
         let (actions, objects) = (column(|pair| pair.0), column(|pair| pair.1));
         tch::no_grad(|| {
             let conditioning = self.conditioner.forward(conditioning, observation.kind(), false);
-            let observation = Observations::distinct(observation);
+            let observation = SharedRows::own(observation);
             let first = self.input(0, &observation, &conditioning, None, false);
             let [second, third] = [1, 2].map(|head| self.input(head, &observation, &conditioning, Some(&first), false));
             let inputs = [first, second, third];
@@ -252,7 +252,8 @@ mod tests {
         let convolutions = [true, false].map(|shared| {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = critic(&store, shared);
-            let values = critic.evaluate(&Observations::distinct(&observation), &conditioning, &actions, &objects);
+            let values =
+                critic.evaluate(&SharedRows::own(&observation), &SharedRows::own(&conditioning), &actions, &objects);
             assert!([&values.q[0], &values.q[1], &values.value, &values.baseline].iter().all(|t| t.size() == [3]));
             assert!(values.value.requires_grad() && !values.baseline.requires_grad());
             store.variables().keys().filter(|name| name.ends_with("conv.weight")).count()
@@ -272,7 +273,8 @@ mod tests {
             let (value, q) = critic.evaluate_actions(&observation, &conditioning, &pairs);
             let (actions, objects) = (Tensor::from_slice(&pairs.map(|p| p.0)), Tensor::from_slice(&pairs.map(|p| p.1)));
             let repeat = |tensor: &Tensor| tensor.repeat([&[4i64][..], &vec![1; tensor.dim() - 1]].concat());
-            let (many, conditionings) = (Observations::distinct(&repeat(&observation)), repeat(&conditioning));
+            let (many, conditionings) =
+                (SharedRows::from(repeat(&observation)), SharedRows::from(repeat(&conditioning)));
             let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-5;
             assert!(close(&q, &critic.min_q(&many, &conditionings, &actions, &objects)));
             assert!(close(&value, &critic.value(&many, &conditionings)));
@@ -289,10 +291,13 @@ mod tests {
             let critic = critic(&store, shared);
             let (maps, conditioning, actions, objects) = inputs(4);
             let rows = Tensor::from_slice(&[1i64, 0, 1, 1]);
-            let each = Observations::distinct(&maps.narrow(0, 0, 2).index_select(0, &rows));
-            let together = Observations { maps: maps.narrow(0, 0, 2), rows: Some(rows) };
+            let each = SharedRows::own(&maps.narrow(0, 0, 2).index_select(0, &rows));
+            let together = SharedRows { distinct: maps.narrow(0, 0, 2), rows: Some(rows) };
             let values = [each, together].map(|observations| {
-                critic.evaluate(&observations, &conditioning, &actions, &objects).baseline.to_kind(Kind::Double)
+                critic
+                    .evaluate(&observations, &SharedRows::own(&conditioning), &actions, &objects)
+                    .baseline
+                    .to_kind(Kind::Double)
             });
             let apart = (&values[0] - &values[1]).abs().max().double_value(&[]);
             assert!(apart < 1e-5, "{apart}");

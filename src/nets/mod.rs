@@ -11,13 +11,13 @@ pub(crate) mod film;
 pub(crate) mod frozen;
 pub(crate) mod home;
 pub(crate) mod language_model;
-pub(crate) mod observations;
 pub(crate) mod perception_heads;
 pub(crate) mod policy;
 pub(crate) mod precision;
 pub(crate) mod resize;
 pub mod resnet18;
 pub mod sentence;
+pub(crate) mod shared_rows;
 pub(crate) mod size_differences;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -6,8 +6,8 @@ use tch::nn;
 
 use super::bounds;
 use super::episodic::{AttentionSpec, Episodic};
-use super::observations::Observations;
 use super::precision;
+use super::shared_rows::SharedRows;
 use super::trunk::{Conditioning, Convolutions, DenseLayers, Trunk};
 use crate::domain::{ActionType, Class};
 
@@ -118,17 +118,18 @@ impl PolicyNet {
     /// `observation` [n, history * features, 7, 7], oldest frame first, and `conditioning`: sentences [n, embedding] of unit length,
     /// goals of the observation's shape, or numbers of words [n, words].
     pub(crate) fn forward(&self, observation: &Tensor, conditioning: &Tensor, train: bool) -> Logits {
-        self.forward_shared(&Observations::distinct(observation), conditioning, train)
+        self.forward_shared(&SharedRows::own(observation), &SharedRows::own(conditioning), train)
     }
 
-    /// The same of items that may share observations.
-    pub(crate) fn forward_shared(&self, observations: &Observations, conditioning: &Tensor, train: bool) -> Logits {
+    /// The same of items that may share observations, and goals or instructions.
+    pub(crate) fn forward_shared(&self, observations: &SharedRows, conditioning: &SharedRows, train: bool) -> Logits {
         let features = match &self.body {
             Body::Episodic(episodic) => {
-                episodic.forward(&observations.for_items(observations.maps.shallow_clone()), conditioning, train)
+                let all = |shared: &SharedRows| shared.for_items(shared.distinct.shallow_clone());
+                episodic.forward(&all(observations), &all(conditioning), train)
             }
             Body::Trunk { conditioner, trunk } => {
-                let conditioning = conditioner.forward(conditioning, observations.kind(), train);
+                let conditioning = conditioner.for_items(conditioning, observations.kind(), train);
                 Tensor::cat(&[trunk.forward_shared(observations, Some(&conditioning), train), conditioning], 1)
             }
         };
@@ -175,6 +176,23 @@ mod tests {
         let other = net.forward(&observation, &say(-0.4), false);
         assert_eq!((one.actions.size(), one.objects.size()), (vec![2, 12], vec![2, 82]));
         assert!((one.actions - other.actions).abs().max().double_value(&[]) > 1e-3);
+    }
+
+    #[test]
+    fn a_goal_that_items_share_is_to_them_as_their_own_copy_of_it() {
+        let _chance = crate::nets::testing::chance();
+        tch::manual_seed(3);
+        let store = nn::VarStore::new(Device::Cpu);
+        let policy = PolicyNet::new(&store.root(), &PolicySpec { dropout: 0.0, ..spec(Some([4; 4])) }, 2);
+        let maps = |n: i64| Tensor::rand([n, 10, SIDE, SIDE], (Kind::Float, Device::Cpu));
+        let (seen, goals) = (maps(4), maps(2));
+        let rows = Tensor::from_slice(&[0i64, 1, 1, 0]);
+        let shared = SharedRows { distinct: goals.shallow_clone(), rows: Some(rows.shallow_clone()) };
+        for train in [true, false] {
+            let together = policy.forward_shared(&SharedRows::own(&seen), &shared, train);
+            let apart = policy.forward(&seen, &goals.index_select(0, &rows), train);
+            assert!((together.actions - apart.actions).abs().max().double_value(&[]) < 1e-5, "{train}");
+        }
     }
 
     #[test]

@@ -5,8 +5,8 @@ use tch::nn::{self, ModuleT};
 use tch::{Kind, Tensor};
 
 use super::film::Film;
-use super::observations::Observations;
 use super::precision;
+use super::shared_rows::SharedRows;
 use super::visual::SIDE;
 
 /// The convolutions of a trunk.
@@ -80,17 +80,17 @@ impl Trunk {
 
     /// `observation` [n, channels, 7, 7] and `conditioning` [n, width] in numbers of one width, to [n, [`Trunk::width`]].
     pub(crate) fn forward(&self, observation: &Tensor, conditioning: Option<&Tensor>, train: bool) -> Tensor {
-        self.forward_shared(&Observations::distinct(observation), conditioning, train)
+        self.forward_shared(&SharedRows::own(observation), conditioning, train)
     }
 
     /// The same of items that may share observations: the first convolution is computed once for each.
     pub(crate) fn forward_shared(
         &self,
-        observations: &Observations,
+        observations: &SharedRows,
         conditioning: Option<&Tensor>,
         train: bool,
     ) -> Tensor {
-        let mut x = observations.maps.shallow_clone();
+        let mut x = observations.distinct.shallow_clone();
         for (position, TrunkStage { conv, stride, norm, film }) in self.stages.iter().enumerate() {
             x = precision::convolution(conv, &x, *stride);
             if position == 0 {
@@ -159,6 +159,11 @@ impl Conditioning {
         let trunk = Trunk::new(&path, from, convolutions, None);
         let out = nn::linear(&path / "out", trunk.width(), width, Default::default());
         Conditioning::Goal { trunk, out }
+    }
+
+    /// The vectors of all items, [items, width]: each goal is seen once, however many items share it.
+    pub(crate) fn for_items(&self, conditioning: &SharedRows, kind: Kind, train: bool) -> Tensor {
+        conditioning.for_items(self.forward(&conditioning.distinct, kind, train))
     }
 
     /// `conditioning`, sentences [n, width] or goals [n, channels, 7, 7], to [n, width], as wide as `kind` says.

@@ -10,6 +10,7 @@ use super::training_data::{ConditioningTable, TrainingData};
 use crate::algo::batch::{Batch, ChainedPairs, Transitions};
 use crate::algo::chain::{Chaining, cut_chance};
 use crate::data::items::{Item, Span};
+use crate::nets::shared_rows::SharedRows;
 use crate::nets::visual::SIDE;
 
 /// Mixed into the seed: pairs are drawn from another random stream than items.
@@ -82,7 +83,7 @@ impl<'a> BatchSampler<'a> {
 
     /// Transitions of items, each conditioned on its own text or goal.
     fn base(&self, items: &[Item]) -> anyhow::Result<Transitions> {
-        self.transitions(items, self.conditioning(items)?)
+        self.transitions(items, self.conditioning(items)?.into())
     }
 
     /// The same items of held-out spans every time, in chunks.
@@ -139,15 +140,15 @@ impl<'a> BatchSampler<'a> {
         let (of_base, first, second) = match permuted {
             Some(rows) => {
                 let count = Tensor::arange(rows.size()[0], (Kind::Int64, self.device));
-                let first = base.picked(&count, base.conditioning.index_select(0, &rows));
-                (true, first, with_joint.then(|| base.picked(&rows, joint)))
+                let first = base.picked(&count, base.conditioning.picked(&rows));
+                (true, first, with_joint.then(|| base.picked(&rows, joint.into())))
             }
             None => {
-                let under_second = self.transitions(&first, self.conditioning(&second)?)?;
-                (false, under_second, with_joint.then(|| self.transitions(&second, joint)).transpose()?)
+                let under_second = self.transitions(&first, self.conditioning(&second)?.into())?;
+                (false, under_second, with_joint.then(|| self.transitions(&second, joint.into())).transpose()?)
             }
         };
-        let joint = second.map(|second| (under_joint, second));
+        let joint = second.map(|second| (under_joint.into(), second));
         Ok(ChainedPairs { of_base, first, cut: Tensor::from_slice(&cut).to_device(self.device), joint })
     }
 
@@ -179,7 +180,7 @@ impl<'a> BatchSampler<'a> {
         }
     }
 
-    fn transitions(&self, items: &[Item], conditioning: Tensor) -> anyhow::Result<Transitions> {
+    fn transitions(&self, items: &[Item], conditioning: SharedRows) -> anyhow::Result<Transitions> {
         let n = items.len() as i64;
         let (mut actions, mut objects, mut executed) = (Vec::new(), Vec::new(), Vec::new());
         let object_target: Vec<i64> = items.iter().map(|item| i64::from(self.data.items.object_target(item))).collect();

@@ -17,7 +17,7 @@ use crate::data::items::{Items, Span};
 use crate::domain::Class;
 use crate::house::House;
 use crate::house::render::Renderer;
-use crate::nets::observations::Observations;
+use crate::nets::shared_rows::SharedRows;
 
 /// How B relates to the state that A ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -150,13 +150,13 @@ impl Judge<'_> {
                 }
                 maps.push(encoder.encode(&images).flatten(0, 1));
             }
-            let observations = Observations::distinct(&Tensor::stack(&maps, 0).to_kind(Kind::Float));
+            let observations = SharedRows::from(Tensor::stack(&maps, 0).to_kind(Kind::Float));
             let texts: Vec<&str> =
                 chunk.iter().map(|pair| items.texts[spans[pair.second].text as usize].as_str()).collect();
             let mut embedder =
                 self.sentences.lock().map_err(|_| anyhow::anyhow!("the sentence encoder failed earlier"))?;
-            let conditioning = embedder.embed(&texts)?.to_kind(Kind::Float).to_device(observations.maps.device());
-            let found = critic.online.value(&observations, &conditioning).to_kind(Kind::Double);
+            let conditioning = embedder.embed(&texts)?.to_kind(Kind::Float).to_device(observations.distinct.device());
+            let found = critic.online.value(&observations, &conditioning.into()).to_kind(Kind::Double);
             values.extend(Vec::<f64>::try_from(found.to_device(tch::Device::Cpu))?);
         }
         Ok(values)

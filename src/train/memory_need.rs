@@ -54,13 +54,19 @@ pub(crate) fn of_updates(preset: &Preset, features: i64, parts: usize) -> Bytes 
     let activations = items
         * (kept(&policy.channels) + preset.critic.as_ref().map_or(0, |critic| trunks * kept(&critic.channels)))
         * width;
+    // Each goal is seen once by the policy and once by the critic, at full width.
+    let goals = policy.goal_channels.as_ref().map_or(0, |seen_by| {
+        let seers = 1 + u64::from(preset.critic.is_some());
+        let distinct = if own > base { base + 3 * pairs } else { base };
+        distinct * (observation * 4 + seers * kept(seen_by) * width)
+    });
     let observations = own * observation * seen * width
         + preset.training.batch_size as u64 * channels * CELLS * 2 * BATCHES * (policy.history as u64 + 1)
             / policy.history.max(1) as u64;
     // A weight, its gradient and two moments; of the critic the target, too.
     let weights = 4 * 4 * policy_numbers(policy, channels)
         + preset.critic.as_ref().map_or(0, |critic| 5 * 4 * critic_numbers(critic, policy, channels, trunks));
-    Bytes(activations + observations + weights)
+    Bytes(activations + goals + observations + weights)
 }
 
 fn trunk_numbers(channels: &[i64; 4], from: u64, conditioning: u64) -> u64 {
@@ -85,15 +91,23 @@ fn dense_numbers(channels: &[i64; 4], downsample: bool, hidden: &[i64], conditio
     numbers
 }
 
+/// Of what turns a goal into the vector that an instruction would be.
+fn goal_numbers(policy: &PolicySpec, channels: u64) -> u64 {
+    let out = |own: &[i64; 4]| dense_numbers(own, policy.downsample, &[policy.embedding], 0);
+    policy.goal_channels.as_ref().map_or(0, |own| trunk_numbers(own, channels, 0) + out(own))
+}
+
 fn policy_numbers(policy: &PolicySpec, channels: u64) -> u64 {
     let conditioning = policy.embedding as u64;
-    trunk_numbers(&policy.channels, channels, conditioning)
+    goal_numbers(policy, channels)
+        + trunk_numbers(&policy.channels, channels, conditioning)
         + dense_numbers(&policy.channels, policy.downsample, &policy.hidden, conditioning)
 }
 
 fn critic_numbers(critic: &CriticSpec, policy: &PolicySpec, channels: u64, trunks: u64) -> u64 {
     let conditioning = policy.embedding as u64;
-    trunks * trunk_numbers(&critic.channels, channels, conditioning)
+    goal_numbers(policy, channels)
+        + trunks * trunk_numbers(&critic.channels, channels, conditioning)
         + 3 * dense_numbers(&critic.channels, critic.downsample, &critic.hidden, conditioning)
 }
 

@@ -140,7 +140,7 @@ impl Trainer<'_> {
         for items in measured {
             let observation = network_input(&items.observation, Precision::Full);
             let (logits, nll) = tch::no_grad(|| {
-                let logits = self.networks.policy.forward(&observation, &items.conditioning, false);
+                let logits = self.networks.policy.forward_shared(&observation.into(), &items.conditioning, false);
                 let nll = bc::neg_log_likelihood(&logits, &items.actions, &items.objects);
                 (logits, nll)
             });

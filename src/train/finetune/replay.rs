@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor};
 
 use crate::algo::batch::Transitions;
+use crate::nets::shared_rows::SharedRows;
 use crate::nets::visual::SIDE;
 
 /// One step of a rollout.
@@ -197,13 +198,11 @@ impl Replay {
             Tensor::from_slice(&steps.iter().map(of).collect::<Vec<f32>>()).to_device(device)
         };
         let indices = |of: fn(&ReplayStep) -> u8| column_of_indices(&steps, of, device);
-        let mut shape = conditioning.size();
-        shape[0] = n;
         Ok(Transitions {
             observation: maps.narrow(1, 0, history),
             next: Some(maps.narrow(1, 1, history)),
             rows: None,
-            conditioning: conditioning.expand(&shape[..], false),
+            conditioning: SharedRows::repeated(conditioning, n),
             actions: indices(|step| step.action),
             objects: indices(|step| step.object),
             object_target: indices(|step| step.object),
@@ -303,7 +302,7 @@ mod tests {
         assert_eq!(numbers(&found.actions), [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(numbers(&found.reward), [0.0, 0.5, 0.5, 0.0]);
         assert_eq!(numbers(&found.terminal), [0.0, 0.0, 1.0, 0.0], "a rewarded step need not end it, nor a timeout");
-        assert_eq!(found.conditioning.size(), [4, 4]);
+        assert_eq!((found.conditioning.count(), found.conditioning.numbers().size()), (1, vec![4]));
         assert_eq!((replay.steps(), replay.steps_of_first(1), replay.steps_of_first(9)), (4, 3, 4));
         assert_eq!(replay.episodes().iter().map(ReplayEpisode::episode_return).collect::<Vec<_>>(), [1.0, 0.0]);
     }
