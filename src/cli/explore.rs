@@ -389,7 +389,7 @@ impl Origin {
                 let kept = KeptSession::read(path)?;
                 let policies = Policies::new(policy_source::agents(None, kept.author.deciding));
                 let taken_up = Exploration::take_up(&kept, policies).context("the last session cannot be taken up")?;
-                return Ok(taken_up.reading_as(self.expect()?));
+                return Ok(taken_up.taken_from(path.clone()).reading_as(self.expect()?));
             }
             Start::Run { folder, number } => {
                 let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, None)?;

@@ -1,7 +1,7 @@
 //! A session as it is kept while it goes on, in one file of the state folder: everything that was tried in one house.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,20 @@ pub(crate) struct KeptSession {
     pub(crate) author: Author,
     /// Some of it is in no run folder.
     pub(crate) is_unsaved: bool,
+}
+
+/// Where the session before is kept.
+pub(crate) fn before(path: &Path) -> PathBuf {
+    path.with_file_name("session-before.json")
+}
+
+/// Puts a session that nobody saved aside, as another one is about to take its place. What cannot be read is nothing to keep.
+pub(crate) fn put_aside(path: &Path) {
+    if KeptSession::read(path).is_ok_and(|kept| kept.is_unsaved)
+        && let Err(error) = std::fs::rename(path, before(path))
+    {
+        tracing::warn!("{}: {error}", path.display());
+    }
 }
 
 impl KeptSession {

@@ -6,7 +6,7 @@ use std::time::SystemTime;
 use nucleo_matcher::pattern::{AtomKind, CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
-use super::kept_session::KeptSession;
+use super::kept_session::{self, KeptSession};
 use crate::data::dataset::Dataset;
 use crate::domain::Room;
 use crate::run_dir::layout::MANIFEST;
@@ -101,6 +101,10 @@ impl StartEntry {
 pub(crate) fn list(folders: &StartFolders) -> Vec<StartEntry> {
     let runs = runs(&folders.here.join("runs"));
     let mut found: Vec<StartEntry> = last_session(&folders.session, &runs).into_iter().collect();
+    found.extend(
+        session(&kept_session::before(&folders.session))
+            .map(|entry| StartEntry { note: format!("before that, {}", entry.note), ..entry }),
+    );
     // As a person would name them: kitchens first.
     let rooms = [Room::Kitchen, Room::Bedroom, Room::LivingRoom, Room::Bathroom];
     found.extend(rooms.map(|room| StartEntry::of(Start::House { room, seed: 0 }, room.spoken(), "generated")));
@@ -118,17 +122,21 @@ pub(crate) fn list(folders: &StartFolders) -> Vec<StartEntry> {
 
 /// The session that was kept last: by the explorer itself, or as a run by a person if that is newer.
 fn last_session(kept: &Path, runs: &[(SystemTime, StartEntry)]) -> Option<StartEntry> {
-    let own = kept.exists().then(|| KeptSession::read(kept)).and_then(|read| {
-        let session = read.inspect_err(|error| tracing::info!("{error:#}")).ok()?;
-        let (name, note) = session.words();
-        Some((modified(kept), StartEntry::of(Start::Session(kept.to_owned()), name, note)))
-    });
+    let own = session(kept).map(|entry| (modified(kept), entry));
     let explored = runs.iter().find(|(_, entry)| entry.name.starts_with("explored-"));
     let saved = explored.map(|(when, run)| {
         let note = format!("saved as {}", run.name);
         (*when, StartEntry { note, ..run.clone() })
     });
     own.into_iter().chain(saved).max_by_key(|(when, _)| *when).map(|(_, entry)| entry)
+}
+
+/// A session in a file, where there is one.
+fn session(kept: &Path) -> Option<StartEntry> {
+    let read = kept.exists().then(|| KeptSession::read(kept))?;
+    let session = read.inspect_err(|error| tracing::info!("{error:#}")).ok()?;
+    let (name, note) = session.words();
+    Some(StartEntry::of(Start::Session(kept.to_owned()), name, note))
 }
 
 fn floor_plans(data: &Path) -> Vec<StartEntry> {
@@ -277,6 +285,11 @@ mod tests {
         assert_eq!(found[0].start, Start::Session(wanted.session.clone()));
         assert!(found[0].note.ends_with("Pick up the mug."), "{:?}", found[0]);
         assert_eq!(lines(&found)[5..], ["tasks eval_100 task 1", "checkpoint small ", "run tried episode 1"]);
+        exploration.as_kept().write(&kept_session::before(&wanted.session)).unwrap();
+        let both = list(&wanted);
+        assert_eq!(both[1].start, Start::Session(kept_session::before(&wanted.session)));
+        assert!(both[1].note.starts_with("before that, "), "{:?}", both[1]);
+        std::fs::remove_file(kept_session::before(&wanted.session)).unwrap();
         std::fs::write(&wanted.session, b"{ broken").unwrap();
         assert_eq!(lines(&list(&wanted))[..4], houses, "a broken session costs no more than itself");
     }

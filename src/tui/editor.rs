@@ -69,6 +69,13 @@ impl Editor {
         }
     }
 
+    /// The line may have another width from now on: what was scrolled out of a narrow one comes back.
+    pub(crate) fn refit(&mut self) {
+        let (text, column) = (self.text().to_owned(), self.area.cursor().1);
+        self.show(&text);
+        self.area.move_cursor(CursorMove::Jump(0, u16::try_from(column).unwrap_or(u16::MAX)));
+    }
+
     /// Remembers an instruction that was given.
     pub(crate) fn remember(&mut self, text: &str) {
         if self.history.last().is_none_or(|last| last != text) {
@@ -109,6 +116,26 @@ mod tests {
         editor.travel(1);
         editor.travel(1);
         assert_eq!(editor.text(), "d");
+    }
+
+    #[test]
+    fn a_line_that_was_narrow_for_a_while_is_seen_whole_again() {
+        use ratatui::buffer::Buffer;
+        use ratatui::layout::Rect;
+        use ratatui::widgets::Widget;
+        let seen = |editor: &Editor, width| {
+            let mut buf = Buffer::empty(Rect::new(0, 0, width, 1));
+            editor.area().render(buf.area, &mut buf);
+            buf.content().iter().map(|cell| cell.symbol().to_owned()).collect::<String>()
+        };
+        let mut editor = Editor::default();
+        editor.open("half a wish");
+        editor.key(KeyEvent::new(KeyCode::Left, KeyModifiers::NONE));
+        assert!(!seen(&editor, 5).contains("half"));
+        editor.refit();
+        assert!(seen(&editor, 40).starts_with("half a wish"));
+        editor.key(KeyEvent::new(KeyCode::Char('X'), KeyModifiers::NONE));
+        assert_eq!(editor.text(), "half a wisXh", "the cursor stays where it was");
     }
 
     #[test]

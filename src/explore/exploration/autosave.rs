@@ -8,7 +8,7 @@ use crate::agent::registry::Policies;
 use crate::domain::task::SceneRef;
 use crate::episode::record::{Author, Episode};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
-use crate::explore::kept_session::KeptSession;
+use crate::explore::kept_session::{self, KeptSession};
 
 /// States up to which a run writes the file at every step; it is written less often in larger trees.
 const EVERY_STEP: usize = 2000;
@@ -19,9 +19,17 @@ impl Exploration {
         self.autosave.written = None;
     }
 
+    /// The session was taken up from that file.
+    pub(crate) fn taken_from(mut self, path: PathBuf) -> Exploration {
+        self.autosave.taken_from = Some(path);
+        self
+    }
+
     /// Keeps the session in that file from now on.
     pub(crate) fn kept_in(mut self, path: PathBuf) -> Exploration {
-        self.autosave = Autosave { path: Some(path), written: None };
+        let taken_from = self.autosave.taken_from.take();
+        let is_ours = taken_from.as_deref() == Some(path.as_path());
+        self.autosave = Autosave { path: Some(path), is_ours, ..Autosave::default() };
         self.autosave.written = Some(self.reached());
         self
     }
@@ -66,7 +74,11 @@ impl Exploration {
         if soon {
             return;
         }
-        if let Err(error) = self.as_kept().write(&path) {
+        let kept = self.as_kept();
+        if !std::mem::replace(&mut self.autosave.is_ours, true) {
+            kept_session::put_aside(&path);
+        }
+        if let Err(error) = kept.write(&path) {
             tracing::warn!("{error:#}");
         }
         self.autosave.written = Some(now);
@@ -188,6 +200,28 @@ mod tests {
             }
             assert_eq!(after.rollout().env.house.world().digest(), before.rollout().env.house.world().digest());
         }
+    }
+
+    #[test]
+    fn a_session_that_nobody_saved_is_put_aside_when_another_one_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.json");
+        let mut first = explored().kept_in(path.clone());
+        first.write_again();
+        first.autosave(false);
+        // Taken up again it is the same session.
+        let read = KeptSession::read(&path).unwrap();
+        let again = Exploration::take_up(&read, Policies::new(Vec::new())).unwrap();
+        let mut again = again.taken_from(path.clone()).kept_in(path.clone());
+        again.seek(1);
+        again.autosave(false);
+        let before = kept_session::before(&path);
+        assert!(!before.exists());
+        let mut other = testing::exploration().kept_in(path.clone());
+        other.act(Action::navigate(ActionType::RotateLeft)).unwrap();
+        other.autosave(false);
+        assert_eq!(KeptSession::read(&before).unwrap().episodes.len(), 2, "in the same house, too");
+        assert_eq!(KeptSession::read(&path).unwrap().step, 1);
     }
 
     #[test]

@@ -148,6 +148,9 @@ mod tests {
         exploration.seek(4);
         exploration.keep_task(&tasks).unwrap();
         assert!(exploration.keep_task(&tasks).unwrap().contains("is task 2"));
+        let nowhere = folder.path().join("none/tasks.json");
+        assert!(exploration.keep_task(&nowhere).unwrap_err().to_string().contains("make it first"));
+        assert!(!folder.path().join("none").exists());
         let set = taskset::read(&tasks).unwrap().value;
         assert_eq!(set.tasks.len(), 2);
         assert!(set.tasks[0].expert_steps > 0 && set.tasks[0].start.is_some());

@@ -53,6 +53,10 @@ pub(super) struct Frames {
 pub(super) struct Autosave {
     pub(super) path: Option<PathBuf>,
     pub(super) written: Option<Progress>,
+    /// The file holds this session, not the one of before.
+    pub(super) is_ours: bool,
+    /// The file that the session was taken up from.
+    pub(super) taken_from: Option<PathBuf>,
 }
 
 /// What there is to keep: it changes with every step and word.

@@ -173,6 +173,7 @@ impl AnnotateState {
         }
         self.screen.size = size;
         self.picture = None;
+        self.editor.refit();
         vec![AnnotateEffect::Encode, AnnotateEffect::Repaint]
     }
 

@@ -249,9 +249,19 @@ impl App {
 
     /// Adds a line to the log, and shows it on pages without one until the next key.
     pub(crate) fn note(&mut self, tone: Tone, text: impl Into<String>) {
-        let step = self.session.now.as_ref().map(|now| now.step);
-        let entry = LogEntry { step, text: text.into(), outcome: String::new(), tone };
+        let entry = self.entry(tone, text);
         self.notice = Some(entry.clone());
         self.log.write(entry);
+    }
+
+    /// Adds a line to the log alone.
+    pub(crate) fn write(&mut self, tone: Tone, text: impl Into<String>) {
+        let entry = self.entry(tone, text);
+        self.log.write(entry);
+    }
+
+    fn entry(&self, tone: Tone, text: impl Into<String>) -> LogEntry {
+        let step = self.session.now.as_ref().map(|now| now.step);
+        LogEntry { step, text: text.into(), outcome: String::new(), tone }
     }
 }

@@ -174,6 +174,7 @@ impl OwnApp {
 
     pub(super) fn resize(&mut self, size: Size) {
         (self.size, self.picture, self.is_picture_stale) = (size, None, true);
+        self.editor.refit();
     }
 
     /// Encodes the picture for the place that it has, where that is to be done; whether there is a new one.

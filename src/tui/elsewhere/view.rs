@@ -29,6 +29,19 @@ impl Widget for &OwnApp {
     }
 }
 
+/// Hints as far as they fit whole, the first ones last on the line: those have to be seen.
+fn whole(hints: &[&str], width: usize) -> String {
+    let mut used = 0;
+    let fitting = hints.iter().take_while(|hint| {
+        used += hint.chars().count() + 2;
+        used <= width + 2
+    });
+    let mut shown: Vec<&str> = fitting.copied().collect();
+    let kept = hints.iter().take_while(|hint| ["? keys", "q leave"].contains(*hint)).count().min(shown.len());
+    shown.rotate_left(kept);
+    shown.join("  ")
+}
+
 fn line(buf: &mut Buffer, area: Rect, spans: Vec<Span<'_>>) {
     Line::from(spans).render(area, buf);
 }
@@ -58,14 +71,25 @@ impl OwnApp {
             (Some((true, words)), _) => Span::styled(words.clone(), THEME.bad),
             (Some((false, words)), _) => Span::styled(words.clone(), THEME.good),
             (None, Some(problem)) => Span::styled(problem.clone(), THEME.bad),
-            (None, None) => Span::styled(format!("going back: {}", shown.exactness), THEME.quiet),
+            (None, None) => Span::styled(format!("going back is {}", shown.exactness), THEME.quiet),
         };
         line(buf, below, vec![Span::styled(fit(&exact.content, usize::from(below.width)), exact.style)]);
-        let hint = match self.mode {
-            OwnMode::Choosing => "j k choose  Enter does it  m watches  ? keys",
-            _ => "space runs  n step  h l time  m act  i tell  B compare  N next  S save  ? keys  q",
+        let hints: &[&str] = match self.mode {
+            OwnMode::Choosing => &["? keys", "j k choose", "Enter does it", "m watches"],
+            _ => &[
+                "? keys",
+                "q leave",
+                "space runs",
+                "n step",
+                "h l time",
+                "m act",
+                "i tell",
+                "B compare",
+                "N next",
+                "S save",
+            ],
         };
-        line(buf, places.keys, vec![Span::styled(fit(hint, usize::from(places.keys.width)), THEME.quiet)]);
+        line(buf, places.keys, vec![Span::styled(whole(hints, usize::from(places.keys.width)), THEME.quiet)]);
     }
 
     fn told(&self, shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
@@ -251,5 +275,22 @@ fn help(area: Rect, buf: &mut Buffer) {
     for (row, (key, effect)) in inside.rows().zip(KEYS) {
         let words = fit(effect, usize::from(row.width).saturating_sub(9));
         line(buf, row, vec![Span::styled(format!("{key:<8} "), THEME.key), Span::raw(words)]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::whole;
+
+    #[test]
+    fn hints_are_whole_and_the_way_out_is_among_them() {
+        let hints = ["? keys", "q leave", "space runs", "n step"];
+        assert_eq!(whole(&hints, 40), "space runs  n step  ? keys  q leave");
+        assert_eq!(whole(&hints, 34), "space runs  ? keys  q leave");
+        assert_eq!(
+            (whole(&hints, 15), whole(&hints, 6), whole(&hints, 5)),
+            ("? keys  q leave".into(), "? keys".into(), String::new())
+        );
+        assert_eq!(whole(&["? keys", "j k choose"], 60), "j k choose  ? keys");
     }
 }

@@ -105,6 +105,8 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
             app.terminal.size = size;
             app.frame.picture = None;
             app.main.interactions = 0;
+            app.input.editor.refit();
+            app.input.palette.refit();
             let mut effects = vec![Effect::Encode, Effect::Repaint];
             if app.layout().is_none() && app.session.run_mode.is_some() {
                 app.note(Tone::Note, "paused: the screen was too small to see anything");

@@ -92,8 +92,13 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
             effects
         }
         SessionEvent::Read(wish) => {
+            // The line under the instruction says the same, where there is one.
+            let is_shown = app.layout().is_some() && !app.is_frame_alone();
             for (tone, text) in reading(&wish) {
-                app.note(tone, text);
+                if is_shown { app.write(tone, text) } else { app.note(tone, text) }
+            }
+            if let Some(why) = &wish.unasked {
+                app.note(Tone::Bad, format!("read by the program itself: {why}"));
             }
             vec![]
         }
@@ -200,9 +205,6 @@ fn reading(wish: &Wish) -> Vec<(Tone, String)> {
     if !wish.understood.is_empty() {
         let by = wish.read_by.as_ref().map_or(String::new(), |name| format!(" by {name}"));
         lines.push((Tone::Note, format!("understood{by}: {}", wish.understood)));
-    }
-    if let Some(why) = &wish.unasked {
-        lines.push((Tone::Bad, format!("read by the program itself: {why}")));
     }
     if let Some(why) = &wish.ungraded {
         lines.push((Tone::Bad, format!("not graded: {why}")));
