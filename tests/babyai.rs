@@ -71,7 +71,7 @@ fn the_bot_is_explored_in_a_terminal_back_and_forth_until_it_is_done() {
     session.press("m");
     session.press(" ");
     session.see("over: done");
-    session.press("q");
+    session.press("qq");
     assert_eq!(session.end(), 0);
     session.is_restored();
 }

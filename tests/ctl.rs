@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::program::{Sprint, wait_for};
 use crate::terminal::Session;
+use crate::training::{demonstrations, done};
 
 /// Seeds enough for an evaluation that lasts until it is stopped, however busy the machine is.
 const ENDLESS: u32 = 4_000;
@@ -45,6 +46,11 @@ impl Steered {
         let ended = self.ctl(line);
         assert!(ended.status.success(), "{line}: {}", String::from_utf8_lossy(&ended.stderr));
         String::from_utf8(ended.stdout).unwrap()
+    }
+
+    /// Tells an explorer something of several words.
+    fn tell(&self, words: &str) {
+        assert!(self.command("ctl instruct").arg(words).status().unwrap().success());
     }
 
     fn refusal(&self, line: &str) -> String {
@@ -176,6 +182,117 @@ fn an_explorer_is_told_run_paused_and_ended_from_another_terminal() {
     let told = status();
     assert_eq!((&told["kind"], &told["instruction"]), (&"explore".into(), &"Pick up the quince.".into()));
     assert!(told["progress"]["done"].as_u64().unwrap() > 0);
+    ctl(&["stop"]);
+    assert_eq!(session.end(), 130, "as after a signal");
+    assert_eq!(ctl(&["list", "--json"]), "");
+}
+
+#[test]
+fn a_training_that_was_paused_ends_with_the_same_bytes() {
+    let Some(sprint) = demonstrations() else { return };
+    let longer = sprint.read("tiny.toml").replace("steps = 6\n", "steps = 120\n");
+    std::fs::write(sprint.path("longer.toml"), longer).unwrap();
+    let line = "pretrain D --preset longer.toml --out paused";
+    let mut paused = sprint.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let status = || serde_json::from_str::<Value>(&done(&sprint, "ctl status --json --of pretrain")).unwrap();
+    wait_for(|| done(&sprint, "ctl list --json").contains("\"stage\":\"policy\""));
+    wait_for(|| status()["progress"]["done"].as_u64().unwrap() > 3);
+    done(&sprint, "ctl pause --of paused");
+    assert_eq!(status()["state"], "paused");
+    let before = status()["progress"]["done"].as_u64().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let after = status()["progress"]["done"].as_u64().unwrap();
+    assert!(after <= before + 1 && after < 120, "{before} {after}: no more than the step under way");
+    assert!(paused.try_wait().unwrap().is_none());
+    assert!(sprint.run("ctl instruct Hello").stderr.contains("a training is told nothing"));
+    done(&sprint, "ctl resume --of paused");
+    assert!(paused.wait().unwrap().success());
+    done(&sprint, "pretrain D --preset longer.toml --out whole");
+    let [whole, paused] =
+        ["whole", "paused"].map(|run| std::fs::read(sprint.path(run).join("model.safetensors")).unwrap());
+    assert!(whole == paused, "the weights are others");
+}
+
+/// An explorer without a screen, whose input stays open.
+fn plain(steered: &Steered, line: &str) -> Child {
+    let mut command = steered.command(&format!("explore --plain --policy random {line}"));
+    command.env("SPRINT_PYTHON", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corridor_server.py"));
+    let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    wait_for(|| steered.list().iter().any(|one| one["instruction"].is_string()));
+    child
+}
+
+/// What it printed in all, once it has ended well.
+fn printed(child: Child) -> String {
+    let ended = child.wait_with_output().unwrap();
+    let shown = String::from_utf8(ended.stdout).unwrap();
+    assert!(ended.status.success(), "{shown}");
+    shown
+}
+
+#[test]
+fn an_explorer_without_a_screen_is_told_run_paused_and_ended_while_it_waits_for_a_line() {
+    let steered = Steered::new();
+    let mut child = plain(&steered, "--seed 3");
+    // An input that ends would end the explorer.
+    let input = child.stdin.take();
+    steered.tell("pick up the quince");
+    let status = || serde_json::from_str::<Value>(&steered.text("status --json")).unwrap();
+    wait_for(|| status()["instruction"] == "Pick up the quince.");
+    steered.text("resume");
+    wait_for(|| status()["progress"]["done"].as_u64().unwrap() > 1);
+    assert_eq!(status()["state"], "running");
+    steered.text("pause");
+    wait_for(|| status()["state"] == "paused");
+    assert!(status()["progress"]["done"].as_u64().unwrap() < 1000, "it was paused on the way");
+    steered.text("stop");
+    let shown = printed(child);
+    drop(input);
+    assert!(shown.contains("instruction: Pick up the quince.") && shown.contains("step 2: "), "{shown}");
+    assert!(steered.list().is_empty() && steered.sockets().is_empty());
+}
+
+#[test]
+fn an_explorer_of_another_environment_without_a_screen_is_steered_too() {
+    let steered = Steered::new();
+    let mut child = plain(&steered, "--env gym:none --seed 2");
+    let input = child.stdin.take();
+    let status = || serde_json::from_str::<Value>(&steered.text("status --json")).unwrap();
+    assert_eq!(status()["what"], "gym:none, random");
+    steered.text("instruct home");
+    wait_for(|| status()["instruction"] == "Home.");
+    let mut tail = steered.command("ctl tail").stdout(Stdio::piped()).spawn().unwrap();
+    steered.text("resume");
+    wait_for(|| status()["state"] == "paused" && status()["progress"]["done"].as_u64().unwrap() >= 5);
+    steered.text("stop");
+    let heard: Vec<String> = BufReader::new(tail.stdout.take().unwrap()).lines().map(Result::unwrap).collect();
+    assert!(heard.iter().any(|line| line.starts_with("step ")) && heard.contains(&"over: done".into()), "{heard:?}");
+    let shown = printed(child);
+    drop(input);
+    assert!(tail.wait().unwrap().success());
+    assert!(shown.contains("told: Home.") && shown.contains("over: done"), "{shown}");
+}
+
+#[test]
+fn the_screen_of_another_environment_is_steered_too() {
+    let state = tempfile::tempdir().unwrap();
+    let corridor = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corridor_server.py"));
+    let arguments = ["--env", "gym:none", "--policy", "random", "--seed", "2", "--paused", "--graphics", "halfblocks"];
+    let variables = [("SPRINT_PYTHON", corridor)];
+    let mut session = Session::open_where(state.path(), (80, 24), "explore", &arguments, &variables);
+    session.see("asked: go to the right end");
+    let ctl = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
+        let ended =
+            command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path().join("runtime")).output().unwrap();
+        assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
+        String::from_utf8(ended.stdout).unwrap()
+    };
+    ctl(&["instruct", "go home"]);
+    session.see("told: Go home.");
+    ctl(&["resume"]);
+    session.see("over: done");
+    wait_for(|| serde_json::from_str::<Value>(&ctl(&["status", "--json"])).unwrap()["state"] == "paused");
     ctl(&["stop"]);
     assert_eq!(session.end(), 130, "as after a signal");
     assert_eq!(ctl(&["list", "--json"]), "");

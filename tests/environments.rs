@@ -232,6 +232,24 @@ fn a_served_environment_is_explored_on_a_screen() {
 }
 
 #[test]
+fn a_refusal_stays_whatever_comes_of_what_was_asked_before() {
+    let server = Server::start("late");
+    let state = tempfile::tempdir().unwrap();
+    let env = format!("openenv:{}", server.url);
+    let mut session = Session::open(state.path(), (80, 24), "explore", &["--env", &env, "--seed", "2"]);
+    session.see("asked: go to the right end");
+    // The third step takes three seconds.
+    session.press("nnn:fly\r");
+    session.see("\"fly\" is none of");
+    session.see("step 3/3");
+    session.see("\"fly\" is none of");
+    session.press("h");
+    session.miss("\"fly\" is none of");
+    session.press("qq");
+    assert_eq!(session.end(), 0);
+}
+
+#[test]
 fn a_screen_says_how_long_it_waits_and_leaves_at_once() {
     let server = Server::start("hangs");
     let state = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! `sprint explore`: opens what the explorer starts in, and starts it.
 
-use std::io::{IsTerminal, Write};
+use std::io::{BufReader, IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -27,6 +27,7 @@ use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::explore::kept_session::KeptSession;
 use crate::explore::plain;
+use crate::explore::plain_input::PlainInput;
 use crate::explore::start_list::{self, Start, StartFolders};
 use crate::tui::config::ExplorerConfig;
 use crate::tui::graphics::Protocol;
@@ -120,9 +121,11 @@ impl Display {
         open: impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static,
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
-            let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
+            let (input, control) = PlainInput::steered(BufReader::new(std::io::stdin()))?;
+            let out = Printable::new(std::io::stdout().lock());
+            let _listens = control.listen();
             // At a terminal a person has seen what was refused; of a script nobody may have.
-            let obeyed = plain::run(open()?, input, out)? || std::io::stdin().is_terminal();
+            let obeyed = plain::run(open()?, input, &control, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
         self.show_screen(kind, manual, || Opening::Named(Box::new(open)), || from.list())
@@ -134,8 +137,11 @@ impl Display {
     /// When the environment cannot be reached, or there is no terminal.
     pub(crate) fn show_elsewhere(self, manual: bool, open: OpenOwn, agent: PolicySource) -> anyhow::Result<ExitStatus> {
         if self.plain {
-            let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
-            let obeyed = elsewhere::plain::run(open()?, &agent, input, out)? || std::io::stdin().is_terminal();
+            let (input, control) = PlainInput::steered(BufReader::new(std::io::stdin()))?;
+            let out = Printable::new(std::io::stdout().lock());
+            let _listens = control.listen();
+            let obeyed =
+                elsewhere::plain::run(open()?, &agent, input, &control, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
         let options = self.screen_options(PolicyKind::Random, manual)?;

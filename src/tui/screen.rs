@@ -20,7 +20,7 @@ use super::screen_loop::ScreenLoop;
 use super::session_worker::{Told, let_work_end, start_worker};
 use super::signals::PATIENCE;
 use super::start_page::StartPage;
-use super::steering::ExplorerControl;
+use super::steering::{ended_by_signal, obeyed_by};
 use super::taken_terminal::{TakenTerminal, TerminalOptions};
 use super::terminal;
 use super::theme::Ability;
@@ -65,7 +65,7 @@ pub(crate) fn run(
     let memory = screen.memory.as_deref();
     let options = TerminalOptions { protocol: screen.protocol, memory, log: screen.log.as_ref() };
     let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
-    let control = ExplorerControl::new(tell.clone());
+    let control = ended_by_signal(&tell);
     let listens = control.listen();
     let exit = loop {
         let is_heard = Arc::new(AtomicBool::new(true));
@@ -84,7 +84,7 @@ pub(crate) fn run(
                 return Ok(exit);
             }
         };
-        control.command(commands.clone());
+        control.command(obeyed_by(commands.clone()));
         let app = prepared(&screen, display.size()?, graphics.clone(), ability)?;
         if screen.runs && !screen.manual && !goes_on && app.layout().is_some() {
             commands.send(SessionCommand::Run { mode: RunMode::Policy, until: None })?;

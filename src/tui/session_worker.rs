@@ -8,10 +8,10 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
 use super::opening::Open;
-use super::steering::ExplorerControl;
 use super::update::Msg;
 use super::{terminal, worker};
 use crate::explore::session::SessionCommand;
+use crate::explore::steering::ExplorerControl;
 
 /// Where a worker tells what happens, as long as anybody wants to know.
 pub(super) struct Told {
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     fn told(tell: &SyncSender<Msg>) -> Told {
-        Told::new(tell.clone(), Arc::new(AtomicBool::new(true)), ExplorerControl::new(tell.clone()))
+        Told::new(tell.clone(), Arc::new(AtomicBool::new(true)), ExplorerControl::new(|| true))
     }
 
     #[test]

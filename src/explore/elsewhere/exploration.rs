@@ -68,6 +68,16 @@ pub(crate) struct OwnStepTaken {
     pub(crate) forked: Option<String>,
 }
 
+impl OwnStepTaken {
+    /// The step in a line.
+    pub(crate) fn in_words(&self) -> String {
+        let reward =
+            self.reward.filter(|reward| *reward != 0.0).map_or(String::new(), |reward| format!(", reward {reward}"));
+        let done = if self.completed { ", part done" } else { "" };
+        format!("step {}: {}: {}{reward}{done}", self.step, self.action, self.outcome)
+    }
+}
+
 /// The chance of a policy begins anew with each episode's seed.
 fn author_of(source: &PolicySource, seed: u64) -> Author {
     let checkpoint = source.checkpoint_hash.clone();

@@ -1,167 +1,223 @@
 //! The same without a screen: a line in, plain lines out.
 
-use std::io::{BufRead, Write};
+use std::io::Write;
 
 use super::command::OwnCommand;
 use super::exploration::{OwnExploration, OwnStepTaken};
 use super::view::OwnChoice;
 use crate::agent::policy_source::PolicySource;
+use crate::control::Order;
 use crate::data::text_file;
+use crate::explore::plain_input::{Asked, PlainInput};
+use crate::explore::steering::ExplorerControl;
 
 /// The most steps of a run that nothing stops.
 const MOST: u32 = 100_000;
 
-/// Obeys lines until `quit` or the end of the input; says whether all of them could be obeyed.
+/// Who asks, and who hears of it.
+struct Plain<'a, W> {
+    agent: &'a PolicySource,
+    input: PlainInput,
+    control: &'a ExplorerControl,
+    out: W,
+    /// Somebody ordered that it ends.
+    leaves: bool,
+}
+
+/// Obeys lines, and orders of those who steer it, until `quit` or the end of the input; says whether all of them could be
+/// obeyed.
 ///
 /// # Errors
 /// When reading or writing fails.
 pub(crate) fn run(
     mut exploration: OwnExploration,
     agent: &PolicySource,
-    input: impl BufRead,
-    mut out: impl Write,
+    input: PlainInput,
+    control: &ExplorerControl,
+    out: impl Write,
 ) -> anyhow::Result<bool> {
+    let mut plain = Plain { agent, input, control, out, leaves: false };
     let mut obeyed = true;
-    writeln!(out, "{}, seed {}", exploration.name(), exploration.seed())?;
-    writeln!(out, "told: {}", exploration.instruction())?;
-    for line in input.lines() {
-        let line = line?;
-        let line = text_file::line(&line).trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let done = match OwnCommand::parse(line) {
+    writeln!(plain.out, "{}, seed {}", exploration.name(), exploration.seed())?;
+    writeln!(plain.out, "told: {}", exploration.instruction())?;
+    while !plain.leaves {
+        plain.out.flush()?;
+        plain.note(&exploration, false);
+        let command = match plain.input.next() {
+            Asked::Over => break,
+            Asked::Ordered(Order::Stop) => break,
+            Asked::Ordered(Order::Pause) => continue,
+            Asked::Ordered(Order::Resume) => Ok(OwnCommand::Run),
+            Asked::Ordered(Order::Instruct(text)) => Ok(OwnCommand::Instruct(text)),
+            Asked::Line(line) => {
+                let line = line?;
+                let line = text_file::line(&line).trim();
+                if line.is_empty() || line.starts_with('#') {
+                    continue;
+                }
+                OwnCommand::parse(line)
+            }
+        };
+        let done = match command {
             Ok(OwnCommand::Quit) => break,
-            Ok(command) => obey(&mut exploration, agent, command, &mut out),
+            Ok(command) => plain.obey(&mut exploration, command),
             Err(complaint) => Err(anyhow::anyhow!(complaint)),
         };
         if let Err(error) = done {
             obeyed = false;
-            writeln!(out, "error: {error:#}")?;
+            writeln!(plain.out, "error: {error:#}")?;
+            control.say(format!("problem: {error:#}"));
         }
-        out.flush()?;
     }
+    plain.out.flush()?;
     Ok(obeyed)
 }
 
-fn obey(
-    exploration: &mut OwnExploration,
-    agent: &PolicySource,
-    command: OwnCommand,
-    out: &mut impl Write,
-) -> anyhow::Result<()> {
-    let exact_before = exploration.exactness();
-    match command {
-        OwnCommand::Step(count) => steps(exploration, count, out)?,
-        OwnCommand::Run => steps(exploration, MOST, out)?,
-        OwnCommand::Pause | OwnCommand::Quit => {}
-        OwnCommand::Move(by) => {
-            let step = i64::from(exploration.tree().present().step) + by;
-            exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
-            at(exploration, out)?;
-        }
-        OwnCommand::Goto(step) => {
-            exploration.seek(step);
-            at(exploration, out)?;
-        }
-        OwnCommand::Act(text) => {
-            let action = exploration.action(&text)?;
-            let taken = exploration.act(action)?;
-            told(exploration, &taken, out)?;
-        }
-        OwnCommand::Instruct(text) => {
-            exploration.instruct(&text)?;
-            writeln!(out, "told: {}", exploration.instruction())?;
-        }
-        OwnCommand::Compare(text) => {
-            for (told, choices) in exploration.compared(&text)? {
-                writeln!(out, "told: {told}")?;
-                list(&choices, out)?;
+impl<W: Write> Plain<'_, W> {
+    fn obey(&mut self, exploration: &mut OwnExploration, command: OwnCommand) -> anyhow::Result<()> {
+        let exact_before = exploration.exactness();
+        match command {
+            OwnCommand::Step(count) => self.steps(exploration, count)?,
+            OwnCommand::Run => self.steps(exploration, MOST)?,
+            OwnCommand::Pause | OwnCommand::Quit => {}
+            OwnCommand::Move(by) => {
+                let step = i64::from(exploration.tree().present().step) + by;
+                exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
+                at(exploration, &mut self.out)?;
             }
-        }
-        OwnCommand::Chance => {
-            exploration.choose(PolicySource::random())?;
-            writeln!(out, "{} acts", exploration.policy())?;
-        }
-        OwnCommand::Agent => {
-            exploration.choose(agent.clone())?;
-            writeln!(out, "{} acts", exploration.policy())?;
-        }
-        OwnCommand::Begin(seed) => begin(exploration, seed, out)?,
-        OwnCommand::Next => begin(exploration, exploration.seed().wrapping_add(1), out)?,
-        OwnCommand::Reset => {
-            exploration.seek(0);
-            at(exploration, out)?;
-        }
-        OwnCommand::Branch(number) => {
-            exploration.switch(number.wrapping_sub(1))?;
-            at(exploration, out)?;
-        }
-        OwnCommand::Branches => {
-            let tree = exploration.tree();
-            for (place, branch) in (1..).zip(tree.branches()) {
-                let mark = if place == tree.branch() + 1 { "*" } else { " " };
-                writeln!(out, "{mark} {place} {}: {} steps, {}", branch.name, tree.state(branch.tip).step, branch.why)?;
+            OwnCommand::Goto(step) => {
+                exploration.seek(step);
+                at(exploration, &mut self.out)?;
             }
-        }
-        OwnCommand::Break(condition) => {
-            let set = exploration.conditions.iter().position(|known| *known == condition);
-            match set {
-                Some(at) => drop(exploration.conditions.remove(at)),
-                None => exploration.conditions.push(condition),
+            OwnCommand::Act(text) => {
+                let action = exploration.action(&text)?;
+                let taken = exploration.act(action)?;
+                self.told(exploration, &taken)?;
             }
-            let all: Vec<String> = exploration.conditions.iter().map(ToString::to_string).collect();
-            writeln!(out, "stops at: {}", if all.is_empty() { "nothing".into() } else { all.join(", ") })?;
+            OwnCommand::Instruct(text) => {
+                exploration.instruct(&text)?;
+                writeln!(self.out, "told: {}", exploration.instruction())?;
+                self.control.say(format!("told: {}", exploration.instruction()));
+            }
+            OwnCommand::Compare(text) => {
+                for (told, choices) in exploration.compared(&text)? {
+                    writeln!(self.out, "told: {told}")?;
+                    list(&choices, &mut self.out)?;
+                }
+            }
+            OwnCommand::Chance => {
+                exploration.choose(PolicySource::random())?;
+                writeln!(self.out, "{} acts", exploration.policy())?;
+            }
+            OwnCommand::Agent => {
+                exploration.choose(self.agent.clone())?;
+                writeln!(self.out, "{} acts", exploration.policy())?;
+            }
+            OwnCommand::Begin(seed) => begin(exploration, seed, &mut self.out)?,
+            OwnCommand::Next => begin(exploration, exploration.seed().wrapping_add(1), &mut self.out)?,
+            OwnCommand::Reset => {
+                exploration.seek(0);
+                at(exploration, &mut self.out)?;
+            }
+            OwnCommand::Branch(number) => {
+                exploration.switch(number.wrapping_sub(1))?;
+                at(exploration, &mut self.out)?;
+            }
+            OwnCommand::Branches => {
+                let tree = exploration.tree();
+                for (place, branch) in (1..).zip(tree.branches()) {
+                    let mark = if place == tree.branch() + 1 { "*" } else { " " };
+                    writeln!(
+                        self.out,
+                        "{mark} {place} {}: {} steps, {}",
+                        branch.name,
+                        tree.state(branch.tip).step,
+                        branch.why
+                    )?;
+                }
+            }
+            OwnCommand::Break(condition) => {
+                let set = exploration.conditions.iter().position(|known| *known == condition);
+                match set {
+                    Some(at) => drop(exploration.conditions.remove(at)),
+                    None => exploration.conditions.push(condition),
+                }
+                let all: Vec<String> = exploration.conditions.iter().map(ToString::to_string).collect();
+                writeln!(self.out, "stops at: {}", if all.is_empty() { "nothing".into() } else { all.join(", ") })?;
+            }
+            OwnCommand::Save(path) => {
+                let wrote = exploration.save(path)?;
+                writeln!(self.out, "{wrote}")?;
+            }
+            OwnCommand::Look => look(exploration, &mut self.out)?,
         }
-        OwnCommand::Save(path) => {
-            let wrote = exploration.save(path)?;
-            writeln!(out, "{wrote}")?;
+        let exact = exploration.exactness();
+        if exact != exact_before {
+            writeln!(self.out, "going back: {exact}")?;
         }
-        OwnCommand::Look => look(exploration, out)?,
+        Ok(())
     }
-    let exact = exploration.exactness();
-    if exact != exact_before {
-        writeln!(out, "going back: {exact}")?;
+
+    fn steps(&mut self, exploration: &mut OwnExploration, count: u32) -> anyhow::Result<()> {
+        for _ in 0..count {
+            let taken = exploration.step()?;
+            self.told(exploration, &taken)?;
+            self.note(exploration, true);
+            if exploration.end().is_some() || self.is_paused(exploration)? {
+                break;
+            }
+            if let Some(condition) = exploration.stopped_by() {
+                writeln!(self.out, "stopped at: {condition}")?;
+                self.control.say(format!("stopped at: {condition}"));
+                break;
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Hears what is ordered while it runs; whether the run ends here.
+    fn is_paused(&mut self, exploration: &mut OwnExploration) -> anyhow::Result<bool> {
+        while let Some(order) = self.input.order() {
+            match order {
+                Order::Resume => {}
+                Order::Instruct(text) => self.obey(exploration, OwnCommand::Instruct(text))?,
+                Order::Pause => return Ok(true),
+                Order::Stop => {
+                    self.leaves = true;
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// Tells those who steer it how it stands.
+    fn note(&self, exploration: &OwnExploration, runs: bool) {
+        self.control.note(|seen| {
+            (seen.runs, seen.step) = (runs, exploration.tree().present().step);
+            seen.instruction = Some(exploration.instruction().to_owned());
+            seen.acts = format!("{}, {}", exploration.name(), exploration.policy());
+        });
+    }
+
+    fn told(&mut self, exploration: &OwnExploration, taken: &OwnStepTaken) -> anyhow::Result<()> {
+        let mut line = taken.in_words();
+        if let Some(branch) = &taken.forked {
+            line += &format!("; branch {branch} begins");
+        }
+        writeln!(self.out, "{line}")?;
+        self.control.say(line);
+        if let Some(end) = exploration.end() {
+            writeln!(self.out, "over: {end}")?;
+            self.control.say(format!("over: {end}"));
+        }
+        Ok(())
+    }
 }
 
 fn begin(exploration: &mut OwnExploration, seed: u64, out: &mut impl Write) -> anyhow::Result<()> {
     exploration.begin(seed)?;
     writeln!(out, "seed {seed}; told: {}", exploration.instruction())?;
-    Ok(())
-}
-
-fn steps(exploration: &mut OwnExploration, count: u32, out: &mut impl Write) -> anyhow::Result<()> {
-    for _ in 0..count {
-        let taken = exploration.step()?;
-        told(exploration, &taken, out)?;
-        if exploration.end().is_some() {
-            break;
-        }
-        if let Some(condition) = exploration.stopped_by() {
-            writeln!(out, "stopped at: {condition}")?;
-            break;
-        }
-    }
-    Ok(())
-}
-
-fn told(exploration: &OwnExploration, taken: &OwnStepTaken, out: &mut impl Write) -> anyhow::Result<()> {
-    write!(out, "step {}: {}: {}", taken.step, taken.action, taken.outcome)?;
-    if let Some(reward) = taken.reward.filter(|reward| *reward != 0.0) {
-        write!(out, ", reward {reward}")?;
-    }
-    if taken.completed {
-        write!(out, ", part done")?;
-    }
-    if let Some(branch) = &taken.forked {
-        write!(out, "; branch {branch} begins")?;
-    }
-    writeln!(out)?;
-    if let Some(end) = exploration.end() {
-        writeln!(out, "over: {end}")?;
-    }
     Ok(())
 }
 
@@ -215,7 +271,8 @@ mod tests {
         let agent = PolicySource::random();
         let exploration = OwnExploration::new(&serve(fault), Elsewhere::default(), agent.clone(), 2, None).unwrap();
         let mut out = Vec::new();
-        let obeyed = run(exploration, &agent, lines.as_bytes(), &mut out).unwrap();
+        let (input, control) = PlainInput::steered(std::io::Cursor::new(lines.to_owned())).unwrap();
+        let obeyed = run(exploration, &agent, input, &control, &mut out).unwrap();
         (obeyed, String::from_utf8(out).unwrap())
     }
 

@@ -4,7 +4,7 @@ mod chains;
 mod obey;
 mod render;
 
-use std::io::{BufRead, Write};
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -12,19 +12,24 @@ use std::time::Duration;
 use super::chain_report::ChainReport;
 use super::choices::Sort;
 use super::exploration::{Exploration, SessionSnapshot};
-use super::session::{Session, SessionCommand, SessionEvent};
+use super::plain_input::{Asked, PlainInput};
+use super::session::{RunMode, Session, SessionCommand, SessionEvent};
+use super::steering::ExplorerControl;
 use super::timeline::BranchPosition;
 use super::verb::{Verb, parse};
 use crate::agent::{Decision, Values};
 use crate::analysis::value_map::ValueMap;
+use crate::control::Order;
 use crate::data::text_file;
 use crate::domain::Heading;
 use render::{at, compare, divergence, opening, reading, step_line, verdict};
 
 /// A session without a screen, and what was last told of it.
-struct Plain<W> {
+struct Plain<'a, W> {
     session: Session,
     events: Receiver<SessionEvent>,
+    input: PlainInput,
+    control: &'a ExplorerControl,
     out: W,
     state: Option<Box<SessionSnapshot>>,
     decided: Option<(Decision, String, Option<Values>)>,
@@ -40,6 +45,8 @@ struct Plain<W> {
     sort: Sort,
     /// Something that was asked for was not done.
     refused: bool,
+    /// Somebody ordered that it ends.
+    leaves: bool,
 }
 
 /// Whether what was asked for was done. If not, that was told.
@@ -51,17 +58,27 @@ enum Answer {
 
 /// How long work in the background is waited for before it is asked whether it still goes on.
 const PATIENCE: Duration = Duration::from_millis(20);
+/// Runs that are not told how far end here.
+const FARTHEST: u32 = 1000;
 
-/// Obeys lines until `quit` or the end of the input; says whether all of them could be obeyed.
+/// Obeys lines, and orders of those who steer it, until `quit` or the end of the input; says whether all of them could be
+/// obeyed.
 ///
 /// # Errors
 /// When reading or writing fails.
-pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write) -> anyhow::Result<bool> {
+pub(crate) fn run(
+    exploration: Exploration,
+    input: PlainInput,
+    control: &ExplorerControl,
+    out: impl Write,
+) -> anyhow::Result<bool> {
     let (tell, events) = channel();
     let session = Session::on_request(exploration, Arc::new(move |event| drop(tell.send(event))));
     let mut plain = Plain {
         session,
         events,
+        input,
+        control,
         out,
         state: None,
         decided: None,
@@ -72,13 +89,22 @@ pub(crate) fn run(exploration: Exploration, input: impl BufRead, out: impl Write
         heading: None,
         sort: Sort::Probability,
         refused: false,
+        leaves: false,
     };
     opening(&plain.state()?, &mut plain.out)?;
     plain.session.begin();
     plain.take_events(Echo::Everything)?;
     plain.out.flush()?;
-    for line in input.lines() {
-        let line = line?;
+    while !plain.leaves {
+        let line = match plain.input.next() {
+            Asked::Over => break,
+            Asked::Line(line) => line?,
+            Asked::Ordered(order) => {
+                plain.carry_out(order)?;
+                plain.out.flush()?;
+                continue;
+            }
+        };
         let line = text_file::line(&line).trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
@@ -109,7 +135,38 @@ enum Echo {
     Errors,
 }
 
-impl<W: Write> Plain<W> {
+impl<W: Write> Plain<'_, W> {
+    /// Does what is ordered while nothing else is under way.
+    fn carry_out(&mut self, order: Order) -> anyhow::Result<()> {
+        let command = match order {
+            Order::Stop => {
+                self.leaves = true;
+                return Ok(());
+            }
+            Order::Pause => SessionCommand::Pause,
+            Order::Resume => SessionCommand::Run { mode: RunMode::Steps(FARTHEST), until: None },
+            Order::Instruct(text) => SessionCommand::Instruct(text),
+        };
+        self.ask(command).map(drop)
+    }
+
+    /// Does what is ordered while something is under way.
+    fn hear_orders(&mut self) {
+        while let Some(order) = self.input.order() {
+            match order {
+                Order::Stop => {
+                    self.leaves = true;
+                    self.session.apply(SessionCommand::Pause);
+                    self.session.apply(SessionCommand::Stop);
+                }
+                Order::Pause => self.session.apply(SessionCommand::Pause),
+                Order::Instruct(text) => self.session.apply(SessionCommand::Instruct(text)),
+                // It goes on.
+                Order::Resume => {}
+            }
+        }
+    }
+
     /// Asks for something, and writes what comes of it until it is over.
     fn ask(&mut self, command: SessionCommand) -> anyhow::Result<Answer> {
         self.session.apply(command);
@@ -138,6 +195,7 @@ impl<W: Write> Plain<W> {
     fn take_events(&mut self, echo: Echo) -> anyhow::Result<Answer> {
         let mut answer = Answer::Given;
         loop {
+            self.hear_orders();
             // Asked first: what ends meanwhile has told everything by then.
             let (runs, works) = (self.session.interval().is_some(), self.session.is_working());
             while let Ok(event) = self.events.try_recv() {
@@ -155,6 +213,7 @@ impl<W: Write> Plain<W> {
     }
 
     fn on_event(&mut self, event: SessionEvent, echo: Echo, answer: &mut Answer) -> anyhow::Result<()> {
+        self.control.hear(&event);
         let out = &mut self.out;
         match event {
             SessionEvent::Refused(reason) | SessionEvent::Failed(reason) => {
@@ -229,11 +288,13 @@ impl<W: Write> Plain<W> {
 #[cfg(test)]
 mod tests {
     use super::run;
+    use crate::explore::plain_input::PlainInput;
     use crate::explore::testing;
 
     fn say(lines: &str) -> String {
         let mut out = Vec::new();
-        run(testing::exploration(), lines.as_bytes(), &mut out).unwrap();
+        let (input, control) = PlainInput::steered(std::io::Cursor::new(lines.to_owned())).unwrap();
+        run(testing::exploration(), input, &control, &mut out).unwrap();
         String::from_utf8(out).unwrap()
     }
 

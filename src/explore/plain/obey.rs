@@ -4,15 +4,12 @@ use std::io::Write;
 
 use super::chains::{chains, values};
 use super::render::{branches, candidates, choices, look, next, opening, things};
-use super::{Answer, Plain};
+use super::{Answer, FARTHEST, Plain};
 use crate::explore::session::{RunMode, SessionCommand};
 use crate::explore::terms::TERMS;
 use crate::explore::verb::{ExplorerPage, Verb, table};
 
-/// Runs that are not told how far end here.
-const FARTHEST: u32 = 1000;
-
-impl<W: Write> Plain<W> {
+impl<W: Write> Plain<'_, W> {
     pub(super) fn obey(&mut self, verb: Verb) -> anyhow::Result<()> {
         let run = |count: u32, until| SessionCommand::Run { mode: RunMode::Steps(count), until };
         match verb {

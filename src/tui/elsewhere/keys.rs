@@ -101,7 +101,7 @@ impl OwnApp {
                 match command {
                     Ok(OwnCommand::Quit) => return self.quit(),
                     Ok(command) => self.ask_surely(command),
-                    Err(complaint) => self.said = Some((true, complaint)),
+                    Err(complaint) => self.refused = Some(complaint),
                 }
             }
             _ => self.editor.key(key),
@@ -121,7 +121,7 @@ impl OwnApp {
         let many = self.shown.as_ref().map_or(0, |shown| shown.choices.len());
         match key.code {
             KeyCode::Char('q') => return self.quit(),
-            KeyCode::Esc => (self.mode, self.compared) = (OwnMode::Watch, None),
+            KeyCode::Esc => (self.mode, self.compared, self.refused) = (OwnMode::Watch, None, None),
             KeyCode::Char('j') | KeyCode::Down if choosing => {
                 self.marked = (self.marked + 1).min(many.saturating_sub(1))
             }

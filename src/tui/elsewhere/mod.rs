@@ -4,6 +4,7 @@
 mod keys;
 mod layout;
 mod state;
+mod steering;
 mod view;
 mod worker;
 
@@ -18,6 +19,7 @@ use anyhow::Context;
 use super::graphics::{Protocol, inline};
 use super::paced_display::PacedDisplay;
 use super::screen::ScreenOptions;
+use super::steering::ended_by_signal;
 use super::taken_terminal::{QUEUE, TakenTerminal, TerminalOptions};
 use super::terminal;
 use super::update::{ExitReason, Msg};
@@ -37,7 +39,14 @@ pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> 
     let options =
         TerminalOptions { protocol: screen.protocol, memory: screen.memory.as_deref(), log: screen.log.as_ref() };
     let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
-    let commands = worker::start(open, agent, move |event| tell.send(Msg::Elsewhere(Box::new(event))).is_ok())?;
+    let control = ended_by_signal(&tell);
+    let heard = control.clone();
+    let commands = worker::start(open, agent, move |event| {
+        steering::heard_by(&heard, &event);
+        tell.send(Msg::Elsewhere(Box::new(event))).is_ok()
+    })?;
+    control.command(steering::obeyed_by(commands.clone()));
+    let listens = control.listen();
     let mut app = OwnApp::new(display.size()?, graphics, ability, screen.config.scheme, commands);
     app.traffic.limit = screen.bandwidth;
     if screen.runs && !screen.manual {
@@ -48,6 +57,8 @@ pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> 
     }
     let exit = run_loop(&mut app, &mut display, &messages);
     drop(guard);
+    control.leave();
+    drop(listens);
     exit
 }
 

@@ -64,6 +64,8 @@ pub(crate) struct OwnApp {
     pub(super) traffic: Traffic,
     pub(super) is_running: bool,
     pub(super) said: Option<(bool, String)>,
+    /// Why what was typed or pressed last is not done; it stays whatever comes of what was asked before.
+    pub(super) refused: Option<String>,
     pub(super) compared: Option<Vec<(String, Vec<OwnChoice>)>>,
     pub(super) mode: OwnMode,
     pub(super) editor: Editor,
@@ -96,6 +98,7 @@ impl OwnApp {
             traffic: Traffic::default(),
             is_running: false,
             said: None,
+            refused: None,
             compared: None,
             mode: OwnMode::Watch,
             editor: Editor::default(),
@@ -127,7 +130,7 @@ impl OwnApp {
         let _ = self.commands.send(command);
         let (since, many) = self.waiting.unwrap_or_else(|| (Instant::now(), 0));
         self.waiting = Some((since, many + 1));
-        self.compared = None;
+        (self.compared, self.refused) = (None, None);
     }
 
     /// Whether something that would lose steps was asked for again: the first time it is said what would be lost.
@@ -141,7 +144,7 @@ impl OwnApp {
         self.asked = Some(command.clone());
         let what = if *command == OwnCommand::Quit { "leaves" } else { "forgets them" };
         let steps = counted(unsaved, "step");
-        self.said = Some((true, format!("Not saved: {steps}. S saves, the same again {what}")));
+        self.refused = Some(format!("Not saved: {steps}. S saves, the same again {what}"));
         false
     }
 

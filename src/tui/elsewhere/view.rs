@@ -67,7 +67,8 @@ impl OwnApp {
         timeline(shown, places.timeline, buf);
         last(shown, places.last, buf);
         let below = Rect { y: places.last.y + 1, ..places.last };
-        let exact = match (&self.said, &shown.undecided) {
+        let refused = self.refused.as_ref().map(|why| (true, why.clone()));
+        let exact = match (refused.as_ref().or(self.said.as_ref()), &shown.undecided) {
             (Some((true, words)), _) => Span::styled(words.clone(), THEME.bad),
             (Some((false, words)), _) => Span::styled(words.clone(), THEME.good),
             (None, Some(problem)) => Span::styled(problem.clone(), THEME.bad),
