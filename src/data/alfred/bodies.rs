@@ -16,7 +16,7 @@ const ARM: i32 = 100;
 const ARM_RISE: i32 = 180;
 const BOWL: i32 = 420;
 /// Walls of tubs and cupboards around their contents.
-const WALL: i32 = 30;
+pub(crate) const WALL: i32 = 30;
 /// What it costs to turn something away from its users, in units of overlap.
 const RETURN: f32 = 0.03;
 /// A cupboard's contents need at least this height.
@@ -104,7 +104,7 @@ fn first_guess(fixture: &Fixture, row: &Furniture, floor: i32) -> Cuboid {
 }
 
 /// What the outer box has to contain: where things stood, without the margin.
-fn contents(fixture: &Fixture, row: &Furniture) -> Option<Cuboid> {
+pub(crate) fn contents(fixture: &Fixture, row: &Furniture) -> Option<Cuboid> {
     let (lowest, highest) = (fixture.surfaces.first()?, fixture.surfaces.last()?);
     let area = outline(fixture);
     match row.build {

@@ -60,6 +60,10 @@ pub(crate) struct Subject<'a> {
     pub(crate) cells: &'a [Cell],
     /// Which sides may move: smallest x, y, z, then largest.
     pub(crate) free: [bool; 6],
+    /// Moves any sides together, not only opposite ones.
+    pub(crate) together: bool,
+    /// What lines of sight it blocks costs, of an outer box.
+    pub(crate) blocks: &'a dyn Fn(&Cuboid) -> f32,
     /// Turns the outer box into the boxes of the body.
     pub(crate) parts: &'a dyn Fn(Cuboid) -> Vec<Cuboid>,
 }
@@ -88,12 +92,23 @@ impl<'a> Subject<'a> {
             meshes: Vec::new(),
         };
         let world = World::new(&scene, Pose::default(), Vec::new());
-        Subject { scene, world, views: views(uses), contents: None, cells, free: [true; 6], parts }
+        let views = views(uses);
+        Subject {
+            scene,
+            world,
+            views,
+            contents: None,
+            cells,
+            free: [true; 6],
+            together: false,
+            blocks: &|_| 0.0,
+            parts,
+        }
     }
 
     /// The outer box that agrees best with all views, starting from `first`, and how badly it still does.
     pub(crate) fn fit(&mut self, first: Cuboid) -> (Cuboid, f32) {
-        if self.views.is_empty() {
+        if self.views.is_empty() && (self.blocks)(&first) <= 0.0 {
             return (first, 0.0);
         }
         let start = sides(first);
@@ -102,7 +117,7 @@ impl<'a> Subject<'a> {
         for step in STEPS {
             for _ in 0..SWEEPS {
                 let before = least;
-                for moved in moves(step) {
+                for moved in if self.together { joint_moves(step) } else { moves(step) } {
                     if (0..6).any(|side| moved[side] != 0 && !self.free[side]) {
                         continue;
                     }
@@ -129,7 +144,7 @@ impl<'a> Subject<'a> {
         }
         let moved: i32 = (0..6).map(|side| (sides[side] - start[side]).abs()).sum();
         let trodden = self.cells.iter().filter(|cell| stands_in(cell, &outer)).count();
-        let mut cost = STIFF * moved as f32 / 1000.0 + trodden as f32;
+        let mut cost = STIFF * moved as f32 / 1000.0 + trodden as f32 + (self.blocks)(&outer);
         self.scene.fixtures[0].body = (self.parts)(outer);
         for view in &self.views {
             self.world.fixtures[0] = FixtureState { open: view.open, on: false };
@@ -164,6 +179,12 @@ fn moves(step: i32) -> Vec<[i32; 6]> {
     moves
 }
 
+/// Any sides in or out together.
+fn joint_moves(step: i32) -> Vec<[i32; 6]> {
+    let digit = |number: i32, side: u32| (number / 3i32.pow(side) % 3 - 1) * step;
+    (0..3i32.pow(6)).map(|number| [0, 1, 2, 3, 4, 5].map(|side| digit(number, side))).collect()
+}
+
 fn sides(cuboid: Cuboid) -> [i32; 6] {
     let (min, max) = (cuboid.min, cuboid.max);
     [min.x, min.y, min.z, max.x, max.y, max.z]
@@ -173,7 +194,7 @@ fn cuboid([x, y, z, right, top, far]: [i32; 6]) -> Cuboid {
     Cuboid { min: Point::new(x, y, z), max: Point::new(right, top, far) }
 }
 
-fn contains(outer: &Cuboid, inner: &Cuboid) -> bool {
+pub(crate) fn contains(outer: &Cuboid, inner: &Cuboid) -> bool {
     let (outer, inner) = (sides(*outer), sides(*inner));
     (0..3).all(|axis| outer[axis] <= inner[axis] && inner[axis + 3] <= outer[axis + 3])
 }

@@ -56,7 +56,7 @@ fn is_fixture(class: Class) -> bool {
     class != Class::NONE && !class.info().pickupable
 }
 
-fn is_basin(class: Class) -> bool {
+pub(crate) fn is_basin(class: Class) -> bool {
     matches!(class.name(), "Sink" | "Bathtub")
 }
 

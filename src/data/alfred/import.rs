@@ -11,7 +11,7 @@ use super::checkout::{find, read};
 use super::layout::FloorPlanLayout;
 use super::recording::{RecordedStart, Recording};
 use super::tasks::{self, OFFICIAL};
-use super::{parents, scenes, trajectories};
+use super::{clearing, parents, scenes, trajectories};
 use crate::data::dataset::{Counts, DatasetManifest, DatasetWriter, Skipped};
 use crate::domain::{Scene, Trajectory};
 use crate::house::validate;
@@ -194,7 +194,9 @@ fn build_one(folder: &Path, name: &str, recordings: &[&Recording], settings: &[&
             Err(reason) => skipped.push(skip(recording, reason)),
         }
     }
-    (Some(built.scene), resolved, skipped)
+    let mut scene = built.scene;
+    clearing::clear(&mut scene, &built.inventory, &resolved.iter().collect::<Vec<_>>());
+    (Some(scene), resolved, skipped)
 }
 
 /// How much of each split there is.

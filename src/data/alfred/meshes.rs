@@ -40,7 +40,21 @@ pub(crate) fn meshes(recordings: &[&Recording], agent_y: i32) -> Vec<Mesh> {
         }
     }
     sights.retain(|_, sights| sights.len() >= LEAST);
-    sights.into_iter().map(|(name, sights)| fit(name, &sights, agent_y)).collect()
+    let mut meshes: Vec<Mesh> = sights.into_iter().map(|(name, sights)| fit(name, &sights, agent_y)).collect();
+    let placed = recordings.iter().flat_map(|recording| &recording.setting.objects);
+    for placed in placed.filter(|placed| placed.class.name() == "PaperTowelRoll") {
+        if !meshes.iter().any(|mesh| mesh.name == placed.mesh) {
+            meshes.push(roll(placed));
+        }
+    }
+    meshes
+}
+
+/// Nobody takes paper towel rolls. They stand with their pivot 105 mm above counters and tables, the median of all plans that
+/// have any: it is their middle.
+fn roll(placed: &Placed) -> Mesh {
+    let shape = placed.class.info().shape;
+    Mesh { name: placed.mesh.clone(), shape, size: [120, 210, 120], offset: [0, 0, 0] }
 }
 
 /// Pickups and slices of objects that were not touched before. A drawer's contents slide with it: they are left out.

@@ -2,6 +2,8 @@
 
 pub(crate) mod bodies;
 pub mod checkout;
+pub(crate) mod carving;
+pub(crate) mod clearing;
 pub(crate) mod cover;
 pub(crate) mod facing;
 pub(crate) mod files;
@@ -17,6 +19,7 @@ pub(crate) mod parents;
 pub(crate) mod presence;
 pub(crate) mod recording;
 pub mod scenes;
+pub(crate) mod sightlines;
 pub(crate) mod support;
 pub mod tasks;
 pub(crate) mod trajectories;

@@ -5,13 +5,15 @@ use glam::{Mat3, Vec3};
 use super::looks::{FilledBox, Look, Variant};
 use super::solid::{RgbF32, Solid, SolidKind};
 use crate::domain::place::Cuboid;
-use crate::domain::scene::{Fixture, Scene};
+use crate::domain::scene::{Fixture, Scene, Surface};
 use crate::domain::world::FixtureState;
 use crate::domain::{Heading, Point};
 use crate::house::{doors, placing};
 
 /// Pieces lower than this are slabs: counter tops, boards.
 const SLAB: i32 = 80;
+/// How far a board in a cupboard reaches before the area that things stand on, in millimetres.
+pub(crate) const BOARD_BEFORE_AREA: i32 = 120;
 /// A hole thinner than this is not worth cutting, in millimetres.
 const THIN: i32 = 2;
 
@@ -95,6 +97,7 @@ fn open_up(fixture: &Fixture, look: &Look, variant: Variant, out: &mut Vec<Solid
     for surface in &fixture.surfaces {
         if surface.height > body.min.y + 40 && surface.height < body.max.y {
             let (low, high) = (Point { y: surface.height - 12, ..body.min }, Point { y: surface.height, ..body.max });
+            let (low, high) = set_back(fixture, surface, low, high);
             let mut shelf = place(fixture.facing, &Cuboid { min: low, max: high }, None);
             // Set back from the front, so that it is seen as inside.
             shelf.centre += shelf.axes.z_axis * 0.06;
@@ -102,6 +105,22 @@ fn open_up(fixture: &Fixture, look: &Look, variant: Variant, out: &mut Vec<Solid
             out.push(plain(&shelf, inner, inner));
         }
     }
+}
+
+/// A board that ends a little before the area that things stand on, where that ends far behind the front.
+fn set_back(fixture: &Fixture, surface: &Surface, mut low: Point, mut high: Point) -> (Point, Point) {
+    let (dx, dz) = fixture.facing.step();
+    let reach = |axis: usize, out: bool| {
+        let edges = surface.areas.iter().map(move |area| if out { area.max[axis] } else { area.min[axis] });
+        if out { edges.max() } else { edges.min() }
+    };
+    match (dx, dz) {
+        (1, _) => high.x = reach(0, true).map_or(high.x, |x| high.x.min((x + BOARD_BEFORE_AREA).max(low.x))),
+        (-1, _) => low.x = reach(0, false).map_or(low.x, |x| low.x.max((x - BOARD_BEFORE_AREA).min(high.x))),
+        (_, 1) => high.z = reach(1, true).map_or(high.z, |z| high.z.min((z + BOARD_BEFORE_AREA).max(low.z))),
+        _ => low.z = reach(1, false).map_or(low.z, |z| low.z.max((z - BOARD_BEFORE_AREA).min(high.z))),
+    }
+    (low, high)
 }
 
 /// The surfaces of a fixture without a body, as thin boards.
