@@ -78,6 +78,22 @@ impl Progress {
         })
     }
 
+    /// Whether an interaction brings about the present goal at once, as far as one can tell which thing is meant.
+    pub(crate) fn is_fulfilled_by(&self, kind: ActionType, class: Class) -> bool {
+        let Some(goal) = self.goal() else { return false };
+        match (goal.skill, kind) {
+            (SkillKind::Pickup, ActionType::Pickup) => {
+                let any_will_do = goal.place.is_none() && self.placed.iter().all(|(placed, _)| *placed != class);
+                goal.is_object(class) && !goal.slice && any_will_do
+            }
+            (SkillKind::Put, ActionType::Put) => {
+                goal.receptacle == Some(class) && self.held.is_some_and(|held| goal.is_object(held))
+            }
+            (SkillKind::Toggle, ActionType::ToggleOn) | (SkillKind::Slice, ActionType::Slice) => goal.is_object(class),
+            _ => false,
+        }
+    }
+
     /// Whether the present goal is the last one.
     pub(crate) fn is_last(&self) -> bool {
         self.at + 1 >= self.goals.len()
@@ -134,6 +150,29 @@ mod tests {
         };
         assert_eq!(held(SkillKind::Put), Some(mug));
         assert_eq!(held(SkillKind::Pickup), Some(Class::NONE));
+    }
+
+    #[test]
+    fn a_goal_is_brought_about_by_its_own_interaction_with_a_thing_that_must_be_the_one() {
+        use ActionType::{Pickup, Put, ToggleOn};
+        let [mug, cup, sink] = ["Mug", "Cup", "Sink"].map(|name| Class::named(name).unwrap());
+        let goal = Goal {
+            skill: SkillKind::Pickup,
+            object: mug,
+            others: Vec::new(),
+            receptacle: None,
+            place: None,
+            slice: false,
+        };
+        let at = |goal: &Goal| Progress { goals: vec![goal.clone()], ..Progress::default() };
+        assert!(at(&goal).is_fulfilled_by(Pickup, mug));
+        assert!(!at(&goal).is_fulfilled_by(Pickup, cup) && !at(&goal).is_fulfilled_by(ToggleOn, mug));
+        assert!(!at(&Goal { place: Some(sink), ..goal.clone() }).is_fulfilled_by(Pickup, mug), "it may lie elsewhere");
+        let placed = Progress { placed: vec![(mug, Cell::new(0, 0))], ..at(&goal) };
+        assert!(!placed.is_fulfilled_by(Pickup, mug), "it may be another one");
+        let put = Goal { skill: SkillKind::Put, receptacle: Some(sink), ..goal };
+        let holds = |held| Progress { held: Some(held), ..at(&put) };
+        assert!(holds(mug).is_fulfilled_by(Put, sink) && !holds(cup).is_fulfilled_by(Put, sink));
     }
 
     #[test]

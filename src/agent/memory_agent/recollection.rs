@@ -12,6 +12,7 @@ use super::features::Choice;
 use super::goal::Goal;
 use super::macro_action::{MacroAction, Purpose};
 use super::mind::{Mind, Moment};
+use super::progress::Progress;
 use crate::agent::decision::Decision;
 use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::env::Environment;
@@ -25,6 +26,9 @@ const REACHED: f32 = 0.5;
 
 /// So many times as likely is what goes on with what was set out to last: of two equally good ends, one is reached.
 const COMMITMENT: f32 = 2.5;
+
+/// So many times as likely is what brings about the goal now: what can be done is certain, what is seen is not.
+const AT_ONCE: f32 = 20.0;
 
 /// All that is carried from step to step in a slot.
 #[derive(Clone, Debug)]
@@ -160,9 +164,12 @@ impl Recollection {
         let open: Vec<(usize, &MacroAction)> =
             actions.iter().enumerate().filter(|(_, action)| !any_new || is_new(action)).collect();
         let aim = self.aim;
+        let progress = &self.mind.progress;
         let weight = |index: usize| {
             let goes_on = actions.get(index).is_some_and(|action| goes_on(aim, action));
-            probabilities.get(index).copied().unwrap_or(0.0) * if goes_on { COMMITMENT } else { 1.0 }
+            let fulfils = actions.get(index).is_some_and(|action| fulfils(action, progress));
+            let factor = if fulfils { AT_ONCE } else { 1.0 } * if goes_on { COMMITMENT } else { 1.0 };
+            probabilities.get(index).copied().unwrap_or(0.0) * factor
         };
         let by_chance = by_chance.then(|| self.rng.random::<f32>());
         let chosen = match by_chance {
@@ -200,6 +207,12 @@ impl Recollection {
 fn goes_on(aim: Option<Aim>, action: &MacroAction) -> bool {
     let near = |(was, is): (Cell, Cell)| was.apart(is) <= 2;
     aim.is_some_and(|(purpose, at)| purpose == action.purpose && at.zip(action.at).is_some_and(near))
+}
+
+/// Whether what can be done now brings about the goal.
+fn fulfils(action: &MacroAction, progress: &Progress) -> bool {
+    let Purpose::Interact(kind, class) = action.purpose else { return false };
+    action.first.kind == kind && progress.is_fulfilled_by(kind, class)
 }
 
 /// How a macro action begins, as the loop guard tells beginnings apart.
