@@ -17,13 +17,13 @@ fn with_child(sprint: &Sprint, line: &str) -> Ended {
 }
 
 /// A server that goes on until it is dropped, and its address.
-struct Server {
+pub(crate) struct Server {
     child: Child,
-    url: String,
+    pub(crate) url: String,
 }
 
 impl Server {
-    fn start(fault: &str) -> Server {
+    pub(crate) fn start(fault: &str) -> Server {
         let mut child = Command::new(SERVER).arg(fault).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();

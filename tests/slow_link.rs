@@ -242,3 +242,26 @@ fn slow_link_in_every_picture_mode() {
     }
     assert!(late.is_empty(), "`space` takes more than a second: {}", late.join("; "));
 }
+
+#[test]
+#[ignore = "it measures times, and takes half a minute"]
+fn slow_link_in_another_environment() {
+    let server = crate::environments::Server::start("none");
+    let environment = format!("openenv:{}", server.url);
+    for protocol in ["halfblocks", "sixel"] {
+        let mut far = Far::open(&["explore", "--env", &environment, "--graphics", protocol, "--policy", "random"]);
+        far.until("run", |text| text.contains("random acts"));
+        let mut longest = Duration::ZERO;
+        for moment in 0..5 {
+            far.pass(Duration::from_millis(1500 + 170 * moment));
+            // An episode that is over begins anew.
+            let is_running = far.text().contains("running");
+            far.press(if is_running { " " } else { "0 " });
+            longest = longest.max(far.until("answer", |text| text.contains("running") != is_running));
+        }
+        far.child.kill().unwrap();
+        far.child.wait().unwrap();
+        eprintln!("{protocol}: {:.2} s at most", longest.as_secs_f64());
+        assert!(longest <= Duration::from_secs(1), "{protocol}: {longest:?}");
+    }
+}

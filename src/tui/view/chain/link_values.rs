@@ -19,15 +19,19 @@ pub(super) struct LinkValueStrips<'a> {
     pub(super) selected: usize,
 }
 
-/// Columns before a strip.
+/// Columns before a strip, on a screen of 80 columns and on a wide one.
 const LABEL: u16 = 20;
+const WIDE_LABEL: u16 = 40;
+/// Columns of a wide one.
+const WIDE: u16 = 100;
 
 impl Widget for LinkValueStrips<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let many = self.sides.len() as u16;
         let steps =
             self.sides.iter().filter_map(|side| Some(side.by_link.as_ref()?.link_values.len())).max().unwrap_or(0);
-        let (height, width) = ((area.height - 1) / many, area.width.saturating_sub(LABEL));
+        let before = if area.width < WIDE { LABEL } else { WIDE_LABEL };
+        let (height, width) = ((area.height - 1) / many, area.width.saturating_sub(before));
         for (at, side) in (0u16..).zip(self.sides) {
             let place = Rect { y: area.y + at * height, height, ..area };
             let Some(play) = &side.by_link else {
@@ -40,9 +44,9 @@ impl Widget for LinkValueStrips<'_> {
             let rows = usize::from(inner.height);
             let first = (self.selected + 1).saturating_sub(rows).min(side.links.len().saturating_sub(rows));
             for (row, (link, words)) in inner.rows().zip(side.links.iter().enumerate().skip(first)) {
-                let label = format!("{:>2} {}", link + 1, fit(words, usize::from(LABEL) - 4));
+                let label = format!("{:>2} {}", link + 1, fit(words, usize::from(before) - 4));
                 put(buf, row, 0, label, if link == self.selected { THEME.chosen } else { THEME.quiet });
-                let strip = Rect { x: row.x + LABEL.min(row.width), width, ..row };
+                let strip = Rect { x: row.x + before.min(row.width), width, ..row };
                 for (column, place) in strip.positions().take(steps.min(usize::from(width))).enumerate() {
                     let step = if steps <= usize::from(width) { column } else { column * steps / usize::from(width) };
                     let Some(value) = play.link_values.get(step).and_then(|values| values.get(link)) else { continue };
@@ -58,7 +62,7 @@ impl Widget for LinkValueStrips<'_> {
             }
         }
         let foot = Rect { y: area.bottom() - 1, height: 1, ..area };
-        put(buf, foot, 0, format!("{:width$}{}", "", legend(self.sides), width = usize::from(LABEL)), THEME.quiet);
+        put(buf, foot, 0, format!("{:width$}{}", "", legend(self.sides), width = usize::from(before)), THEME.quiet);
     }
 }
 
