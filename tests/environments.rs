@@ -160,6 +160,10 @@ fn an_environment_is_explored_saved_verified_and_opened_without_a_screen() {
     }
     let verified = with_child(&sprint, "verify run");
     assert_eq!((verified.code, verified.stdout.contains("equal")), (Some(0), true), "{}", verified.stdout);
+    let exported = with_child(&sprint, "export run#2:1 film.gif seen.png told.txt page.html");
+    assert_eq!(exported.code, Some(0), "{}", exported.stderr);
+    assert!(std::fs::read(sprint.path("film.gif")).unwrap().starts_with(b"GIF89a"));
+    assert!(sprint.read("told.txt").contains("Go home.") && sprint.read("page.html").contains("left"));
     let opened = piped(&sprint, "open run#2:1 --plain", "look\nstep\n");
     assert_eq!(opened.code, Some(0), "{}", opened.stdout);
     assert!(opened.stdout.contains("at step 1 of 4"), "{}", opened.stdout);

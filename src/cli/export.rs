@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::{recorded::Reference, streams};
 use crate::episode::frames::FrameSequence;
@@ -22,6 +23,8 @@ pub(crate) struct Export {
     /// The task file that the run was made from, where the folder does not hold it
     #[arg(long, value_name = "FILE")]
     tasks: Option<PathBuf>,
+    #[command(flatten)]
+    environment: EnvironmentChoice,
 }
 
 impl Export {
@@ -32,8 +35,11 @@ impl Export {
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let (reference, recorded) = Reference::find(&self.episode, self.tasks.as_deref())?;
         let episode = &recorded.episodes[reference.episode];
-        let (_, task, setting) = recorded.setting(episode)?;
-        let recording = FrameSequence::of(&setting, task, episode)?;
+        let task = recorded.task(episode)?;
+        let recording = match &task.env {
+            Some(_) => FrameSequence::elsewhere(task, episode, self.environment.reach())?,
+            None => FrameSequence::of(&recorded.setting(episode)?.2, task, episode)?,
+        };
         let mut out = streams::out();
         for path in &self.out {
             let size = export::write(&recording, reference.step.unwrap_or(0), path)?;

@@ -20,7 +20,8 @@ use crate::language::instruction;
 pub(crate) struct FrameSequence {
     /// Task, scene and result in a line.
     pub(crate) title: String,
-    pub(crate) scene: Arc<Scene>,
+    /// House's; nothing elsewhere.
+    pub(crate) scene: Option<Arc<Scene>>,
     /// What the task asked, in words.
     pub(crate) subtasks: Vec<String>,
     /// What was told one after the other, with what came of it, where there was more than one task.
@@ -29,13 +30,24 @@ pub(crate) struct FrameSequence {
     pub(crate) shots: Vec<Shot>,
 }
 
+/// What is drawn of a state.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Seen {
+    /// House in that state.
+    World(Box<World>),
+    /// A picture of another environment's.
+    Picture(Arc<Frame>),
+    /// It shows no pictures.
+    Nothing,
+}
+
 /// A state of a recording.
 #[derive(Clone, Debug)]
 pub(crate) struct Shot {
     /// How many steps were taken.
     pub(crate) step: u32,
-    /// The state.
-    pub(crate) world: World,
+    /// What is drawn of it.
+    pub(crate) seen: Seen,
     /// What the agent was told when it got here.
     pub(crate) told: String,
     /// What was done to get here, with its target's class; nothing at the start.
@@ -60,13 +72,22 @@ impl Shot {
 }
 
 /// Draws the states of a recording.
-pub(crate) struct FrameCamera(House);
+pub(crate) struct FrameCamera(Option<House>);
 
 impl FrameCamera {
     /// What the agent saw.
     pub(crate) fn draw(&mut self, shot: &Shot) -> Frame {
-        self.0.restore(shot.world.clone());
-        self.0.frame().clone()
+        match (&shot.seen, &mut self.0) {
+            (Seen::World(world), Some(house)) => {
+                house.restore((**world).clone());
+                house.frame().clone()
+            }
+            (Seen::Picture(frame), _) => (**frame).clone(),
+            _ => {
+                let side = House::FRAME;
+                Frame { width: side, height: side, rgb: vec![0; 3 * side * side], depth: Vec::new(), ids: Vec::new() }
+            }
+        }
     }
 }
 
@@ -82,7 +103,7 @@ impl FrameSequence {
         let mut told = instruction::normalise(&episode.instruction);
         let start = Shot {
             step: 0,
-            world: setting.world.clone(),
+            seen: Seen::World(Box::new(setting.world.clone())),
             told: told.clone(),
             did: None,
             outcome: Outcome::Done,
@@ -107,7 +128,7 @@ impl FrameSequence {
             let class = step.class.map_or(String::new(), |class| format!(" {}", class.name()));
             shots.push(Shot {
                 step: number,
-                world: rollout.env.house.world().clone(),
+                seen: Seen::World(Box::new(rollout.env.house.world().clone())),
                 told: told.clone(),
                 did: Some(format!("{}{class}", step.kind)),
                 outcome,
@@ -130,7 +151,7 @@ impl FrameSequence {
         let row = |wish: &Wish| format!("at step {}: {} {}", wish.began, wish.instruction, wish.verdict_in_words());
         let is_told = episode.wishes.iter().any(Wish::is_told);
         let wishes = if is_told { episode.wishes.iter().map(row).collect() } else { Vec::new() };
-        Ok(FrameSequence { title, scene: setting.scene.clone(), subtasks, wishes, shots })
+        Ok(FrameSequence { title, scene: Some(setting.scene.clone()), subtasks, wishes, shots })
     }
 
     /// What the agent was told first.
@@ -138,10 +159,14 @@ impl FrameSequence {
         self.shots.first().map_or_else(String::new, |shot| shot.told.clone())
     }
 
+    /// Whether there is anything to draw.
+    pub(crate) fn has_pictures(&self) -> bool {
+        self.shots.iter().any(|shot| shot.seen != Seen::Nothing)
+    }
+
     /// Something to draw its states with.
     pub(crate) fn camera(&self) -> FrameCamera {
-        let world = self.shots.first().map_or_else(World::default, |shot| shot.world.clone());
-        FrameCamera(House::new(self.scene.clone(), world))
+        FrameCamera(self.scene.as_ref().map(|scene| House::new(scene.clone(), World::default())))
     }
 }
 
@@ -190,7 +215,7 @@ pub(crate) mod tests {
     fn a_recording_has_the_state_after_every_step() {
         let recording = recording();
         assert_eq!(recording.shots.len(), 4);
-        assert_ne!(recording.shots[0].world, recording.shots[1].world);
+        assert_ne!(recording.shots[0].seen, recording.shots[1].seen);
         assert_eq!(recording.told(), "Put the mug in the sink.");
         assert!(recording.shots[2].done.is_some());
         assert!(recording.title.ends_with("3 steps: success"), "{}", recording.title);

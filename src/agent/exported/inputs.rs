@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_the_policys_size_is_taken_as_it_is_and_one_that_does_not_fit_is_refused() {
+    fn a_frame_of_the_right_size_is_taken_as_it_is_and_one_that_does_not_fit_is_refused() {
         let frame = |width, height| Frame {
             width,
             height,

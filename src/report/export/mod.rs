@@ -24,13 +24,17 @@ pub(crate) fn write(recording: &FrameSequence, at: u32, path: &Path) -> anyhow::
         bail!("{}: there is no folder {}; make it first", path.display(), folder.display());
     }
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().to_lowercase());
+    let is_text = name.ends_with(".txt") || name.ends_with(".md");
+    if !is_text && !recording.has_pictures() {
+        bail!("{}: this environment shows no pictures; only .txt can be written", path.display());
+    }
     let bytes = if name.ends_with(".strip.png") {
         strip::draw(recording).png()?
     } else if name.ends_with(".png") {
         strip::frame(recording, at)?.png()?
     } else if name.ends_with(".gif") {
         film::draw(recording)?
-    } else if name.ends_with(".txt") || name.ends_with(".md") {
+    } else if is_text {
         text::write(recording).into_bytes()
     } else if name.ends_with(".html") {
         html::write(recording)?.into_bytes()
