@@ -8,7 +8,7 @@ use crate::domain::{Fixture, Point};
 use crate::house::render::furniture::BOARD_BEFORE_AREA;
 
 /// Around lines, in millimetres.
-const SPARE: i32 = 12;
+pub(super) const SPARE: i32 = 12;
 /// Pieces thinner than this are left out, in millimetres.
 const SLIVER: i32 = 40;
 /// No box gives up more than this share of a side.

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use glam::Vec3;
 
 use super::bodies;
-use super::carving::{RIM, crossed, let_look_in, notch, sink, trimmed, without};
+use super::carving::{RIM, SPARE, crossed, let_look_in, notch, sink, trimmed, without};
 use super::fit::{Subject, contains, within};
 use super::fixtures::Inventory;
 use super::furniture::{self, BodyKind};
 use super::sightlines::{Hider, Line, SeenTarget, seen_targets};
 use crate::domain::place::Cuboid;
-use crate::domain::world::Instance;
+use crate::domain::world::{Instance, Parent};
 use crate::domain::{Fixture, Heading, Point, Scene, Trajectory};
 use crate::house::House;
 use crate::house::render::Renderer;
@@ -20,6 +20,8 @@ use crate::house::render::Renderer;
 const ROUNDS: usize = 4;
 /// Lines that pass a box within this count when it is fitted once more, in millimetres.
 const NEAR: i32 = 300;
+/// What is left of a cut counter is a strip when narrower than this, in millimetres.
+const STRIP: i32 = 300;
 /// What it costs to hide a target that was seen, in units of overlap.
 const HIDES: f32 = 0.3;
 /// A target counts as seen when more than this share of its lines is free.
@@ -37,6 +39,7 @@ pub(crate) fn clear(scene: &mut Scene, inventory: &Inventory, trajectories: &[&T
         }
     }
     targets.retain(|target| target.is_hidden(scene, &mut renderer));
+    let before = scene.fixtures.clone();
     let mut refitted = BTreeSet::new();
     for round in 0..ROUNDS {
         for target in &targets {
@@ -53,6 +56,33 @@ pub(crate) fn clear(scene: &mut Scene, inventory: &Inventory, trajectories: &[&T
                     _ => make_way(scene, hider, target),
                 }
             }
+        }
+    }
+    drop_bare_strips(scene, &before, trajectories);
+}
+
+/// Takes away what cutting left of counters as mere strips on which nothing ever lay.
+fn drop_bare_strips(scene: &mut Scene, before: &[Fixture], trajectories: &[&Trajectory]) {
+    for (index, (fixture, before)) in (0u16..).zip(scene.fixtures.iter_mut().zip(before)) {
+        if fixture.body.len() <= before.body.len() {
+            continue;
+        }
+        let holder = Parent::In(Instance::Fixture(index));
+        let objects = trajectories.iter().flat_map(|trajectory| &trajectory.start.objects);
+        let contents: Vec<Point> = objects.filter(|object| object.parent == holder).map(|object| object.at).collect();
+        let kept: Vec<Cuboid> = fixture
+            .body
+            .iter()
+            .copied()
+            .filter(|part| {
+                let area = part.footprint();
+                let narrow = (0..2).any(|axis| area.max[axis] - area.min[axis] < STRIP);
+                let cut = !before.body.contains(part);
+                !(cut && narrow) || contents.iter().any(|at| area.grown(SPARE).contains(at.x, at.z))
+            })
+            .collect();
+        if !kept.is_empty() {
+            fixture.body = kept;
         }
     }
 }
@@ -166,7 +196,7 @@ fn make_way(scene: &mut Scene, hider: Hider, target: &SeenTarget) {
 mod tests {
     use super::*;
     use crate::domain::task::SceneRef;
-    use crate::domain::world::{Object, Parent};
+    use crate::domain::world::Object;
     use crate::domain::{Action, ActionType, Cell, Class, Pose, Room, World};
     use crate::house::bounds::projected_bounds;
     use crate::house::view::{View, reachable};
@@ -242,6 +272,18 @@ mod tests {
             assert!(3 * volume(&scene.fixtures[1]) > volume(&before[1]), "{class}: {:?}", scene.fixtures[1].body);
             assert_eq!(scene.fixtures[0], before[0], "the shelf hid nothing");
         }
+    }
+
+    #[test]
+    fn strips_that_a_cut_leaves_go_unless_something_lay_on_them() {
+        let (mut scene, mut trajectory) = taken_from_behind(fixture("CounterTop", [-150, 850, 500], [1000, 900, 1200]));
+        let mug = trajectory.start.objects[0].clone();
+        let wide = Point::new(800, 905, 800);
+        trajectory.start.objects.push(Object { at: wide, parent: Parent::In(Instance::Fixture(1)), ..mug });
+        clear(&mut scene, &Inventory::default(), &[&trajectory]);
+        let holds = |x: i32, z: i32| scene.fixtures[1].body.iter().any(|part| part.footprint().contains(x, z));
+        assert!(holds(800, 800), "what something lay on stays");
+        assert!(!holds(-130, 700), "a bare strip beside the cut");
     }
 
     #[test]
