@@ -77,8 +77,10 @@ fn answer(mut stream: TcpStream, fault: Fault, asked: &Mutex<Vec<String>>) {
         _ => ("404 Not Found", String::new(), String::new()),
     };
     asked.lock().unwrap().push(path);
-    write!(stream, "HTTP/1.1 {status}\r\n{more}Content-Length: {}\r\nConnection: close\r\n\r\n{body}", body.len())
-        .unwrap();
+    let length = body.len();
+    let whole = format!("HTTP/1.1 {status}\r\n{more}Content-Length: {length}\r\nConnection: close\r\n\r\n{body}");
+    // Whoever asked may have left by now.
+    let _ = stream.write_all(whole.as_bytes());
 }
 
 fn folder(hub: &Hub, cache: &Path, named: &str) -> Result<(PathBuf, Vec<String>), String> {
