@@ -220,10 +220,16 @@ mod tests {
         learning.schedule.learning_rate = 1e-2;
         let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 50, report_every: 1 };
         let folder = tempfile::tempdir().unwrap();
-        let run = |name: &str, stop_at: Option<u64>| {
-            tch::manual_seed(9);
+        let fresh = || {
             let store = nn::VarStore::new(Device::Cpu);
             let chooser = Chooser::new(&store.root(), &preset.chooser.spec());
+            (store, chooser)
+        };
+        // Other tests open agents, whose networks begin by chance: a seed would not make two beginnings alike.
+        let (beginning, _) = fresh();
+        let run = |name: &str, stop_at: Option<u64>| {
+            let (mut store, chooser) = fresh();
+            store.copy(&beginning).unwrap();
             let path = folder.path().join(name);
             let state = TrainingState { path: &path, identity: &BTreeMap::new() };
             let mut recorded = RecordedScalars(Vec::new());
