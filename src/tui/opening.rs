@@ -34,7 +34,7 @@ pub(super) enum Picked {
     /// A worker opened it; these messages came from it already.
     Started { commands: Sender<SessionCommand>, first: Vec<Msg>, start: Start },
     /// The person left; a worker may still be opening something.
-    Left { exit: ExitReason, is_opening: bool },
+    Left(ExitReason),
 }
 
 /// How the page is drawn.
@@ -79,12 +79,12 @@ pub(super) fn pick<W: Write>(
                 StartAnswer::Stay => {}
                 StartAnswer::Open(start) => under_way = Some((start_worker(&start)?, start)),
                 StartAnswer::Leave => {
-                    return Ok(Picked::Left { exit: ExitReason::Asked, is_opening: under_way.is_some() });
+                    return Ok(Picked::Left(ExitReason::Asked));
                 }
             },
             Msg::Paste(text) => page.on_paste(&text),
             Msg::Signal(number) => {
-                return Ok(Picked::Left { exit: ExitReason::Signal(number), is_opening: under_way.is_some() });
+                return Ok(Picked::Left(ExitReason::Signal(number)));
             }
             Msg::WorkerGone => {
                 under_way = None;

@@ -17,7 +17,7 @@ use super::history;
 use super::opening::{Open, Opening, Picked, StartStyle, pick};
 use super::paced_display::PacedDisplay;
 use super::screen_loop::ScreenLoop;
-use super::session_worker::{Told, let_work_end, start_worker};
+use super::session_worker::{AtWork, Told, let_work_end, start_worker};
 use super::signals::PATIENCE;
 use super::start_page::StartPage;
 use super::steering::{ended_by_signal, obeyed_by};
@@ -67,20 +67,19 @@ pub(crate) fn run(
     let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
     let control = ended_by_signal(&tell);
     let listens = control.listen();
+    let at_work = AtWork::default();
     let exit = loop {
         let is_heard = Arc::new(AtomicBool::new(true));
         let work = |open: Open| {
-            let told = Told::new(tell.clone(), is_heard.clone(), control.clone());
+            let told = Told::new(tell.clone(), is_heard.clone(), control.clone(), at_work.clone());
             start_worker(open, screen.session.clone(), told)
         };
         let style = StartStyle { scheme: screen.config.scheme, ability };
         let Opened { commands, first, goes_on } = match open(opening, style, &mut display, &messages, work)? {
             Ok(opened) => opened,
-            Err((exit, is_opening)) => {
+            Err(exit) => {
                 drop(guard);
-                if is_opening {
-                    let_work_end(&messages, Instant::now() + PATIENCE / 2);
-                }
+                let_work_end(&messages, at_work, Instant::now() + PATIENCE / 2);
                 return Ok(exit);
             }
         };
@@ -109,9 +108,7 @@ pub(crate) fn run(
     drop(guard);
     control.leave();
     drop(listens);
-    if !matches!(exit, Ok(ExitReason::WorkerGone)) {
-        let_work_end(&messages, Instant::now() + PATIENCE / 2);
-    }
+    let_work_end(&messages, at_work, Instant::now() + PATIENCE / 2);
     match exit? {
         ExitReason::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
         exit => Ok(exit),
@@ -127,14 +124,14 @@ struct Opened {
     goes_on: bool,
 }
 
-/// Opens what was named or is picked; where the person left instead, why, and whether something is still being opened.
+/// Opens what was named or is picked; where the person left instead, why.
 fn open<W: Write>(
     opening: Opening,
     style: StartStyle,
     display: &mut PacedDisplay<W>,
     messages: &Receiver<Msg>,
     work: impl Fn(Open) -> io::Result<Sender<SessionCommand>>,
-) -> anyhow::Result<Result<Opened, (ExitReason, bool)>> {
+) -> anyhow::Result<Result<Opened, ExitReason>> {
     match opening {
         Opening::Named(open) => Ok(Ok(Opened { commands: work(open)?, first: Vec::new(), goes_on: false })),
         Opening::Picked(entries, open) => {
@@ -144,7 +141,7 @@ fn open<W: Write>(
             };
             Ok(match pick(StartPage::new(entries), style, display, messages, start)? {
                 Picked::Started { commands, first, start } => Ok(Opened { commands, first, goes_on: start.goes_on() }),
-                Picked::Left { exit, is_opening } => Err((exit, is_opening)),
+                Picked::Left(exit) => Err(exit),
             })
         }
     }
