@@ -1,8 +1,8 @@
 //! `sprint ctl` steers what runs beside it.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
@@ -158,19 +158,21 @@ fn only_the_user_himself_is_obeyed() {
     child.wait().unwrap();
 }
 
+/// What `sprint ctl` says beside a session on a screen.
+fn ctl_beside(state: &Path, words: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
+    let ended = command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.join("runtime")).output().unwrap();
+    assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
+    String::from_utf8(ended.stdout).unwrap()
+}
+
 #[test]
 fn an_explorer_is_told_run_paused_and_ended_from_another_terminal() {
     let state = tempfile::tempdir().unwrap();
     let arguments = ["--policy", "random", "--graphics", "halfblocks", "--seed", "3", "--paused"];
     let mut session = Session::open(state.path(), (120, 36), "explore", &arguments);
     session.see("step 0");
-    let ctl = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
-        let ended =
-            command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path().join("runtime")).output().unwrap();
-        assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
-        String::from_utf8(ended.stdout).unwrap()
-    };
+    let ctl = |words: &[&str]| ctl_beside(state.path(), words);
     ctl(&["instruct", "pick up the quince"]);
     session.see("told: Pick up the quince.");
     session.see("Instruction > Pick up the quince.");
@@ -233,19 +235,29 @@ fn printed(child: Child) -> String {
 #[test]
 fn an_explorer_without_a_screen_is_told_run_paused_and_ended_while_it_waits_for_a_line() {
     let steered = Steered::new();
-    let mut child = plain(&steered, "--seed 3");
+    // Nothing ends the run: what is told is not graded.
+    let mut child = plain(&steered, "--seed 3 --expect none");
     // An input that ends would end the explorer.
     let input = child.stdin.take();
+    let mut output = child.stdout.take().unwrap();
     steered.tell("pick up the quince");
     let status = || serde_json::from_str::<Value>(&steered.text("status --json")).unwrap();
     wait_for(|| status()["instruction"] == "Pick up the quince.");
+    // While nobody reads what it prints it cannot come to the end of the run.
     steered.text("resume");
     wait_for(|| status()["progress"]["done"].as_u64().unwrap() > 1);
+    assert_eq!(status()["state"], "running");
     steered.text("pause");
+    let shown = std::thread::spawn(move || {
+        let mut shown = String::new();
+        output.read_to_string(&mut shown).unwrap();
+        shown
+    });
     wait_for(|| status()["state"] == "paused");
     assert!(status()["progress"]["done"].as_u64().unwrap() < 1000, "it was paused on the way");
     steered.text("stop");
-    let shown = printed(child);
+    assert!(child.wait().unwrap().success());
+    let shown = shown.join().unwrap();
     drop(input);
     assert!(shown.contains("instruction: Pick up the quince.") && shown.contains("step 2: "), "{shown}");
     assert!(steered.list().is_empty() && steered.sockets().is_empty());
@@ -275,18 +287,12 @@ fn an_explorer_of_another_environment_without_a_screen_is_steered_too() {
 #[test]
 fn the_screen_of_another_environment_is_steered_too() {
     let state = tempfile::tempdir().unwrap();
-    let corridor = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corridor_server.py"));
+    let corridor = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corridor_server.py"));
     let arguments = ["--env", "gym:none", "--policy", "random", "--seed", "2", "--paused", "--graphics", "halfblocks"];
     let variables = [("SPRINT_PYTHON", corridor)];
     let mut session = Session::open_where(state.path(), (80, 24), "explore", &arguments, &variables);
     session.see("asked: go to the right end");
-    let ctl = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_sprint"));
-        let ended =
-            command.arg("ctl").args(words).env("XDG_RUNTIME_DIR", state.path().join("runtime")).output().unwrap();
-        assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
-        String::from_utf8(ended.stdout).unwrap()
-    };
+    let ctl = |words: &[&str]| ctl_beside(state.path(), words);
     ctl(&["instruct", "go home"]);
     session.see("told: Go home.");
     ctl(&["resume"]);
