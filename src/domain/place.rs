@@ -235,6 +235,37 @@ impl Cuboid {
         Point::new((self.min.x + self.max.x) / 2, (self.min.y + self.max.y) / 2, (self.min.z + self.max.z) / 2)
     }
 
+    /// Its sides along x, y and z.
+    pub(crate) fn sides(&self) -> [i32; 3] {
+        [self.max.x - self.min.x, self.max.y - self.min.y, self.max.z - self.min.z]
+    }
+
+    /// What is left of it when another box is cut out: at most six boxes, some of which may be thin.
+    pub(crate) fn without(self, hole: &Cuboid) -> Vec<Cuboid> {
+        let (mut min, mut max): ([i32; 3], [i32; 3]) = (self.min.into(), self.max.into());
+        let (low, high): ([i32; 3], [i32; 3]) = (hole.min.into(), hole.max.into());
+        if (0..3).any(|axis| high[axis] <= min[axis] || max[axis] <= low[axis]) {
+            return vec![self];
+        }
+        let mut left = Vec::new();
+        // Pieces above and below are as small as can be: what stands is cut into slices first.
+        for axis in [0, 2, 1] {
+            if low[axis] > min[axis] {
+                let mut end = max;
+                end[axis] = low[axis];
+                left.push(Cuboid { min: min.into(), max: end.into() });
+                min[axis] = low[axis];
+            }
+            if high[axis] < max[axis] {
+                let mut start = min;
+                start[axis] = high[axis];
+                left.push(Cuboid { min: start.into(), max: max.into() });
+                max[axis] = high[axis];
+            }
+        }
+        left
+    }
+
     /// Its outline on the floor.
     pub(crate) fn footprint(&self) -> Rect {
         Rect { min: [self.min.x, self.min.z], max: [self.max.x, self.max.z] }

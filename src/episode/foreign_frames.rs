@@ -13,7 +13,6 @@ use crate::env::Environment;
 use crate::env::observation::Picture;
 use crate::env::remote::{Elsewhere, RemoteEnvironment, Sessions};
 use crate::house::House;
-use crate::house::Outcome;
 use crate::house::view::Frame;
 
 impl FrameSequence {
@@ -28,15 +27,7 @@ impl FrameSequence {
         ensure!(is_same, "task {:?}: {name} begins otherwise than was recorded", episode.task);
         let mut rollout = Rollout::new(env, episode.instruction.clone(), None);
         let mut told = episode.instruction.clone();
-        let start = Shot {
-            step: 0,
-            seen: seen(&rollout),
-            told: told.clone(),
-            did: None,
-            outcome: Outcome::Done,
-            possible: true,
-            done: None,
-        };
+        let start = Shot::start(seen(&rollout), told.clone());
         let mut shots = vec![start];
         for (number, recorded) in (1..).zip(&episode.trace) {
             let action = recorded.action_in(&rollout.env).with_context(|| format!("step {number}"))?;

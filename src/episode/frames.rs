@@ -61,6 +61,11 @@ pub(crate) struct Shot {
 }
 
 impl Shot {
+    /// The state in which a recording begins.
+    pub(super) fn start(seen: Seen, told: String) -> Shot {
+        Shot { step: 0, seen, told, did: None, outcome: Outcome::Done, possible: true, done: None }
+    }
+
     /// What was done and what it came to.
     pub(crate) fn words(&self) -> String {
         match (&self.did, self.possible) {
@@ -101,15 +106,7 @@ impl FrameSequence {
         let mut rollout = Rollout::in_house(house, String::new(), None, None);
         let subtasks: Vec<String> = task.subtasks.iter().map(|subtask| describe(&task.roles, subtask)).collect();
         let mut told = instruction::normalise(&episode.instruction);
-        let start = Shot {
-            step: 0,
-            seen: Seen::World(Box::new(setting.world.clone())),
-            told: told.clone(),
-            did: None,
-            outcome: Outcome::Done,
-            possible: true,
-            done: None,
-        };
+        let start = Shot::start(Seen::World(Box::new(setting.world.clone())), told.clone());
         let mut shots = vec![start];
         let mut recorded = (1..).zip(&episode.trace);
         let mut record = AfterEach(|rollout: &mut Rollout, tick: &Tick| {

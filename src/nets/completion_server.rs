@@ -5,9 +5,31 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use anyhow::{anyhow, bail, ensure};
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::language::instruction::visible;
+
+/// What a model wrote, as far as it is read.
+#[derive(Deserialize)]
+pub(crate) struct Completion {
+    pub(crate) text: String,
+    /// Why it ended: `length` where it was cut off.
+    #[serde(default)]
+    pub(crate) finish_reason: Option<String>,
+}
+
+impl Completion {
+    /// The first one of a server's answer; `None` where that has not the form of completions.
+    pub(crate) fn first_of(answer: &[u8]) -> Option<Completion> {
+        #[derive(Deserialize)]
+        struct Completions {
+            choices: Vec<Completion>,
+        }
+        let completions: Completions = serde_json::from_slice(answer).ok()?;
+        completions.choices.into_iter().next()
+    }
+}
 
 /// How often and how patiently a server is asked.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use crate::language::instruction::visible;
 use crate::language::maker::{Maker, Sampling};
 use crate::language::passage::{Passage, Summarizer, Summary, TakeSummary};
 use crate::language::prompt;
-use crate::nets::completion_server::CompletionServer;
+use crate::nets::completion_server::{Completion, CompletionServer};
 
 /// A model on a server that sums passages up.
 pub(crate) struct HttpSummarizer {
@@ -20,19 +20,6 @@ pub(crate) struct HttpSummarizer {
     maker: Maker,
     /// Whether an answer had the form of a completion: before that, one that has not is a wrong server's.
     has_completed: AtomicBool,
-}
-
-/// A completion, as far as it is read.
-#[derive(Deserialize)]
-struct Completions {
-    choices: Vec<Choice>,
-}
-
-#[derive(Deserialize)]
-struct Choice {
-    text: String,
-    #[serde(default)]
-    finish_reason: Option<String>,
 }
 
 /// A completion that repeats the prompt with how likely each of its tokens was.
@@ -82,8 +69,7 @@ impl HttpSummarizer {
             "stop": ["\n", "."],
         });
         let Some(body) = self.server.ask(&request)? else { return Ok(None) };
-        let completions: Result<Completions, _> = serde_json::from_slice(&body);
-        let choice = completions.ok().and_then(|completions| completions.choices.into_iter().next());
+        let choice = Completion::first_of(&body);
         if choice.is_some() {
             self.has_completed.store(true, Ordering::Relaxed);
         }

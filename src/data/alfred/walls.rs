@@ -73,33 +73,15 @@ pub(crate) fn under_counters(fixtures: &[Fixture], floor: i32) -> Vec<Cuboid> {
 }
 
 fn thick(piece: &Cuboid) -> bool {
-    let (min, max): ([i32; 3], [i32; 3]) = (piece.min.into(), piece.max.into());
-    (0..3).all(|axis| max[axis] - min[axis] >= SLIVER)
+    piece.sides().iter().all(|side| *side >= SLIVER)
 }
 
-/// What is left of a box when another is cut out.
+/// What is left of a box when another is cut out, but for slivers.
 fn without(piece: Cuboid, hole: &Cuboid) -> Vec<Cuboid> {
-    let (mut min, mut max): ([i32; 3], [i32; 3]) = (piece.min.into(), piece.max.into());
-    let (low, high): ([i32; 3], [i32; 3]) = (hole.min.into(), hole.max.into());
-    if (0..3).any(|axis| high[axis] <= min[axis] || max[axis] <= low[axis]) {
-        return vec![piece];
+    let mut left = piece.without(hole);
+    if left != [piece] {
+        left.retain(thick);
     }
-    let mut left = Vec::new();
-    for axis in [0, 2, 1] {
-        if low[axis] > min[axis] {
-            let mut end = max;
-            end[axis] = low[axis];
-            left.push(Cuboid { min: min.into(), max: end.into() });
-            min[axis] = low[axis];
-        }
-        if high[axis] < max[axis] {
-            let mut start = min;
-            start[axis] = high[axis];
-            left.push(Cuboid { min: start.into(), max: max.into() });
-            max[axis] = high[axis];
-        }
-    }
-    left.retain(thick);
     left
 }
 

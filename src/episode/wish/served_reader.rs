@@ -6,14 +6,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use serde::Deserialize;
 use serde_json::json;
 
 use crate::domain::Class;
 use crate::language::instruction::visible;
 use crate::language::reader::asked;
 use crate::language::reader::{WishReading, asked::prompt};
-use crate::nets::completion_server::{CompletionServer, Pace};
+use crate::nets::completion_server::{Completion, CompletionServer, Pace};
 
 /// The most tokens of an answer: a list of a few steps.
 const MOST_TOKENS: u32 = 400;
@@ -34,17 +33,6 @@ impl fmt::Debug for ServedReader {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.name)
     }
-}
-
-/// A completion, as far as it is read.
-#[derive(Deserialize)]
-struct Completions {
-    choices: Vec<Choice>,
-}
-
-#[derive(Deserialize)]
-struct Choice {
-    text: String,
 }
 
 impl ServedReader {
@@ -102,8 +90,7 @@ impl ServedReader {
             request["model"] = json!(model);
         }
         let body = self.server.ask(&request).map_err(|error| format!("{error:#}"))?.unwrap_or_default();
-        let completions: Option<Completions> = serde_json::from_slice(&body).ok();
-        let choice = completions.and_then(|completions| completions.choices.into_iter().next());
+        let choice = Completion::first_of(&body);
         let said = || visible(&String::from_utf8_lossy(&body)).chars().take(100).collect::<String>();
         let choice = choice.ok_or_else(|| format!("the server's answer is no completion: {}", said()))?;
         asked::reading(&choice.text, text, house, &self.name)
