@@ -19,12 +19,13 @@ use crate::env::Environment;
 use crate::env::remote::{RemoteEnvironment, Sessions};
 use crate::episode::instruction_variant::task_instruction;
 use crate::episode::scenes::Scenes;
-use crate::eval::evaluation::{Evaluation, read_instruction};
+use crate::eval::evaluation::Evaluation;
 use crate::eval::options::Options;
 use crate::eval::tasks::check;
 use crate::eval::tasks::elsewhere;
 use crate::eval::tasks::sample;
 use crate::eval::tasks::sample::{Phrasing, SampleSpec};
+use crate::eval::untold::read_instruction;
 use crate::house::grading::{Grading, describe};
 use crate::language::count::counted;
 

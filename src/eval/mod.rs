@@ -11,6 +11,7 @@ pub(crate) mod progress_event;
 pub(crate) mod replay;
 pub mod schemas;
 pub mod tasks;
+pub(crate) mod untold;
 pub mod verify;
 pub(crate) mod work_queue;
 pub mod worker;
