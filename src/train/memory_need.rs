@@ -183,16 +183,18 @@ mod tests {
 
     #[test]
     fn what_is_counted_are_the_networks_weights() {
-        let preset = Preset::named("sprint").unwrap();
-        let features = preset.visual_encoder.features();
-        let networks = crate::agent::checkpoint::Networks::new(
-            crate::nets::visual_encoder::VisualEncoder::house(&preset.visual_encoder, Device::Cpu),
-            &preset.policy,
-            None,
-            Device::Cpu,
-        );
-        let counted: usize = networks.policy_store.trainable_variables().iter().map(tch::Tensor::numel).sum();
-        let estimated = policy_numbers(&preset.policy, (preset.policy.history * features) as u64) as f64;
-        assert!((estimated / counted as f64 - 1.0).abs() < 0.1, "{estimated} and {counted}");
+        for method in ["sprint", "am"] {
+            let preset = Preset::named(method).unwrap();
+            let features = preset.visual_encoder.features();
+            let networks = crate::agent::checkpoint::Networks::new(
+                crate::nets::visual_encoder::VisualEncoder::house(&preset.visual_encoder, Device::Cpu),
+                &preset.policy,
+                None,
+                Device::Cpu,
+            );
+            let counted: usize = networks.policy_store.trainable_variables().iter().map(tch::Tensor::numel).sum();
+            let estimated = policy_numbers(&preset.policy, (preset.policy.history * features) as u64) as f64;
+            assert!((estimated / counted as f64 - 1.0).abs() < 0.1, "{method}: {estimated} and {counted}");
+        }
     }
 }
