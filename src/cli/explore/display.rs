@@ -1,13 +1,12 @@
 //! How the explorer is shown: on a screen, or in plain lines.
 
 use std::io::{BufReader, IsTerminal};
-use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use etcetera::BaseStrategy;
 
-use super::origin::Origin;
+use super::origin::{Origin, kept_session};
 use crate::agent::policy_source::PolicySource;
 use crate::agent::registry::PolicyKind;
 use crate::cli::exit_status::ExitStatus;
@@ -123,7 +122,7 @@ impl Display {
 }
 
 /// What the person has set in `sprint/explorer.toml` of the configuration folder.
-pub(in crate::cli) fn settings() -> anyhow::Result<ExplorerConfig> {
+pub(crate) fn settings() -> anyhow::Result<ExplorerConfig> {
     let Ok(base) = etcetera::choose_base_strategy() else { return Ok(ExplorerConfig::default()) };
     let path = base.config_dir().join("sprint").join("explorer.toml");
     match text_file::read(&path) {
@@ -134,7 +133,7 @@ pub(in crate::cli) fn settings() -> anyhow::Result<ExplorerConfig> {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-pub(in crate::cli) enum GraphicsName {
+pub(crate) enum GraphicsName {
     Auto,
     Kitty,
     Iterm2,
@@ -145,7 +144,7 @@ pub(in crate::cli) enum GraphicsName {
 
 impl GraphicsName {
     /// The way to show pictures; nothing where it has to be found out.
-    pub(in crate::cli) fn protocol(self) -> Option<Protocol> {
+    pub(crate) fn protocol(self) -> Option<Protocol> {
         match self {
             GraphicsName::Auto => None,
             GraphicsName::Kitty => Some(Protocol::Kitty),
@@ -155,9 +154,4 @@ impl GraphicsName {
             GraphicsName::Ascii => Some(Protocol::Ascii),
         }
     }
-}
-
-/// Where a session is kept as it goes on.
-pub(super) fn kept_session() -> PathBuf {
-    logging::path().with_file_name("session.json")
 }

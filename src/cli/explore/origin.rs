@@ -6,15 +6,14 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
-use super::display::kept_session;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::cli::environment::EnvironmentChoice;
 use crate::cli::policies::Deciding;
 use crate::cli::policy_name::{Elsewhere, ElsewhereOptions};
 use crate::cli::recorded::recorded;
-use crate::cli::value_names;
 use crate::cli::wish_reader::WishReaderArgs;
+use crate::cli::{logging, value_names};
 use crate::data::{dataset::Dataset, taskset};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
@@ -75,6 +74,11 @@ enum ExpectName {
 const DATA: &str = "data";
 /// Demonstrations of one scene that are kept at hand.
 const DEMONSTRATIONS: usize = 20;
+
+/// Where a session is kept as it goes on.
+pub(super) fn kept_session() -> PathBuf {
+    logging::path().with_file_name("session.json")
+}
 
 impl Default for Origin {
     /// Nothing is named.
