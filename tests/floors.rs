@@ -80,11 +80,10 @@ fn only_the_commands_that_open_a_screen_use_one() {
         let mut paths = source.named.iter().filter_map(|named| source.below_crate(&named.segments));
         paths.any(|path| path.first().is_some_and(|floor| floor == "tui"))
     };
-    let users: BTreeSet<String> = sources()
-        .iter()
-        .filter(|source| source.floor() == "cli" && uses_screen(source))
-        .map(|source| source.module.clone())
-        .collect();
+    // A command may be a file with a folder of its parts.
+    let command = |source: &Source| source.module.split("::").take(2).collect::<Vec<_>>().join("::");
+    let users: BTreeSet<String> =
+        sources().iter().filter(|source| source.floor() == "cli" && uses_screen(source)).map(command).collect();
     assert_eq!(users, COMMANDS_WITH_A_SCREEN.map(str::to_owned).into());
 }
 
