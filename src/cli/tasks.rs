@@ -77,6 +77,9 @@ struct SampleArgs {
     /// Only demonstrations of this split of a dataset
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    /// Take whole demonstrations alone, and keep these wholes from every later training on the dataset, as EVAL_CHAIN's are
+    #[arg(long)]
+    withhold: bool,
     /// Replace a file that is there
     #[arg(long)]
     force: bool,
@@ -156,11 +159,16 @@ impl SampleArgs {
             seed: self.seed,
             rooms,
             only_scenes: self.only_scenes.clone(),
+            wholes: self.withhold,
         };
         let set = if scenes == Path::new("generated") {
             ensure!(
                 spec.only_scenes.is_empty(),
                 "--only-scenes names scenes of a dataset, and generated houses have none"
+            );
+            ensure!(
+                !self.withhold,
+                "--withhold keeps demonstrations of a dataset from training, and generated houses have none"
             );
             let counter = Counter::new("sampling", u64::from(self.count));
             let set = sample::balanced(&spec, &lengths, &|spec| sample::sample_generated(spec, &|| counter.add(1)));
@@ -171,9 +179,14 @@ impl SampleArgs {
             let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let split = self.split.as_deref();
-            sample::balanced(&spec, &lengths, &|spec| {
+            let set = sample::balanced(&spec, &lengths, &|spec| {
                 sample::sample_dataset(spec, &dataset, split, self.phrasing, folder)
-            })?
+            })?;
+            if self.withhold {
+                let sources = set.tasks.iter().filter_map(|task| task.source.as_ref());
+                dataset.withhold(&sources.map(|(demonstration, _)| demonstration.as_str()).collect())?;
+            }
+            set
         };
         taskset::write(&self.out, &set)?;
         say_how_told(&set.tasks);

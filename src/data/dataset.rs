@@ -1,6 +1,6 @@
 //! A dataset folder: `dataset.json`, `scenes/*.json`, `trajectories.jsonl.zst`, `tasks/*.json`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub(crate) struct Counts {
     pub(crate) aligned_primitives: u64,
     /// Runs of two or more skills, once for each annotation.
     pub(crate) spans: u64,
-    /// Those with aligned annotations, without the held-out whole trajectories of EVAL_CHAIN.
+    /// Those with aligned annotations, without the held-out whole trajectories.
     pub(crate) spans_after_holdout: u64,
 }
 
@@ -160,6 +160,28 @@ impl Dataset {
             trajectory.check().map_err(anyhow::Error::msg).with_context(place)?;
             Ok(trajectory)
         }))
+    }
+
+    /// Keeps the wholes of these trajectories from every later training.
+    ///
+    /// # Errors
+    /// When another process writes the dataset, or it cannot be read or written.
+    pub(crate) fn withhold(&self, wholes: &BTreeSet<&str>) -> anyhow::Result<()> {
+        let _taken = FolderLock::take(&self.folder)?;
+        let mut manifest = Dataset::open(&self.folder)?.manifest;
+        for trajectory in self.trajectories()? {
+            let trajectory = trajectory?;
+            if !wholes.contains(trajectory.id.as_str()) || manifest.held_out.contains(&trajectory.id) {
+                continue;
+            }
+            let skills = trajectory.skills.len();
+            let aligned = trajectory.annotations.iter().filter(|annotation| annotation.steps.len() == skills).count();
+            if let Some(counts) = manifest.counts.get_mut(&trajectory.split).filter(|_| skills > 1) {
+                counts.spans_after_holdout = counts.spans_after_holdout.saturating_sub(aligned as u64);
+            }
+            manifest.held_out.push(trajectory.id);
+        }
+        json::write(&self.folder.join("dataset.json"), &manifest)
     }
 
     /// Identifies the trajectories: the first 16 digits of the sha256 of their file.

@@ -92,6 +92,7 @@ fn sampled() -> TaskSet {
         seed: 5,
         rooms: vec![Room::Bathroom],
         only_scenes: Vec::new(),
+        wholes: false,
     };
     sample::sample_generated(&wish, &|| ()).unwrap()
 }

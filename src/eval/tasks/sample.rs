@@ -68,6 +68,8 @@ pub struct SampleSpec {
     pub rooms: Vec<Room>,
     /// The dataset's scenes to take, by name; all where none is named.
     pub only_scenes: Vec<String>,
+    /// Whether only whole demonstrations are taken, in a person's words for the whole where the words are people's.
+    pub wholes: bool,
 }
 
 impl SampleSpec {
@@ -184,11 +186,15 @@ pub(crate) fn sample_dataset(
         if split.is_some_and(|split| split != trajectory.split) || !fits(&trajectory) {
             continue;
         }
+        let whole = spec.length == trajectory.skills.len();
+        if !whole && spec.wholes {
+            continue;
+        }
         let said = |first: &usize| {
-            phrasing == Phrasing::Grammar || !annotators(&trajectory, *first..*first + spec.length).is_empty()
+            phrasing == Phrasing::Grammar || !writers(spec, &trajectory, *first..*first + spec.length).is_empty()
         };
         let held_out = dataset.manifest().held_out.contains(&trajectory.id);
-        let free = |_: &usize| !(held_out && spec.length == trajectory.skills.len());
+        let free = |_: &usize| !(held_out && whole);
         let firsts = (0..=trajectory.skills.len()).take_while(|first| first + spec.length <= trajectory.skills.len());
         spans.extend(firsts.filter(free).filter(said).map(|first| (number, first)));
     }
@@ -219,7 +225,7 @@ pub(crate) fn sample_dataset(
             let mut task = span_task(id, &trajectory, &scene, span.clone())
                 .map_err(|problem| anyhow::anyhow!("trajectory {}: {problem}", trajectory.id))?;
             let mut rng = spec.rng(place as u64, 0);
-            let wrote = annotators(&trajectory, span.clone());
+            let wrote = writers(spec, &trajectory, span.clone());
             if phrasing == Phrasing::Grammar || wrote.is_empty() {
                 task.sentences =
                     task.subtasks.iter().map(|subtask| phrases::sentence(&task.roles, subtask, &mut rng)).collect();
@@ -238,6 +244,13 @@ pub(crate) fn sample_dataset(
     let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let scenes = named.then(|| relative(&dataset.folder().join("scenes"), set_folder)).transpose()?;
     Ok(TaskSet { format_version: TaskSet::FORMAT, name: spec.name.clone(), scenes, tasks })
+}
+
+/// The annotators whose words a task may be told in.
+fn writers(spec: &SampleSpec, trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
+    let mut wrote = annotators(trajectory, span);
+    wrote.retain(|&annotator| !spec.wholes || !trajectory.annotations[annotator].goal.trim().is_empty());
+    wrote
 }
 
 /// The set with these of its tasks, as it is written in another folder: the scenes are where they were.
@@ -287,7 +300,15 @@ mod tests {
     use crate::house::testing::kitchen_house;
 
     fn spec(length: usize, count: usize, seed: u64) -> SampleSpec {
-        SampleSpec { name: "sampled".into(), length, count, seed, rooms: Room::ALL.to_vec(), only_scenes: Vec::new() }
+        SampleSpec {
+            name: "sampled".into(),
+            length,
+            count,
+            seed,
+            rooms: Room::ALL.to_vec(),
+            only_scenes: Vec::new(),
+            wholes: false,
+        }
     }
 
     #[test]
@@ -390,6 +411,25 @@ mod tests {
         };
         assert_eq!(sample(1, 2).unwrap().tasks.len(), 2);
         assert!(sample(2, 1).unwrap_err().to_string().contains("holds 0 spans of 2 subtasks"));
+    }
+
+    #[test]
+    fn wholes_alone_are_sampled_in_a_persons_words_for_the_whole_and_withheld_ones_never_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let dataset = dataset(folder.path());
+        let sample = |dataset: &Dataset, length| {
+            let wholes = SampleSpec { wholes: true, ..spec(length, 1, 5) };
+            sample_dataset(&wholes, dataset, None, Phrasing::Annotators, folder.path())
+        };
+        assert!(sample(&dataset, 1).unwrap_err().to_string().contains("holds 0 spans of 1 subtasks"));
+        let set = sample(&dataset, 2).unwrap();
+        assert_eq!(set.tasks[0].instruction, "Set the table.");
+        let (demonstration, first) = set.tasks[0].source.clone().unwrap();
+        assert_eq!(first, 0);
+        dataset.withhold(&[demonstration.as_str()].into()).unwrap();
+        let dataset = Dataset::open(folder.path()).unwrap();
+        assert_eq!(dataset.manifest().held_out, ["mug"]);
+        assert!(sample(&dataset, 2).is_err());
     }
 
     #[test]
