@@ -55,6 +55,8 @@ pub struct OfficialTask {
     first: usize,
     skills: usize,
     wording: TaskText,
+    /// The list's own sentence for each skill, where it has them; they may be another annotator's.
+    sentences: Option<Vec<String>>,
 }
 
 impl OfficialTask {
@@ -79,6 +81,7 @@ pub fn indexed(set: Official) -> Vec<OfficialTask> {
                 "high_desc" => TaskText::Steps,
                 _ => TaskText::Elsewhere,
             },
+            sentences: None,
         }),
         _ => None,
     };
@@ -92,6 +95,36 @@ struct Listed {
     repeat_id: usize,
     subgoal_ids: Vec<usize>,
     annotation: String,
+    #[serde(default)]
+    primitive_skills: Option<Vec<ListedSkill>>,
+}
+
+/// One skill of such an item.
+#[derive(Deserialize)]
+struct ListedSkill {
+    annotations: String,
+}
+
+impl Listed {
+    /// The sentences for its skills.
+    fn sentences(&self) -> Result<Option<Vec<String>>, String> {
+        let Some(listed) = &self.primitive_skills else { return Ok(None) };
+        let (found, wanted) = (listed.len(), self.subgoal_ids.len());
+        if found != wanted {
+            return Err(format!("primitive_skills: {found} for {wanted} subgoal_ids"));
+        }
+        let sentence = |(at, skill): (usize, &ListedSkill)| {
+            told(&skill.annotations).map_err(|wrong| format!("primitive_skills[{at}].annotations: {wrong}"))
+        };
+        listed.iter().enumerate().map(sentence).collect::<Result<_, _>>().map(Some)
+    }
+}
+
+/// A text of the authors' file, as an agent may be told it.
+fn told(text: &str) -> Result<String, String> {
+    let text = instruction::visible(text);
+    instruction::parse(&text).map_err(|error| error.to_string())?;
+    Ok(text)
 }
 
 /// The entries of a set by the authors' own file in `folder`; `None` where it is absent.
@@ -109,17 +142,20 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Officia
     // The task number on the authors' command line is the position in this order.
     items.sort_by_key(|item| std::cmp::Reverse(item.subgoal_ids.len()));
     let entry = |(number, item): (usize, Listed)| {
+        let wrong = |what: String| anyhow::anyhow!("{}: item {number}: {what}", path.display());
         let first = item.subgoal_ids.first().copied();
         let adjacent = item.subgoal_ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));
-        let first = first.filter(|_| adjacent).with_context(|| {
-            format!("{}: item {number}: subgoal_ids: {:?} is no span", path.display(), item.subgoal_ids)
-        })?;
+        let first = first.filter(|_| adjacent);
+        let first = first.ok_or_else(|| wrong(format!("subgoal_ids: {:?} is no span", item.subgoal_ids)))?;
+        let annotation = told(&item.annotation).map_err(|what| wrong(format!("annotation: {what}")))?;
+        let sentences = item.sentences().map_err(wrong)?;
         Ok(OfficialTask {
             trajectory: item.task,
             annotator: item.repeat_id,
             first,
             skills: item.subgoal_ids.len(),
-            wording: TaskText::Given(instruction::visible(&item.annotation)),
+            wording: TaskText::Given(annotation),
+            sentences,
         })
     };
     items.into_iter().enumerate().map(entry).collect::<anyhow::Result<Vec<_>>>().map(Some)
@@ -161,7 +197,8 @@ fn cut(id: String, trajectory: &Trajectory, scene: &Scene, entry: &OfficialTask)
     let task = span_task(id, trajectory, scene, span.clone())?;
     let annotation = trajectory.annotations.get(entry.annotator);
     let annotation = annotation.ok_or_else(|| format!("annotator {} does not exist", entry.annotator))?;
-    let sentences = annotation.steps.get(span).map(<[String]>::to_vec).unwrap_or_default();
+    let annotated = || annotation.steps.get(span).map(<[String]>::to_vec).unwrap_or_default();
+    let sentences = entry.sentences.clone().unwrap_or_else(annotated);
     let joined = || sentences.join(" ");
     let (instruction, reworded) = match &entry.wording {
         TaskText::Goal => (annotation.goal.clone(), false),
@@ -285,5 +322,51 @@ mod tests {
         std::fs::write(folder.path().join(OFFICIAL[0].list), item).unwrap();
         let error = format!("{:#}", listed(OFFICIAL[0], folder.path()).unwrap_err());
         assert!(error.contains(OFFICIAL[0].list) && error.contains("subgoal_ids"), "{error}");
+    }
+
+    /// A list of one item, of two skills, with these sentences.
+    fn list(skills: &serde_json::Value) -> anyhow::Result<Vec<OfficialTask>> {
+        let folder = tempfile::tempdir().unwrap();
+        let item = serde_json::json!({
+            "task": "a/b", "repeat_id": 0, "subgoal_ids": [0, 1], "annotation": "Tidy up.", "primitive_skills": skills,
+        });
+        std::fs::write(folder.path().join(OFFICIAL[0].list), serde_json::json!([item]).to_string()).unwrap();
+        listed(OFFICIAL[0], folder.path()).map(Option::unwrap)
+    }
+
+    #[test]
+    fn the_sentences_of_a_list_for_its_skills_are_kept_though_another_annotator_wrote_them() {
+        let skills = serde_json::json!([
+            {"annotations": "take the \u{8}red mug", "scene_index": 3},
+            {"annotations": "put it in the basin"},
+        ]);
+        let entry = &list(&skills).unwrap()[0];
+        let data = serde_json::from_str(include_str!("../../../tests/fuzz/traj_data.json")).unwrap();
+        let recording = super::super::recording::Recording::new("a/b".into(), "train".into(), data).unwrap();
+        let settings = [&recording.setting];
+        let layout = super::super::layout::FloorPlanLayout::default();
+        let room = recording.setting.room;
+        let built = super::super::scenes::build("FloorPlan1", room, &layout, &[&recording], &settings).unwrap();
+        let parents =
+            super::super::parents::parents(&recording, &built.inventory, &built.recorded, &built.scene.fixtures);
+        let trajectory =
+            super::super::trajectories::resolve(&recording, &built.scene, &built.inventory, &parents).unwrap();
+        let task = cut("x".into(), &trajectory, &built.scene, entry).unwrap();
+        assert_eq!((&*task.instruction, task.reworded), ("Tidy up.", false));
+        assert_eq!(task.sentences, ["take the red mug", "put it in the basin"]);
+        let indexed = OfficialTask { sentences: None, ..entry.clone() };
+        let own = cut("x".into(), &trajectory, &built.scene, &indexed).unwrap();
+        assert_eq!(own.sentences, ["Take the mug.", "Put it in the sink."]);
+    }
+
+    #[test]
+    fn a_list_whose_sentences_fit_no_skills_or_say_nothing_names_item_and_field() {
+        let wrong = |skills: serde_json::Value| format!("{:#}", list(&skills).unwrap_err());
+        let one = wrong(serde_json::json!([{"annotations": "take it"}]));
+        assert!(one.contains("item 0: primitive_skills: 1 for 2"), "{one}");
+        let empty = wrong(serde_json::json!([{"annotations": "take it"}, {"annotations": " \u{200b}"}]));
+        assert!(empty.contains("primitive_skills[1].annotations") && empty.contains("empty"), "{empty}");
+        let long = wrong(serde_json::json!([{"annotations": "a".repeat(3000)}, {"annotations": "b"}]));
+        assert!(long.contains("primitive_skills[0].annotations") && long.contains("2000"), "{long}");
     }
 }
