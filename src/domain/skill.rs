@@ -43,7 +43,8 @@ pub(crate) struct Original {
 }
 
 /// A part that some instance plays in a task: "the apple", "the slice that we heat". The class grader binds a role to
-/// the instance that the agent chose; two roles are never bound to one instance.
+/// the instance that the agent chose. Two roles are never bound to one thing or lamp; furniture may take what several roles
+/// ask a place for.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Role {

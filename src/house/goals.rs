@@ -1,6 +1,6 @@
 //! ALFRED's seven goal conditions: names are matched by their parts, and containment is transitive.
 
-use crate::domain::skill::{Goal, GoalKind};
+use crate::domain::skill::{Goal, GoalKind, Role};
 use crate::domain::world::{Instance, Object};
 use crate::domain::{Class, Scene, World};
 
@@ -35,6 +35,14 @@ pub(crate) fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
 /// Whether `wanted`'s name is part of `class`'s, as ALFRED matches: a "Knife" is also a "ButterKnife".
 fn names(wanted: Option<Class>, class: Class) -> bool {
     wanted.is_some_and(|wanted| class.name().contains(wanted.name()))
+}
+
+/// Whether the goal asks that things like this one end up together in one receptacle like that one: only that of two objects does.
+pub(crate) fn asks_for_one_receptacle(goal: &Goal, object: &Role, receptacle: &Role) -> bool {
+    goal.kind == GoalKind::PickTwoObjAndPlace
+        && names(Some(goal.object), object.class)
+        && (!goal.sliced || object.slice)
+        && names(goal.receptacle, receptacle.class)
 }
 
 /// The objects that the goal is about: those that can be picked up, and only slices where slices are meant.

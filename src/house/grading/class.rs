@@ -28,8 +28,14 @@ pub(super) fn fits(grader: &Grader, scene: &Scene, world: &World, role: u8, inst
     };
     world.class_of(scene, instance) == Some(asked.class)
         && asked.slice == slice_of.is_some()
-        && !grader.bindings.contains(&Some(instance))
+        && (is_furniture(scene, instance) || !grader.bindings.contains(&Some(instance)))
         && slice_of.is_none_or(|(whole, _)| may_be_cut_from(grader, asked.class, Instance::Object(whole)))
+}
+
+/// Furniture may take what several roles ask a place for.
+fn is_furniture(scene: &Scene, instance: Instance) -> bool {
+    matches!(instance, Instance::Fixture(index)
+        if scene.fixture(index).is_some_and(|fixture| fixture.class.info().receptacle))
 }
 
 /// Where the task has something of the class sliced, a slice of another one will not do.

@@ -185,6 +185,33 @@ mod tests {
     }
 
     #[test]
+    fn things_with_a_place_each_may_come_to_one_or_to_two_tables_and_those_with_one_place_only_to_one() {
+        let (scene, world) = kitchen();
+        let (mut scene, mut world) = ((*scene).clone(), world);
+        let Instance::Fixture(table) = named(&scene, &world, "SideTable") else { panic!("no fixture") };
+        let mut second = scene.fixtures[usize::from(table)].clone();
+        second.pivot.x -= 3000;
+        second.surfaces.iter_mut().flat_map(|surface| &mut surface.areas).for_each(|area| {
+            (area.min[0], area.max[0]) = (area.min[0] - 3000, area.max[0] - 3000);
+        });
+        scene.fixtures.push(second);
+        world.fixtures.push(world.fixtures[usize::from(table)].clone());
+        let roles = [role("Mug"), role("SideTable"), role("Tomato"), role("SideTable")];
+        let apart = [put_subtask(0, 1), put_subtask(2, 3)];
+        let together = [put_subtask(0, 1), put_subtask(2, 1)];
+        let script = |table| [(Pickup, "Mug"), (Put, "SideTable"), (Pickup, "Tomato"), (Put, table)];
+        for (subtasks, table, done) in [
+            (&apart, "SideTable", 2),
+            (&apart, "SideTable2", 2),
+            (&together, "SideTable", 2),
+            (&together, "SideTable2", 1),
+        ] {
+            let mut grader = by_class(&roles, subtasks);
+            assert_eq!(play_on(&mut grader, &scene, &mut world.clone(), &script(table)).len(), done, "{table}");
+        }
+    }
+
+    #[test]
     fn a_slice_must_be_of_the_apple_that_was_sliced_for_the_task() {
         let roles = [role("Bread"), slice_role("Bread")];
         let mut grader = by_class(&roles, &[subtask(SkillKind::Slice, 0), subtask(SkillKind::Pickup, 1)]);
