@@ -28,7 +28,8 @@ fn one(seed: u64) -> Option<Option<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let task = generate::task(&scene, &world, SceneRef::Generated { room, seed }, length, &mut rng)?;
     let mut house = House::new(Arc::new(scene), task.start.unwrap_or(world));
-    let mut grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
+    let begun = (house.scene().as_ref(), house.world());
+    let mut grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref(), begun);
     let mut expert = Expert::new();
     for _ in 0..task.horizon {
         if grader.is_done() {

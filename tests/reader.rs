@@ -180,7 +180,8 @@ fn a_reading_becomes_a_task_that_a_grader_follows() {
     assert_eq!(reading.words(), "pick up a mug, rinse it, put it in the sink");
     let (roles, subtasks) = reading.task().unwrap();
     assert_eq!(roles.iter().map(|role| role.class.name()).collect::<Vec<_>>(), ["Mug", "Sink"]);
-    assert_eq!(Grader::new(Grading::Class, &roles, &subtasks, None).total(), 3);
+    let (scene, start) = crate::house::testing::kitchen();
+    assert_eq!(Grader::new(Grading::Class, &roles, &subtasks, None, (&scene, &start)).total(), 3);
     let two = reader().read("put two mugs in the sink", &Context::default());
     assert_eq!(two.task().unwrap().0.len(), 3, "two mugs are two parts");
 }

@@ -33,7 +33,8 @@ impl HouseEnvironment {
 
     /// A task's start, graded.
     pub(crate) fn of_task(task: &Task, house: House, grading: Grading) -> HouseEnvironment {
-        let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        let grader =
+            Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref(), (house.scene(), house.world()));
         HouseEnvironment::new(house, Some(grader))
     }
 }
@@ -105,8 +106,9 @@ mod tests {
     use crate::house::testing::{kitchen_house, role, subtask};
 
     fn environment() -> HouseEnvironment {
-        let grader = Grader::new(Grading::Class, &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
-        HouseEnvironment::new(kitchen_house(), Some(grader))
+        let (house, roles, asked) = (kitchen_house(), [role("Mug")], [subtask(SkillKind::Pickup, 0)]);
+        let grader = Grader::new(Grading::Class, &roles, &asked, None, (house.scene(), house.world()));
+        HouseEnvironment::new(house, Some(grader))
     }
 
     #[test]

@@ -63,7 +63,9 @@ fn later_graders(task: &Task, rollout: &Rollout) -> Vec<Grader> {
     };
     let Some(present) = grader.subtask().map(asked) else { return Vec::new() };
     let later = task.subtasks.iter().skip(grader.completed() + 1).filter(|subtask| asked(subtask) != present);
-    later.map(|subtask| Grader::new(Grading::Class, &task.roles, std::slice::from_ref(subtask), None)).collect()
+    let (scene, now) = (rollout.env.house.scene(), rollout.env.house.world());
+    let alone = |subtask| Grader::new(Grading::Class, &task.roles, std::slice::from_ref(subtask), None, (scene, now));
+    later.map(alone).collect()
 }
 
 impl Observer<HouseEnvironment> for Evidence {
@@ -173,7 +175,7 @@ mod tests {
         let (scene, mut world) = kitchen();
         world.agent = Pose { cell, heading, horizon };
         let task = Task { roles, subtasks, ..ungraded(SceneRef::Named(scene.name.clone())) };
-        let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+        let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None, (&scene, &world));
         let house = House::new(scene.clone(), world.clone());
         let mut rollout = Rollout::in_house(house, String::new(), Some(grader), None);
         let mut trace = Vec::new();

@@ -37,7 +37,8 @@ impl EpisodeStart {
             // What a person made up is not graded.
             Some(task) if task.subtasks.is_empty() => Rollout::in_house(house, task.instruction.clone(), None, None),
             Some(task) => {
-                let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref());
+                let begun = (house.scene().as_ref(), house.world());
+                let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, task.goal.as_ref(), begun);
                 Rollout::in_house(house, task.instruction.clone(), Some(grader), self.limited.then_some(task.horizon))
             }
             None => Rollout::in_house(house, "look around".into(), None, None),

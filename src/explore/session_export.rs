@@ -96,7 +96,7 @@ pub(crate) fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
 
 fn expert_steps(task: &Task, scene: &Arc<Scene>) -> anyhow::Result<u32> {
     let world = task.start.clone().context("the task has no start")?;
-    let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+    let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None, (scene, &world));
     let house = House::new(scene.clone(), world);
     let mut rollout = Rollout::in_house(house, task.instruction.clone(), Some(grader), Some(MOST));
     rollout.run(&mut ExpertPolicy::new(), &mut ())?;

@@ -1,5 +1,8 @@
 //! ALFRED's seven goal conditions: names are matched by their parts, and containment is transitive.
 
+use super::render::Renderer;
+use super::session::House;
+use super::view;
 use crate::domain::skill::{Goal, GoalKind, Role};
 use crate::domain::world::{Instance, Object};
 use crate::domain::{Class, Scene, World};
@@ -11,10 +14,10 @@ pub(crate) fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
     let mut targets = objects(goal, world);
     match goal.kind {
         GoalKind::LookAtObjInLight => {
-            let lit = (0u16..)
-                .zip(&scene.fixtures)
-                .any(|(index, fixture)| names(goal.lamp, fixture.class) && world.is_on(Instance::Fixture(index)));
-            lit && targets.any(|(index, _)| world.held == Some(index))
+            let lamps = (0u16..).zip(&scene.fixtures).filter(|(_, fixture)| names(goal.lamp, fixture.class));
+            let lamps = lamps.map(|(index, _)| Instance::Fixture(index));
+            let lit: Vec<Instance> = lamps.filter(|&lamp| world.is_on(lamp)).collect();
+            targets.any(|(index, _)| world.held == Some(index)) && any_in_view(scene, world, &lit)
         }
         GoalKind::PickAndPlaceSimple => targets.any(|(index, _)| placed(index)),
         GoalKind::PickCleanThenPlaceInRecep => targets.any(|(index, object)| object.clean && placed(index)),
@@ -30,6 +33,15 @@ pub(crate) fn goal_met(goal: &Goal, scene: &Scene, world: &World) -> bool {
             receptacles(goal.receptacle, scene, world).any(|holder| inside(holder) >= 2)
         }
     }
+}
+
+/// Whether the agent sees one of these, near enough for ALFRED's simulator to call it visible.
+fn any_in_view(scene: &Scene, world: &World, wanted: &[Instance]) -> bool {
+    if wanted.is_empty() {
+        return false;
+    }
+    let view = Renderer::new(House::FRAME).look(scene, world);
+    wanted.iter().any(|&instance| view::reachable(scene, world, &view, instance).is_ok())
 }
 
 /// Whether `wanted`'s name is part of `class`'s, as ALFRED matches: a "Knife" is also a "ButterKnife".
@@ -68,7 +80,7 @@ fn movables(wanted: Option<Class>, world: &World) -> impl Iterator<Item = u16> {
 mod tests {
     use super::super::testing::{kitchen, named};
     use super::*;
-    use crate::domain::Parent;
+    use crate::domain::{Heading, Parent, Pose};
 
     fn goal(kind: GoalKind, object: &str, receptacle: &str) -> Goal {
         let (object, receptacle) = (Class::named(object).unwrap(), Class::named(receptacle));
@@ -83,6 +95,35 @@ mod tests {
         assert!(simple("Knife", "Drawer"), "the butter knife is a knife");
         assert!(simple("Spoon", "DiningTable"), "on a plate on the table");
         assert!(!simple("Spoon", "Fridge"));
+    }
+
+    #[test]
+    fn a_thing_is_looked_at_only_while_the_lamp_that_shines_on_it_is_in_view() {
+        let (scene, mut world) = kitchen();
+        let lamp = Class::named("FloorLamp");
+        let goal = Goal { lamp, ..goal(GoalKind::LookAtObjInLight, "Mug", "FloorLamp") };
+        let (Instance::Object(mug), Instance::Fixture(light)) =
+            (named(&scene, &world, "Mug"), named(&scene, &world, "FloorLamp"))
+        else {
+            panic!("no mug, no lamp")
+        };
+        world.held = Some(mug);
+        world.objects[usize::from(mug)].parent = Parent::Hand;
+        let met = |world: &World| goal_met(&goal, &scene, world);
+        let mut poses = Vec::new();
+        for &cell in &scene.cells {
+            for heading in Heading::ALL {
+                world.agent = Pose { cell, heading, horizon: 0 };
+                world.fixtures[usize::from(light)].on = false;
+                assert!(!met(&world), "it is dark");
+                world.fixtures[usize::from(light)].on = true;
+                poses.push((world.agent, met(&world)));
+            }
+        }
+        let near = poses.iter().filter(|(_, met)| *met).count();
+        assert!(near > 0 && near < poses.len() / 2, "{near} of {}", poses.len());
+        let turned = |pose: Pose| Pose { heading: pose.heading.left().left(), ..pose };
+        assert!(poses.iter().filter(|(_, met)| *met).all(|(pose, _)| poses.contains(&(turned(*pose), false))));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::outcome::{Outcome, Reason};
 use super::render::Renderer;
 use super::rules;
 use super::view::{self, Candidate, Frame, View};
-use crate::domain::{Action, Instance, Scene, World};
+use crate::domain::{Action, ActionType, Instance, Scene, World};
 
 /// A scene with a world in it. Frames are drawn on demand: stepping without looking costs no drawing.
 pub struct House {
@@ -49,7 +49,7 @@ impl House {
             && action.kind.is_interaction()
         {
             let may = rules::check(&self.scene, &self.world, action);
-            if let Err(reason) = may.and_then(|()| self.reach(target)) {
+            if let Err(reason) = may.and_then(|()| self.reach(action.kind, target)) {
                 return Outcome::Impossible(reason);
             }
         }
@@ -87,10 +87,10 @@ impl House {
         view::candidates(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing))
     }
 
-    fn reach(&mut self, target: Instance) -> Result<(), Reason> {
+    fn reach(&mut self, kind: ActionType, target: Instance) -> Result<(), Reason> {
         self.view();
         let nothing = View::default();
-        view::reachable(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing), target)
+        view::actionable(&self.scene, &self.world, self.view.as_ref().unwrap_or(&nothing), kind, target)
     }
 
     fn forget(&mut self) {
@@ -101,9 +101,42 @@ impl House {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::kitchen_house;
+    use super::super::testing::{kitchen_house, named};
     use super::*;
-    use crate::domain::Heading;
+    use crate::domain::{Heading, Pose};
+
+    #[test]
+    fn a_tap_is_turned_on_only_while_its_basin_is_in_view_and_off_from_wherever_it_is_seen() {
+        let mut house = kitchen_house();
+        let start = house.world().clone();
+        let (scene, mut counts) = (house.scene().clone(), [0; 2]);
+        let [tap, sink] = ["Faucet", "Sink"].map(|name| named(&scene, &start, name));
+        for &cell in &scene.cells {
+            for horizon in (Pose::UP..=Pose::DOWN).step_by(15) {
+                let mut world = start.clone();
+                world.agent = Pose { cell, heading: Heading::North, horizon };
+                house.restore(world);
+                let seen = house.view().clone();
+                if view::reachable(&scene, house.world(), &seen, tap).is_err() {
+                    continue;
+                }
+                let basin = seen.sighting(sink).is_some();
+                let on = Action::interact(ActionType::ToggleOn, tap);
+                assert_eq!(house.candidates().iter().any(|candidate| candidate.action() == on), basin);
+                let outcome = house.step(on);
+                if !basin {
+                    assert_eq!(outcome.to_string(), "the sink is not in view");
+                    let mut running = house.world().clone();
+                    assert!(rules::apply(&scene, &mut running, on).is_done());
+                    house.restore(running);
+                }
+                assert_eq!(outcome.is_done(), basin);
+                assert!(house.step(Action::interact(ActionType::ToggleOff, tap)).is_done());
+                counts[usize::from(basin)] += 1;
+            }
+        }
+        assert!(counts.iter().all(|&count| count > 0), "{counts:?}");
+    }
 
     #[test]
     fn looking_without_colours_sees_what_the_frame_shows() {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::outcome::Reason;
+use crate::domain::class::FixtureEffect;
 use crate::domain::world::{Instance, World};
 use crate::domain::{Action, ActionType, Cell, Class, Point, Scene};
 
@@ -173,6 +174,28 @@ pub(crate) fn reachable(scene: &Scene, world: &World, view: &View, instance: Ins
     Ok(())
 }
 
+/// Whether the agent could act so on an instance from where it stands: as [`reachable`], and a tap is only turned on while what
+/// it runs into is seen.
+pub(crate) fn actionable(
+    scene: &Scene,
+    world: &World,
+    view: &View,
+    kind: ActionType,
+    instance: Instance,
+) -> Result<(), Reason> {
+    reachable(scene, world, view, instance)?;
+    let rinses = world.class_of(scene, instance).is_some_and(|class| class.info().effect == Some(FixtureEffect::Rinse));
+    if kind == ActionType::ToggleOn
+        && rinses
+        && let Some(pivot) = world.position(scene, instance)
+        && let Some(basin) = super::rules::nearest_basin(scene, pivot)
+        && view.sighting(basin).is_none()
+    {
+        return Err(Reason::NotVisible(world.class_of(scene, basin).unwrap_or_default()));
+    }
+    Ok(())
+}
+
 /// An interaction that is possible now.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
@@ -204,7 +227,9 @@ pub(crate) fn candidates(scene: &Scene, world: &World, view: &View) -> Vec<Candi
             continue;
         }
         for kind in ActionType::ALL.into_iter().filter(|kind| kind.is_interaction()) {
-            if super::rules::check(scene, world, Action::interact(kind, instance)).is_ok() {
+            if super::rules::check(scene, world, Action::interact(kind, instance)).is_ok()
+                && actionable(scene, world, view, kind, instance).is_ok()
+            {
                 found.push(Candidate { kind, instance, class, distance: nearness(scene, world, instance) });
             }
         }

@@ -180,7 +180,7 @@ fn pickup(class: Class) -> ([Role; 1], [Subtask; 1]) {
 fn expert_steps(scene: &Arc<Scene>, world: &World, class: Class) -> Option<u32> {
     const TOO_MANY: u32 = 60;
     let (roles, subtasks) = pickup(class);
-    let grader = Grader::new(Grading::Class, &roles, &subtasks, None);
+    let grader = Grader::new(Grading::Class, &roles, &subtasks, None, (scene, world));
     let house = House::new(scene.clone(), world.clone());
     let mut rollout = Rollout::in_house(house, String::new(), Some(grader), Some(TOO_MANY));
     rollout.run(&mut ExpertPolicy::new(), &mut ()).ok()?;

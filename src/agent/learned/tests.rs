@@ -128,7 +128,9 @@ fn an_agent_says_how_much_of_an_instruction_it_reads() {
 fn an_agent_that_is_shown_its_goal_needs_a_task_and_lacks_it_in_its_own_slot_alone() {
     let _chance = crate::nets::testing::chance();
     let Some(mut agent) = fresh(Some([4; 4])) else { return };
-    let grader = Grader::new(Grading::default(), &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
+    let (scene, start) = crate::house::testing::kitchen();
+    let (roles, asked) = ([role("Mug")], [subtask(SkillKind::Pickup, 0)]);
+    let grader = Grader::new(Grading::default(), &roles, &asked, None, (&scene, &start));
     let (mut without, mut with) = (kitchen(None), kitchen(Some(grader)));
     let mut observations: Vec<Option<Observation<'_>>> = (0..agent.slots()).map(|_| None).collect();
     (0..agent.slots()).for_each(|slot| agent.reset(slot, 1));

@@ -174,8 +174,9 @@ mod tests {
     }
 
     fn episode() -> Rollout {
-        let grader = Grader::new(Grading::Class, &[role("Mug")], &[subtask(SkillKind::Pickup, 0)], None);
-        Rollout::new(HouseEnvironment::new(kitchen_house(), Some(grader)), "pick up the mug".into(), Some(12))
+        let (house, roles, asked) = (kitchen_house(), [role("Mug")], [subtask(SkillKind::Pickup, 0)]);
+        let grader = Grader::new(Grading::Class, &roles, &asked, None, (house.scene(), house.world()));
+        Rollout::new(HouseEnvironment::new(house, Some(grader)), "pick up the mug".into(), Some(12))
     }
 
     /// Plays on for some steps in a slot: what was decided in each.

@@ -133,7 +133,7 @@ fn rebound(chain: &Chain, link: usize, world: &World, expert: &Grader) -> Grader
     for role in &mut roles {
         role.bound = held.filter(|(_, class)| *class == Some(role.class)).map(|(instance, _)| instance);
     }
-    Grader::new(Grading::Class, &roles, subtasks.get(link..).unwrap_or_default(), None)
+    Grader::new(Grading::Class, &roles, subtasks.get(link..).unwrap_or_default(), None, (&chain.scene, world))
 }
 
 #[cfg(test)]

@@ -48,7 +48,7 @@ impl Chain {
 
     fn grader(&self) -> Option<Grader> {
         let (roles, subtasks) = self.graded.as_ref()?;
-        Some(Grader::new(Grading::Class, roles, subtasks, None))
+        Some(Grader::new(Grading::Class, roles, subtasks, None, (&self.scene, &self.start)))
     }
 
     /// All links as one instruction.

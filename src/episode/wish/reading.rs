@@ -114,7 +114,7 @@ fn of_reading(
         Ok(task) => task,
         Err(why) => return Wish { ungraded: Some(why), readings, picked, ..wish },
     };
-    let mut grader = Grader::new(Grading::Class, &roles, &subtasks, None);
+    let mut grader = Grader::new(Grading::Class, &roles, &subtasks, None, (scene, world));
     let already = grader.settle(scene, world) as u32;
     let mut steps = 0;
     let mut house = House::new(scene.clone(), world.clone());

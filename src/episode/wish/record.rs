@@ -174,7 +174,7 @@ impl Wish {
     /// A grader that begins in that state, where it is graded as it was read.
     pub(crate) fn grader(&self, scene: &Scene, world: &World) -> Option<Grader> {
         (self.grading == WishGrading::Read).then(|| {
-            let mut grader = Grader::new(Grading::Class, &self.roles, &self.subtasks, None);
+            let mut grader = Grader::new(Grading::Class, &self.roles, &self.subtasks, None, (scene, world));
             grader.settle(scene, world);
             grader
         })

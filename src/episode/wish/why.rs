@@ -125,7 +125,8 @@ mod tests {
         let (scene, mut world) = kitchen();
         // In front of the counter, with the laptop behind.
         world.agent = Pose { cell: Cell { x: 4, z: 9 }, heading: Heading::North, horizon: 45 };
-        let grader = Grader::new(Grading::Class, &[role("Laptop"), role("Sink")], &[put_subtask(0, 1)], None);
+        let grader =
+            Grader::new(Grading::Class, &[role("Laptop"), role("Sink")], &[put_subtask(0, 1)], None, (&scene, &world));
         let (failure, advice) =
             explain(&grader, &scene, &world, &[Action::navigate(ActionType::LookDown)]).unwrap().unwrap();
         assert_eq!(failure, Failure::NeverReached);

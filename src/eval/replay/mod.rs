@@ -132,7 +132,7 @@ fn replay_one(scene: &Scene, trajectory: &Trajectory, boxes: bool) -> Replayed {
     let mut replayed = Replayed::default();
     let mut replay = Replay::new(scene, trajectory.start.clone(), &trajectory.actions);
     let goal = trajectory.goal.as_ref();
-    let new = |grading| Grader::new(grading, &trajectory.roles, &trajectory.skills, goal);
+    let new = |grading| Grader::new(grading, &trajectory.roles, &trajectory.skills, goal, (scene, &trajectory.start));
     let (mut class, mut strict) = (new(Grading::Class), new(Grading::Strict));
     let mut interactions = 0;
     let mut moved = vec![false; trajectory.start.objects.len()];

@@ -11,7 +11,7 @@ use crate::domain::{Action, ActionType, Class, Scene, Trajectory, World};
 use crate::house::bounds::projected_bounds;
 use crate::house::outcome::Reason;
 use crate::house::render::Renderer;
-use crate::house::view::{Frame, View, decode, reachable};
+use crate::house::view::{Frame, View, actionable, decode};
 use crate::house::{House, Replay};
 
 /// Why a target cannot be acted on.
@@ -95,7 +95,7 @@ pub(super) fn misses(
         let Some((action, outcome)) = replay.step() else { break };
         let Some(target) = action.target.filter(|_| outcome.is_done()) else { continue };
         let frame = renderer.draw(scene, &before);
-        let Err(reason) = reachable(scene, &before, &View::of(frame), target) else { continue };
+        let Err(reason) = actionable(scene, &before, &View::of(frame), action.kind, target) else { continue };
         found.push((number, Miss::of(scene, &before, frame, (action, target), &reason)));
         if let Some(folder) = pictures {
             let file = folder.join(format!("{}-{number}.png", trajectory.id.replace('/', "-")));
@@ -168,7 +168,7 @@ fn picture(frame: &Frame, bounds: Option<[f32; 4]>, file: &Path) -> anyhow::Resu
 mod tests {
     use super::*;
     use crate::house::testing::{kitchen, named};
-    use crate::house::view::code;
+    use crate::house::view::{code, reachable};
 
     #[test]
     fn what_keeps_a_target_from_being_acted_on_is_told() {

@@ -65,7 +65,7 @@ pub(super) fn replay_set(
         let rest = trajectory.actions.get(from..).unwrap_or_default();
         let actions = &rest[..rest.len().min(task.expert_steps as usize)];
         let mut replay = Replay::new(scene, start.clone(), actions);
-        let new = |grading| Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        let new = |grading| Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref(), (scene, start));
         let mut graders = [new(Grading::Class), new(Grading::Strict)];
         while let Some((action, outcome)) = replay.step() {
             for grader in &mut graders {

@@ -345,7 +345,7 @@ mod tests {
         let skills = vec![subtask(SkillKind::Pickup, None), subtask(SkillKind::Put, Some(1))];
         let mut house = kitchen_house();
         let (scene, start) = (house.scene().clone(), house.world().clone());
-        let mut grader = Grader::new(Grading::Class, &roles, &skills, None);
+        let mut grader = Grader::new(Grading::Class, &roles, &skills, None, (&scene, &start));
         let (mut expert, mut actions, mut skill_starts) = (Expert::new(), Vec::new(), vec![0]);
         while !grader.is_done() {
             let action = expert.next(&mut house, &grader).unwrap();

@@ -47,7 +47,8 @@ impl RecordedEpisode<'_> {
         if start != episode.start_hash {
             return Ok(Some(Mismatch::at(0, "start", &episode.start_hash, start)));
         }
-        let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref());
+        let begun = (&*setting.scene, &setting.world);
+        let grader = Grader::new(grading, &task.roles, &task.subtasks, task.goal.as_ref(), begun);
         let grader = (!task.subtasks.is_empty()).then_some(grader);
         let house = House::new(setting.scene, setting.world);
         let mut rollout = Rollout::in_house(house, episode.instruction.clone(), grader, None);

@@ -31,7 +31,7 @@ fn walked() -> SessionExport {
     task.subtasks =
         vec![Subtask { skill: SkillKind::Pickup, object: 0, receptacle: None, closes: false, literal: None }];
     (task.id, task.start, task.instruction) = ("main".into(), Some(world.clone()), "Take the mug.".into());
-    let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+    let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None, (&scene, &world));
     let mut rollout = Rollout::in_house(House::new(scene.clone(), world), task.instruction.clone(), Some(grader), None);
     let mut policy = RandomPolicy::new();
     policy.reset(0, 9);

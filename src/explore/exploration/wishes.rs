@@ -303,7 +303,13 @@ impl Exploration {
         let Some(start) = self.tree.past().nth(began) else { return };
         let grader = match (wish.grading, &self.episode.task) {
             (WishGrading::Nobody, _) | (WishGrading::Task, None) => return,
-            (WishGrading::Task, Some(task)) => Grader::new(Grading::Class, &task.roles, &task.subtasks, None),
+            (WishGrading::Task, Some(task)) => Grader::new(
+                Grading::Class,
+                &task.roles,
+                &task.subtasks,
+                None,
+                (self.rollout.env.house.scene(), &start.world),
+            ),
             (WishGrading::Read, _) => match wish.grader(self.rollout.env.house.scene(), &start.world) {
                 Some(grader) => grader,
                 None => return,

@@ -94,7 +94,7 @@ impl PoseSearch {
             std::collections::hash_map::Entry::Vacant(entry) => entry.insert(self.renderer.look(scene, world)),
         };
         let Some(sighting) = view.sighting(aim.target).copied() else { return Visibility::Unseen };
-        if view::reachable(scene, world, view, aim.target).is_err() {
+        if view::actionable(scene, world, view, aim.kind, aim.target).is_err() {
             return Visibility::Unseen;
         }
         let class = world.class_of(scene, aim.target);
@@ -103,7 +103,7 @@ impl PoseSearch {
             other.instance != aim.target
                 && world.class_of(scene, other.instance) == class
                 && view::nearness(scene, world, other.instance) <= near
-                && view::reachable(scene, world, view, other.instance).is_ok()
+                && view::actionable(scene, world, view, aim.kind, other.instance).is_ok()
                 && rules::check(scene, world, action(other.instance)).is_ok()
         });
         if rivalled { Visibility::Rivalled } else { Visibility::Good(sighting.pixels) }

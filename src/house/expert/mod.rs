@@ -187,7 +187,7 @@ mod tests {
     use ActionType::{Close, Open, Pickup, Put, Slice, ToggleOff, ToggleOn};
 
     fn solve(house: &mut House, roles: &[Role], subtasks: &[Subtask]) -> Vec<Action> {
-        let mut grader = Grader::new(Grading::Class, roles, subtasks, None);
+        let mut grader = Grader::new(Grading::Class, roles, subtasks, None, (house.scene(), house.world()));
         demonstrate(house, &mut grader, 200).unwrap()
     }
 
@@ -265,7 +265,7 @@ mod tests {
         for seed in 0..10 {
             let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
             let mut house = kitchen_house();
-            let mut grader = Grader::new(Grading::Class, &roles, &subtasks, None);
+            let mut grader = Grader::new(Grading::Class, &roles, &subtasks, None, (house.scene(), house.world()));
             let mut expert = Expert::new();
             for _ in 0..400 {
                 if grader.is_done() {
@@ -296,6 +296,7 @@ mod tests {
             &roles,
             &[closing(subtask(SkillKind::Heat, 0)), closing(put_subtask(0, 1))],
             None,
+            (house.scene(), house.world()),
         );
         let mut expert = Expert::new();
         while !grader.is_done() {
@@ -352,7 +353,8 @@ mod tests {
                 let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
                 let task = generate::task(&scene, &world, reference, 1, &mut rng).unwrap();
                 let mut house = House::new(scene, task.start.clone().unwrap_or(world));
-                let grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+                let grader =
+                    Grader::new(Grading::Class, &task.roles, &task.subtasks, None, (house.scene(), house.world()));
                 let mut expert = Expert::of(timing);
                 let first = expert.next(&mut house, &grader).unwrap();
                 let way = std::iter::once(first).chain(expert.state().steps);
@@ -367,7 +369,13 @@ mod tests {
     #[test]
     fn what_is_not_there_is_refused_in_words() {
         let mut house = kitchen_house();
-        let grader = Grader::new(Grading::Class, &[role("Watch")], &[subtask(SkillKind::Pickup, 0)], None);
+        let grader = Grader::new(
+            Grading::Class,
+            &[role("Watch")],
+            &[subtask(SkillKind::Pickup, 0)],
+            None,
+            (house.scene(), house.world()),
+        );
         let no_way = Expert::new().next(&mut house, &grader).unwrap_err();
         assert_eq!(no_way.to_string(), "there is no way to pick up the watch: nothing here would serve for it");
     }

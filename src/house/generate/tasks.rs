@@ -90,7 +90,7 @@ fn solve(scene: &Arc<Scene>, start: World, mut chain: SkillChain) -> Result<Solv
     for subtask in &mut chain.subtasks {
         subtask.closes = subtask.skill != SkillKind::Toggle;
     }
-    let mut grader = Grader::new(Grading::Class, &chain.roles, &chain.subtasks, None);
+    let mut grader = Grader::new(Grading::Class, &chain.roles, &chain.subtasks, None, (scene, &start));
     let mut house = House::new(Arc::clone(scene), start);
     let mut expert = Expert::new();
     let mut steps = 0;
@@ -150,7 +150,8 @@ mod tests {
 
     /// Solves a task from what it says alone; the steps taken.
     fn solve_again(scene: Scene, task: &Task) -> Result<u32, String> {
-        let mut grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None);
+        let begun = (&scene, task.start.as_ref().unwrap());
+        let mut grader = Grader::new(Grading::Class, &task.roles, &task.subtasks, None, begun);
         let mut house = House::new(Arc::new(scene), task.start.clone().unwrap());
         let mut expert = Expert::new();
         for step in 0..task.horizon {

@@ -92,24 +92,14 @@ fn pickup(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> Subta
     let may = step.did(ActionType::Pickup) || subtask.closes && step.did(ActionType::Close);
     let Some(held) = held(grader, subtask.object, step).filter(|_| may) else { return SubtaskVerdict::Unchanged };
     bind(grader, subtask.object, held);
-    let shut = step.did(ActionType::Pickup).then(|| came_from(grader, held, step)).flatten();
+    let shut = step.did(ActionType::Pickup).then(|| came_from(grader, held)).flatten();
     complete_or_close(subtask, shut, step)
 }
 
 /// The openable fixture out of which an object was just taken.
-fn came_from(grader: &Grader, taken: Instance, step: GradedStep<'_>) -> Option<Instance> {
+fn came_from(grader: &Grader, taken: Instance) -> Option<Instance> {
     let Instance::Object(index) = taken else { return None };
-    if let Some(before) = &grader.before {
-        return before.inside.get(usize::from(index)).copied().flatten();
-    }
-    // The first step of an episode: nothing is remembered, but the object's last place tells.
-    let at = step.world.object(index)?.at;
-    (0..step.scene.fixtures.len() as u16).find_map(|index| {
-        let (instance, fixture) = (Instance::Fixture(index), step.scene.fixture(index)?);
-        let mut rects = fixture.surfaces.iter().flat_map(|surface| &surface.areas);
-        let over = rects.any(|rect| rect.grown(super::super::placing::DRAWER_TRAVEL).contains(at.x, at.z));
-        (over && openable_fixture(step.scene, instance) && step.world.is_open(instance)).then_some(instance)
-    })
+    grader.before.inside.get(usize::from(index)).copied().flatten()
 }
 
 fn put(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {
@@ -140,14 +130,7 @@ fn put_object(grader: &Grader, role: u8, step: GradedStep<'_>) -> Option<Instanc
         return Some(bound);
     }
     let fitting = |instance: &Instance| fits(grader, step.scene, step.world, role, *instance);
-    match &grader.before {
-        Some(before) => before.held.map(Instance::Object).filter(fitting),
-        None => {
-            let into = crate::domain::Parent::In(step.action.target?);
-            let there = (0u16..).zip(&step.world.objects).filter(|(_, object)| object.parent == into);
-            there.map(|(index, _)| Instance::Object(index)).find(fitting)
-        }
-    }
+    grader.before.held.map(Instance::Object).filter(fitting)
 }
 
 fn slice(grader: &mut Grader, subtask: &Subtask, step: GradedStep<'_>) -> SubtaskVerdict {

@@ -49,7 +49,7 @@ pub struct Grader {
     pub(super) completed: usize,
     pub(super) bindings: Vec<Option<Instance>>,
     pub(super) pending: Option<Pending>,
-    pub(super) before: Option<Before>,
+    pub(super) before: Before,
     /// Strict: the whole goal was met at an earlier step.
     pub(super) finished: bool,
 }
@@ -104,9 +104,15 @@ fn first_binding(grading: Grading, role: &Role) -> Option<Instance> {
 }
 
 impl Grader {
-    /// A grader at the start of a task.
-    pub fn new(grading: Grading, roles: &[Role], subtasks: &[Subtask], goal: Option<&Goal>) -> Grader {
-        Grader {
+    /// A grader at the start of a task, in that state of that scene.
+    pub fn new(
+        grading: Grading,
+        roles: &[Role],
+        subtasks: &[Subtask],
+        goal: Option<&Goal>,
+        (scene, start): (&Scene, &World),
+    ) -> Grader {
+        let mut grader = Grader {
             grading,
             roles: roles.to_vec(),
             subtasks: subtasks.to_vec(),
@@ -114,9 +120,11 @@ impl Grader {
             completed: 0,
             bindings: roles.iter().map(|role| first_binding(grading, role)).collect(),
             pending: None,
-            before: None,
+            before: Before::default(),
             finished: false,
-        }
+        };
+        grader.remember(scene, start);
+        grader
     }
 
     /// How many subtasks are done.

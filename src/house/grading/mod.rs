@@ -65,14 +65,14 @@ impl Grader {
         }
     }
 
-    fn remember(&mut self, scene: &Scene, world: &World) {
+    pub(super) fn remember(&mut self, scene: &Scene, world: &World) {
         let follows = self.subtask().is_some_and(|subtask| subtask.skill == SkillKind::Pickup && subtask.closes);
         let inside = if follows {
             (0..world.objects.len() as u16).map(|index| class::shell(scene, world, Instance::Object(index))).collect()
         } else {
             Vec::new()
         };
-        self.before = Some(Before { held: world.held, inside });
+        self.before = Before { held: world.held, inside };
     }
 
     /// Whether an instance may play a role: the bound one, or any other of the class that plays no other role. With strict
@@ -124,7 +124,8 @@ mod tests {
     }
 
     fn by_class(roles: &[Role], subtasks: &[Subtask]) -> Grader {
-        Grader::new(Grading::Class, roles, subtasks, None)
+        let (scene, start) = kitchen();
+        Grader::new(Grading::Class, roles, subtasks, None, (&scene, &start))
     }
 
     #[test]
@@ -137,6 +138,41 @@ mod tests {
     fn a_door_need_not_be_closed_where_the_agent_took_the_thing_from_a_table() {
         let mut grader = by_class(&[role("Tomato")], &[closing(subtask(SkillKind::Pickup, 0))]);
         assert_eq!(play(&mut grader, &[(Pickup, "Tomato")]), [0]);
+    }
+
+    #[test]
+    fn where_a_thing_came_from_is_known_at_the_first_step_too() {
+        let (scene, mut world) = kitchen();
+        // The apple lies on the counter, above the open drawer.
+        let (drawer, apple) = (named(&scene, &world, "Drawer"), named(&scene, &world, "Tomato"));
+        let Instance::Object(apple) = apple else { panic!("no tomato") };
+        assert!(rules::apply(&scene, &mut world, Action::interact(Open, drawer)).is_done());
+        let Instance::Fixture(number) = drawer else { panic!("no drawer") };
+        let area = scene.fixtures[usize::from(number)].surfaces[0].areas[0];
+        let at = &mut world.objects[usize::from(apple)].at;
+        (at.x, at.z) = ((area.min[0] + area.max[0]) / 2, (area.min[1] + area.max[1]) / 2);
+        let grader = |object: &str, world: &World| {
+            let asked = [closing(subtask(SkillKind::Pickup, 0))];
+            Grader::new(Grading::Class, &[role(object)], &asked, None, (&scene, world))
+        };
+        let pickup = |object| [(Pickup, object), (Close, "Drawer")];
+        let mut from_counter = grader("Tomato", &world);
+        assert_eq!(play_on(&mut from_counter, &scene, &mut world.clone(), &pickup("Tomato")), [0]);
+        let mut from_drawer = grader("ButterKnife", &world);
+        assert_eq!(play_on(&mut from_drawer, &scene, &mut world, &pickup("ButterKnife")), [1]);
+    }
+
+    #[test]
+    fn what_is_put_down_at_the_first_step_is_what_was_in_the_hand() {
+        let (scene, mut world) = kitchen();
+        for (kind, name) in [(Open, "Cabinet"), (Pickup, "Mug2")] {
+            let action = Action::interact(kind, named(&scene, &world, name));
+            assert!(rules::apply(&scene, &mut world, action).is_done());
+        }
+        let roles = [role("Mug"), role("DiningTable")];
+        let mut grader = Grader::new(Grading::Class, &roles, &[put_subtask(0, 1)], None, (&scene, &world));
+        assert_eq!(play_on(&mut grader, &scene, &mut world, &[(Put, "DiningTable")]), [0]);
+        assert_eq!(grader.binding(0), Some(named(&scene, &world, "Mug2")), "the other mug lay there before");
     }
 
     #[test]
@@ -285,9 +321,9 @@ mod tests {
         let wanted = recorded(&scene, &world, subtask(SkillKind::Pickup, 0), "Mug2", None);
         let roles = [role("Mug")];
         let script = [(Pickup, "Mug"), (Put, "SideTable"), (Open, "Cabinet"), (Pickup, "Mug2")];
-        let mut strict = Grader::new(Grading::Strict, &roles, std::slice::from_ref(&wanted), None);
+        let mut strict = Grader::new(Grading::Strict, &roles, std::slice::from_ref(&wanted), None, (&scene, &world));
         assert_eq!(play(&mut strict, &script), [3]);
-        let mut class = Grader::new(Grading::Class, &roles, &[wanted], None);
+        let mut class = Grader::new(Grading::Class, &roles, &[wanted], None, (&scene, &world));
         assert_eq!(play(&mut class, &script), [0]);
     }
 
@@ -307,10 +343,11 @@ mod tests {
             lamp: None,
         };
         let script = [(Pickup, "Tomato"), (Open, "Fridge"), (Put, "Fridge"), (Close, "Fridge")];
-        let mut strict = Grader::new(Grading::Strict, &roles, std::slice::from_ref(&put), Some(&goal));
+        let mut strict =
+            Grader::new(Grading::Strict, &roles, std::slice::from_ref(&put), Some(&goal), (&scene, &world));
         assert!(play(&mut strict, &script).is_empty());
         assert!(strict.waits_for(&scene, &world).contains("whole goal is met"));
-        let mut class = Grader::new(Grading::Class, &roles, &[put], Some(&goal));
+        let mut class = Grader::new(Grading::Class, &roles, &[put], Some(&goal), (&scene, &world));
         assert_eq!(play(&mut class, &script), [3]);
     }
 
@@ -319,9 +356,10 @@ mod tests {
         let (scene, world) = kitchen();
         let pickup = recorded(&scene, &world, subtask(SkillKind::Pickup, 0), "Laptop", Some("Laptop"));
         let script = [(Close, "Laptop"), (Pickup, "Laptop")];
-        let mut strict = Grader::new(Grading::Strict, &[role("Laptop")], std::slice::from_ref(&pickup), None);
+        let mut strict =
+            Grader::new(Grading::Strict, &[role("Laptop")], std::slice::from_ref(&pickup), None, (&scene, &world));
         assert!(play(&mut strict, &script).is_empty());
-        let mut class = Grader::new(Grading::Class, &[role("Laptop")], &[pickup], None);
+        let mut class = Grader::new(Grading::Class, &[role("Laptop")], &[pickup], None, (&scene, &world));
         assert_eq!(play(&mut class, &script), [1]);
     }
 

@@ -94,7 +94,7 @@ mod tests {
         let (scene, mut world) = kitchen();
         let roles = [role("Mug"), role("SideTable")];
         let asked = [subtask(SkillKind::Pickup, 0), put_subtask(0, 1)];
-        let mut grader = Grader::new(Grading::Class, &roles, &asked, None);
+        let mut grader = Grader::new(Grading::Class, &roles, &asked, None, (&scene, &world));
         assert_eq!(grader.settle(&scene, &world), 0);
         let mug = named(&scene, &world, "Mug");
         assert!(rules::apply(&scene, &mut world, Action::interact(ActionType::Pickup, mug)).is_done());
@@ -110,7 +110,7 @@ mod tests {
     fn what_was_put_away_and_taken_again_no_longer_holds() {
         let (scene, mut world) = kitchen();
         let (roles, asked) = ([role("Mug"), role("SideTable")], [put_subtask(0, 1)]);
-        let mut grader = Grader::new(Grading::Class, &roles, &asked, None);
+        let mut grader = Grader::new(Grading::Class, &roles, &asked, None, (&scene, &world));
         let mut act = |grader: &mut Grader, kind, name: &str| {
             let action = Action::interact(kind, named(&scene, &world, name));
             let outcome = rules::apply(&scene, &mut world, action);

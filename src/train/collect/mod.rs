@@ -245,7 +245,7 @@ mod tests {
         let own = Annotation { goal: "do that for me".into(), steps: vec!["do that for me".into()] };
         assert_eq!((made.len(), &made[0].id, &made[0].annotations), (1, &tasks[1].id, &vec![own]));
         let scene = dataset.scenes().unwrap().into_values().next().unwrap();
-        let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None);
+        let grader = Grader::new(Grading::Class, &made[0].roles, &made[0].skills, None, (&scene, &made[0].start));
         let mut rollout =
             Rollout::in_house(House::new(scene, made[0].start.clone()), String::new(), Some(grader), None);
         made[0].actions.iter().for_each(|&action| drop(rollout.carry_out(Decision::of(action))));
