@@ -21,6 +21,7 @@ mod generated;
 mod policy_server;
 mod properties;
 mod reading;
+mod recorded_policies;
 mod program;
 mod environments;
 mod evaluator;

@@ -12,8 +12,8 @@ use crate::program::Sprint;
 
 /// A server of vla-eval's protocol that turns left and walks, by what it is told of the step; it dies before a message of some
 /// number.
-struct Server {
-    port: u16,
+pub(crate) struct Server {
+    pub(crate) port: u16,
     listener: TcpListener,
 }
 
@@ -26,13 +26,18 @@ fn map(fields: Vec<(&str, Value)>) -> Value {
 }
 
 impl Server {
-    fn bind(port: u16) -> Server {
+    pub(crate) fn bind(port: u16) -> Server {
         let listener = TcpListener::bind(("127.0.0.1", port)).unwrap();
         Server { port: listener.local_addr().unwrap().port(), listener }
     }
 
     /// Serves until so many messages came.
-    fn serve(self, messages: usize) {
+    pub(crate) fn serve(self, messages: usize) {
+        self.serve_as("walker", messages);
+    }
+
+    /// The same under another name.
+    pub(crate) fn serve_as(self, name: &'static str, messages: usize) {
         let (left, closed) = (Arc::new(AtomicUsize::new(messages)), Arc::new(AtomicBool::new(false)));
         std::thread::spawn(move || {
             self.listener.set_nonblocking(true).unwrap();
@@ -40,7 +45,7 @@ impl Server {
                 match self.listener.accept() {
                     Ok((stream, _)) => {
                         let (left, closed) = (left.clone(), closed.clone());
-                        std::thread::spawn(move || talk(stream, &left, &closed));
+                        std::thread::spawn(move || talk(stream, name, &left, &closed));
                     }
                     Err(_) => std::thread::sleep(Duration::from_millis(1)),
                 }
@@ -51,7 +56,7 @@ impl Server {
     }
 }
 
-fn talk(stream: TcpStream, left: &AtomicUsize, closed: &AtomicBool) {
+fn talk(stream: TcpStream, name: &str, left: &AtomicUsize, closed: &AtomicBool) {
     stream.set_nonblocking(false).unwrap();
     let Ok(mut socket) = accept(stream) else { return };
     while let Ok(message) = socket.read() {
@@ -65,7 +70,7 @@ fn talk(stream: TcpStream, left: &AtomicUsize, closed: &AtomicBool) {
             return;
         }
         let (kind, payload) = match field(&told, "type").as_str().unwrap() {
-            "hello" => ("hello", map(vec![("protocol_version", 1.into()), ("model_server", "walker".into())])),
+            "hello" => ("hello", map(vec![("protocol_version", 1.into()), ("model_server", name.into())])),
             "observation" => {
                 let step = field(field(&told, "payload"), "step").as_u64().unwrap();
                 ("action", map(vec![("action", if step % 3 == 2 { "RotateLeft" } else { "MoveAhead" }.into())]))

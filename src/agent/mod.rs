@@ -16,6 +16,7 @@ pub(crate) mod loop_guard;
 pub(crate) mod memory;
 pub(crate) mod memory_agent;
 pub(crate) mod policy;
+pub(crate) mod policy_place;
 pub mod policy_source;
 pub(crate) mod random;
 pub mod registry;

@@ -14,6 +14,7 @@ use super::learned::{LearnedPolicy, SharedEmbedder};
 use super::memory_agent::MemoryPolicy;
 use super::memory_agent::config::MemoryConfig;
 use super::policy::Policy;
+use super::policy_place::PolicyPlace;
 use super::random::RandomPolicy;
 use super::registry::{Loaded, NamedAgent};
 use super::sentence_encoders;
@@ -37,6 +38,8 @@ pub struct PolicySource {
     pub make: Arc<MakePolicy>,
     /// The checkpoint's folder.
     folder: Option<PathBuf>,
+    /// Where it is, as `--policy` takes it, if it is none of the program's own.
+    place: Option<String>,
 }
 
 impl PolicySource {
@@ -52,12 +55,23 @@ impl PolicySource {
 
     /// A policy of that name, which `make` makes.
     pub(crate) fn of(name: &str, make: Arc<MakePolicy>) -> PolicySource {
-        PolicySource { name: name.into(), checkpoint_hash: None, make, folder: None }
+        PolicySource { name: name.into(), checkpoint_hash: None, make, folder: None, place: None }
     }
 
     /// The same, with the hash of its weights.
     pub(crate) fn with_hash(self, checkpoint_hash: Option<String>) -> PolicySource {
         PolicySource { checkpoint_hash, ..self }
+    }
+
+    /// The same, which is there, as `--policy` takes it.
+    pub(crate) fn at(self, place: String) -> PolicySource {
+        PolicySource { place: Some(place), ..self }
+    }
+
+    /// Where it is, if it is none of the program's own.
+    pub(crate) fn place(&self) -> Option<PolicyPlace> {
+        let (policy, checkpoint) = (self.name.clone(), self.checkpoint_hash.clone());
+        self.place.clone().map(|place| PolicyPlace { policy, checkpoint, place })
     }
 
     fn plain(name: &str, make: fn() -> Box<dyn Policy>) -> PolicySource {
@@ -102,7 +116,8 @@ impl PolicySource {
                 Err(_) => {}
             }
         };
-        Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make: Arc::new(load), folder: Some(folder) })
+        let (make, folder) = (Arc::new(load), Some(folder));
+        Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make, folder, place: None })
     }
 
     /// Notices when the checkpoint is no longer the one that was chosen.
@@ -218,7 +233,8 @@ pub(crate) fn agent_of(name: String, open: impl Fn() -> anyhow::Result<PolicySou
                 opened.get_or_init(|| chosen)
             }
         };
-        Ok(Loaded { policy: (chosen.make)()?, checkpoint: chosen.checkpoint_hash.clone() })
+        let (checkpoint, place) = (chosen.checkpoint_hash.clone(), chosen.place());
+        Ok(Loaded { policy: (chosen.make)()?, checkpoint, place })
     };
     NamedAgent { name, load: Box::new(load) }
 }

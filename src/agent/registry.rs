@@ -1,5 +1,6 @@
 //! The policies that may act, made on demand: loading the agent takes a while.
 
+use super::policy_place::PolicyPlace;
 use super::{ExpertPolicy, Policy, RandomPolicy};
 
 /// Who acts.
@@ -47,6 +48,8 @@ pub(crate) struct Loaded {
     pub(crate) policy: Box<dyn Policy>,
     /// SHA-256 of its checkpoint, where it has one.
     pub(crate) checkpoint: Option<String>,
+    /// Where it is, if it is none of the program's own.
+    pub(crate) place: Option<PolicyPlace>,
 }
 
 /// Loads an agent, wherever its checkpoint lies.
@@ -114,7 +117,7 @@ impl Policies {
     /// # Errors
     /// When the agent cannot be loaded.
     pub(crate) fn make(&self, kind: PolicyKind) -> anyhow::Result<Loaded> {
-        let plain = |policy| Ok(Loaded { policy, checkpoint: None });
+        let plain = |policy| Ok(Loaded { policy, checkpoint: None, place: None });
         match kind {
             PolicyKind::Agent => match self.agents.get(self.chosen) {
                 Some(agent) => (agent.load)(),

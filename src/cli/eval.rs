@@ -30,9 +30,9 @@ use crate::house::grading::Grading;
 use crate::language::count::counted;
 use crate::report::summary::RunSummary;
 use crate::report::threshold::Threshold;
-use crate::run_dir::default_path;
 use crate::run_dir::shard::Shard;
 use crate::run_dir::writer::RunWriter;
+use crate::run_dir::{default_path, policy_places};
 
 /// Plays a task set and writes a run folder.
 #[derive(Args)]
@@ -130,6 +130,7 @@ impl Eval {
         }
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunWriter::open(&path, evaluation.manifest())?;
+        policy_places::write(&path, chosen.place().as_slice())?;
         run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &file, &path)?)?;
         let stop = stop::on_signals()?;
         let run_control = ControlledRun::listen(Kind::Eval, &path, &stop, evaluation.clock());

@@ -39,6 +39,7 @@ mod pretrain;
 mod progress;
 mod read;
 mod recorded;
+mod recorded_policy;
 mod relabel;
 mod replay;
 mod report;

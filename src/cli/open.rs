@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::checkpoint;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::explore::{Display, Origin};
 use super::recorded::{recorded, recorded_elsewhere};
+use super::recorded_policy::RecordedPolicy;
 
 /// Which episode, and how to show it.
 #[derive(Args)]
@@ -19,9 +19,8 @@ pub(crate) struct Open {
     /// The task file that the run was made from, where the folder does not hold it
     #[arg(long, value_name = "FILE")]
     tasks: Option<PathBuf>,
-    /// The checkpoint of the run's agent: its folder or its name [default: the one of the run's hash among checkpoints/]
-    #[arg(long, value_name = "DIR|NAME")]
-    checkpoint: Option<PathBuf>,
+    #[command(flatten)]
+    policy: RecordedPolicy,
     #[command(flatten)]
     environment: EnvironmentChoice,
     #[command(flatten)]
@@ -34,12 +33,12 @@ impl Open {
     /// # Errors
     /// When it cannot be read, its tasks are not at hand, or the simulator does not come to what was recorded.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
-        let elsewhere = recorded_elsewhere(&self.episode, self.tasks.as_deref(), self.environment.reach())?;
+        let (episode, tasks, policy) = (&self.episode, self.tasks.as_deref(), &self.policy);
+        let elsewhere = recorded_elsewhere(episode, tasks, policy, self.environment.reach())?;
         if let Some((open, agent)) = elsewhere {
             return self.display.paused().show_elsewhere(true, open, agent);
         }
-        let checkpoint = self.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
-        let (kind, open) = recorded(&self.episode, self.tasks.as_deref(), checkpoint)?;
+        let (kind, open) = recorded(episode, tasks, policy)?;
         self.display.paused().show(kind, false, &Origin::default(), open)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, TypedValueParser};
@@ -44,24 +45,53 @@ impl PolicyName {
     }
 }
 
+/// Seconds that a policy server may take for an answer, unless told otherwise.
+const PATIENCE: u64 = 60;
+
 /// How a policy from elsewhere is dealt with.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct ElsewhereOptions {
     /// How long a policy server may take for an answer
-    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400), default_value_t = 60)]
-    policy_timeout: u64,
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400), default_value_t = PATIENCE)]
+    pub(super) policy_timeout: u64,
     /// Run the code that a TorchScript policy holds
     #[arg(long)]
-    trust: bool,
+    pub(super) trust: bool,
+}
+
+impl Default for ElsewhereOptions {
+    /// Nothing is named.
+    fn default() -> ElsewhereOptions {
+        ElsewhereOptions { policy_timeout: PATIENCE, trust: false }
+    }
 }
 
 impl Elsewhere {
+    /// The kinds, as names of policies and of places begin.
+    const KINDS: [&str; 3] = ["ws", Format::Onnx.name(), Format::TorchScript.name()];
+
+    /// The kind of a policy that a run names so; `None` for the program's own.
+    pub(crate) fn kind_of(policy: &str) -> Option<&'static str> {
+        let (kind, _) = policy.split_once(':')?;
+        Elsewhere::KINDS.into_iter().find(|known| *known == kind)
+    }
+
+    /// The same, found from any folder.
+    fn from_anywhere(&self) -> Elsewhere {
+        match self {
+            Elsewhere::Server(address) => Elsewhere::Server(address.clone()),
+            Elsewhere::File(format, path) => {
+                Elsewhere::File(*format, std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+            }
+        }
+    }
+
     /// Opens it.
     ///
     /// # Errors
     /// When it cannot be used; says what to do.
     pub(crate) fn open(&self, options: ElsewhereOptions, sampling: bool) -> anyhow::Result<PolicySource> {
-        match self {
+        let source = match self {
             Elsewhere::File(Format::TorchScript, path) if !options.trust => anyhow::bail!(
                 "{}: a TorchScript file is a program that runs with your rights: add --trust where you trust its maker, or \
                  export the policy as ONNX",
@@ -69,7 +99,8 @@ impl Elsewhere {
             ),
             Elsewhere::File(format, path) => ExportedPolicy::source(path, *format, sampling),
             Elsewhere::Server(address) => ServedPolicy::source(address, Duration::from_secs(options.policy_timeout)),
-        }
+        };
+        Ok(source?.at(self.from_anywhere().to_string()))
     }
 
     /// The same for an explorer, which opens it when it is to act.
@@ -85,6 +116,28 @@ impl std::fmt::Display for Elsewhere {
             Elsewhere::Server(address) => address.fmt(f),
             Elsewhere::File(format, path) => write!(f, "{}:{}", format.name(), path.display()),
         }
+    }
+}
+
+impl FromStr for Elsewhere {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Elsewhere, String> {
+        if text.starts_with("ws:") || text.starts_with("wss:") {
+            return text.parse().map(Elsewhere::Server);
+        }
+        for format in [Format::Onnx, Format::TorchScript] {
+            let file = text.strip_prefix(format.name()).and_then(|rest| rest.strip_prefix(':'));
+            if let Some(file) = file {
+                return match file {
+                    "" => Err(format!("{text}FILE: the file is missing")),
+                    file => Ok(Elsewhere::File(format, file.into())),
+                };
+            }
+        }
+        Err(format!(
+            "{text:?} is no policy from elsewhere: it is ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy"
+        ))
     }
 }
 
@@ -117,17 +170,8 @@ impl PolicyNameParser {
         if let Some((_, _, name)) = self.names().find(|(known, _, _)| *known == text) {
             return Ok(name.clone());
         }
-        if text.starts_with("ws:") || text.starts_with("wss:") {
-            return text.parse().map(|address| PolicyName::Elsewhere(Elsewhere::Server(address)));
-        }
-        for format in [Format::Onnx, Format::TorchScript] {
-            let file = text.strip_prefix(format.name()).and_then(|rest| rest.strip_prefix(':'));
-            if let Some(file) = file {
-                return match file {
-                    "" => Err(format!("{text}FILE: the file is missing")),
-                    file => Ok(PolicyName::Elsewhere(Elsewhere::File(format, file.into()))),
-                };
-            }
+        if text.starts_with("wss:") || Elsewhere::kind_of(text).is_some() {
+            return text.parse().map(PolicyName::Elsewhere);
         }
         let known: Vec<&str> = self.names().map(|(name, _, _)| *name).collect();
         Err(format!(

@@ -1,9 +1,12 @@
 //! A recorded episode as the command line names it, found and opened.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 
+use super::recorded_policy::{RecordedPolicy, SoughtPolicy};
+use super::streams::say;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::env::remote::Elsewhere;
@@ -62,7 +65,7 @@ impl Reference {
 pub(super) fn recorded(
     episode: &str,
     tasks: Option<&Path>,
-    checkpoint: Option<PathBuf>,
+    policy: &RecordedPolicy,
 ) -> anyhow::Result<(PolicyKind, impl FnOnce() -> anyhow::Result<Exploration> + Send + 'static)> {
     let (reference, recorded) = Reference::find(episode, tasks)?;
     let (at, task, _) = recorded.setting(&recorded.episodes[reference.episode])?;
@@ -71,18 +74,26 @@ pub(super) fn recorded(
     let first = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
     let acts = first.cloned().unwrap_or_else(|| author.clone());
     let kind = kind_of(&acts);
+    policy.check(&recorded.manifest)?;
+    let (checkpoint, sought) = (policy.checkpoint()?, policy.elsewhere(&recorded, &acts)?);
     let explored = recorded.manifest.policy == RunManifest::EXPLORED;
     let open = move || -> anyhow::Result<Exploration> {
         let scenes = recorded.scenes;
         let start = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };
-        let policies = Policies::new(policy_source::agents(checkpoint.as_deref(), acts.deciding));
+        let is_elsewhere = sought.is_some();
+        let agents = policy_source::agents(checkpoint.as_deref(), acts.deciding);
+        let policies = Policies::new(sought.map(SoughtPolicy::agent).into_iter().chain(agents).collect());
         let source = EpisodeSource::new(start, 0, scenes);
         let mut exploration = Exploration::new(source, policies, kind, None)?;
         if explored {
             exploration.unlimited();
         }
         // Without its policy an episode can still be seen, step by step.
-        let found = summon(&mut exploration, kind, &acts);
+        exploration.know_places(recorded.places);
+        let found = match is_elsewhere {
+            true => exploration.choose(kind),
+            false => summon(&mut exploration, kind, &acts),
+        };
         let thinks = found.is_ok();
         if thinks {
             exploration.begin_as(acts);
@@ -101,6 +112,7 @@ pub(super) fn recorded(
 pub(super) fn recorded_elsewhere(
     episode: &str,
     tasks: Option<&Path>,
+    policy: &RecordedPolicy,
     elsewhere: Elsewhere,
 ) -> anyhow::Result<Option<(OpenOwn, PolicySource)>> {
     let (reference, recorded) = Reference::find(episode, tasks)?;
@@ -113,15 +125,32 @@ pub(super) fn recorded_elsewhere(
     let author = recorded.author(at, &episode);
     let named = episode.trace.iter().filter_map(|step| step.author.as_ref()).find(|by| !by.is_hand());
     let acts = named.unwrap_or(&author);
+    policy.check(&recorded.manifest)?;
     // Without its policy an episode can still be seen, step by step, and chance acts on.
-    let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), (acts.sampling, acts.deciding), None)
-        .ok()
-        .flatten();
-    let source = found.unwrap_or_else(PolicySource::random);
-    let acting = source.clone();
+    let (source, agent) = match policy.elsewhere(&recorded, acts)? {
+        None => {
+            let decides = (acts.sampling, acts.deciding);
+            let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), decides, None).ok().flatten();
+            let source = found.unwrap_or_else(PolicySource::random);
+            (source.clone(), source)
+        }
+        Some(sought) => match sought.open() {
+            Ok(source) => (source.clone(), source),
+            Err(error) => {
+                say(&format!("{error:#}"));
+                let reason = format!("{error:#}");
+                (PolicySource::random(), PolicySource::of(&acts.policy, Arc::new(move || bail!("{reason}"))))
+            }
+        },
+    };
+    let (places, now) = (recorded.places, source.place());
     let step = reference.step.unwrap_or(0);
-    let open = move || OwnExploration::open(&task, &episode, &author, elsewhere, source, step);
-    Ok(Some((Box::new(open), acting)))
+    let open = move || {
+        let mut exploration = OwnExploration::open(&task, &episode, &author, elsewhere, source, step)?;
+        exploration.know_places(places.into_iter().chain(now));
+        Ok(exploration)
+    };
+    Ok(Some((Box::new(open), agent)))
 }
 
 /// Which kind of policy an author is.

@@ -8,8 +8,9 @@ use clap::Args;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::progress::Progress;
-use super::{checkpoint, jobs, streams};
-use crate::agent::policy_source;
+use super::recorded_policy::RecordedPolicy;
+use super::streams::say;
+use super::{jobs, streams};
 use crate::episode::record::Author;
 use crate::eval::verify::{Difference, Mismatch, verify};
 use crate::language::count::counted;
@@ -23,9 +24,8 @@ pub(crate) struct Verify {
     /// The task file that the run was made from, where the folder does not hold it
     #[arg(long, value_name = "FILE")]
     tasks: Option<PathBuf>,
-    /// The checkpoint folder of the run's agent [default: the one of the run's hash among checkpoints/]
-    #[arg(long, value_name = "DIR")]
-    checkpoint: Option<PathBuf>,
+    #[command(flatten)]
+    policy: RecordedPolicy,
     /// Threads; the verdict does not depend on their number [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -43,15 +43,9 @@ impl Verify {
     /// When the run or its tasks cannot be read.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let run = RecordedRun::open(&self.run, self.tasks.as_deref())?;
-        let checkpoint = self.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
-        let mut find = |author: &Author| {
-            policy_source::find(
-                author.policy.as_str(),
-                author.checkpoint.as_deref(),
-                (author.sampling, author.deciding),
-                checkpoint.as_deref(),
-            )
-        };
+        self.policy.check(&run.manifest)?;
+        let checkpoint = self.policy.checkpoint()?;
+        let mut find = |author: &Author| self.policy.find(&run, author, checkpoint.as_deref(), &say);
         let (mut progress, total) = (Progress::new(), run.episodes.len() as u64);
         let (threads, reach) = (jobs::threads(self.jobs), self.environment.reach());
         let verdict =

@@ -12,6 +12,7 @@ use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::episode_specs;
 use crate::run_dir::layout::TASKS;
 use crate::run_dir::manifest::RunManifest;
+use crate::run_dir::policy_places;
 use crate::run_dir::reader::RecordedRun;
 use crate::run_dir::shard::Shard;
 use crate::run_dir::writer::RunWriter;
@@ -81,6 +82,7 @@ pub(crate) fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummar
     }
     ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
     let mut folder = RunWriter::open(into, &manifest)?;
+    policy_places::write(into, &first.places)?;
     folder.write_tasks(&sample::as_seen_from(&set, &set.tasks, &file, into)?)?;
     let there: std::collections::BTreeSet<EpisodeKey> =
         folder.earlier.iter().map(crate::episode::record::Episode::key).collect();

@@ -6,6 +6,7 @@ use anyhow::ensure;
 use sha2::{Digest, Sha256};
 
 use crate::agent::DecisionOverride;
+use crate::agent::policy_place::PolicyPlace;
 use crate::data::{atomic_file, json};
 use crate::domain::{Scene, TaskSet};
 use crate::episode::record::Episode;
@@ -15,6 +16,7 @@ use crate::report::summary::RunSummary;
 use crate::report::summary_files;
 use crate::run_dir::layout::{MANIFEST, TASKS};
 use crate::run_dir::manifest::RunManifest;
+use crate::run_dir::policy_places;
 use crate::run_dir::writer::RunWriter;
 
 /// The folder with its scenes, where they come from a dataset.
@@ -29,7 +31,7 @@ pub(super) fn write(
     set: &TaskSet,
     scenes_hash: String,
     scene: Option<&Scene>,
-    episodes: &[Episode],
+    (episodes, places): (&[Episode], &[PolicyPlace]),
 ) -> anyhow::Result<()> {
     ensure!(!path.join(MANIFEST).exists(), "{} holds a run already; name another folder", path.display());
     let mut bytes = serde_json::to_vec_pretty(set)?;
@@ -56,6 +58,7 @@ pub(super) fn write(
     };
     let mut folder = RunWriter::open(path, &manifest)?;
     atomic_file::write(&path.join(TASKS), &bytes)?;
+    policy_places::write(path, places)?;
     if let Some(scene) = scene {
         json::write(&path.join(SCENES).join(format!("{}.json", scene.name)), scene)?;
     }

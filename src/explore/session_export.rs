@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::explored_run::{self, SCENES};
 use crate::agent::ExpertPolicy;
+use crate::agent::policy_place::PolicyPlace;
 use crate::data::{json, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, TaskSet};
@@ -26,6 +27,8 @@ pub(crate) struct SessionExport {
     pub(crate) tasks: Vec<Task>,
     /// What was done.
     pub(crate) episodes: Vec<Episode>,
+    /// Where policies were that are none of the program's own.
+    pub(crate) places: Vec<PolicyPlace>,
 }
 
 /// The most steps that the expert is given for a task.
@@ -44,7 +47,8 @@ pub(crate) fn write(explored: &SessionExport, path: &Path) -> anyhow::Result<()>
         tasks: explored.tasks.clone(),
     };
     let scenes_hash = json::hex(&Sha256::digest(serde_json::to_vec(&*explored.scene)?));
-    explored_run::write(path, &set, scenes_hash, named.then_some(&*explored.scene), &explored.episodes)
+    let scene = named.then_some(&*explored.scene);
+    explored_run::write(path, &set, scenes_hash, scene, (&explored.episodes, &explored.places))
 }
 
 /// A task without subtasks: nobody grades what a person made up.

@@ -6,6 +6,7 @@ pub(crate) mod episode_spec;
 pub(crate) mod episodes;
 pub(crate) mod layout;
 pub(crate) mod manifest;
+pub(crate) mod policy_places;
 pub mod reader;
 pub(crate) mod shard;
 pub mod writer;

@@ -9,6 +9,8 @@ use super::episode_spec::{EpisodeSpec, own_specs, policy_seed};
 use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::RunManifest;
+use super::policy_places;
+use crate::agent::policy_place::PolicyPlace;
 use crate::data::json::Document;
 use crate::data::{json, taskset};
 use crate::domain::{Task, TaskSet};
@@ -23,6 +25,8 @@ pub struct RecordedRun {
     pub(crate) sources: Vec<(PathBuf, usize)>,
     /// What it was made from.
     pub manifest: RunManifest,
+    /// Where its policies were that are none of the program's own.
+    pub(crate) places: Vec<PolicyPlace>,
     /// The tasks that it plays.
     pub(crate) set: TaskSet,
     /// The scenes that its tasks play in.
@@ -51,7 +55,8 @@ impl RecordedRun {
             anyhow::bail!("{}: {misfit}", path.join(EPISODES).display());
         }
         let sources = vec![(path.to_owned(), episodes.len())];
-        Ok(RecordedRun { path: path.to_owned(), sources, manifest, set, scenes, episodes })
+        let places = policy_places::read(path)?;
+        Ok(RecordedRun { path: path.to_owned(), sources, manifest, places, set, scenes, episodes })
     }
 
     /// Reads the run folder of an evaluation: its tasks are in it, and each can be graded.
@@ -86,6 +91,7 @@ impl RecordedRun {
             all.episodes.extend(run.episodes.into_iter().map(later));
             all.path = format!("{},{}", all.path.display(), run.path.display()).into();
             all.sources.extend(run.sources);
+            all.places.extend(run.places);
             all.manifest.seeds += seeds;
             all.manifest.checkpoint_hash = None;
         }

@@ -19,7 +19,7 @@ pub(crate) enum Format {
 
 impl Format {
     /// What `--policy` calls it.
-    pub(crate) fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Format::Onnx => "onnx",
             Format::TorchScript => "torchscript",

@@ -13,8 +13,10 @@ pub(crate) mod spec;
 mod torchscript;
 
 #[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
 mod tests;
 
 pub(crate) use format::Format;
 pub(crate) use frame_stack::FrameStack;
-pub(crate) use policy::ExportedPolicy;
+pub(crate) use policy::{ExportedPolicy, hash};

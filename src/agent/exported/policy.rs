@@ -121,7 +121,10 @@ fn open_encoder(name: &str, size: usize) -> anyhow::Result<SharedEmbedder> {
 }
 
 /// SHA-256 over a policy's description and file.
-fn hash(path: &Path) -> anyhow::Result<String> {
+///
+/// # Errors
+/// When one of them cannot be read.
+pub(crate) fn hash(path: &Path) -> anyhow::Result<String> {
     let mut digest = Sha256::new();
     for path in [&PolicySpec::path_of(path), path] {
         digest.update(std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?);

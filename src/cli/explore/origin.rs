@@ -12,6 +12,7 @@ use crate::cli::environment::EnvironmentChoice;
 use crate::cli::policies::Deciding;
 use crate::cli::policy_name::{Elsewhere, ElsewhereOptions};
 use crate::cli::recorded::recorded;
+use crate::cli::recorded_policy::RecordedPolicy;
 use crate::cli::wish_reader::WishReaderArgs;
 use crate::cli::{logging, value_names};
 use crate::data::{dataset::Dataset, taskset};
@@ -187,7 +188,7 @@ impl Origin {
                 return Ok(taken_up.taken_from(path.clone()).reading_as(self.expect()?));
             }
             Start::Run { folder, number } => {
-                let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, None)?;
+                let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, &RecordedPolicy::default())?;
                 return open();
             }
             Start::House { room, seed } => (from.room, from.seed) = (Some(*room), Some(*seed)),

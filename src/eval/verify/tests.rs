@@ -59,7 +59,7 @@ fn walked() -> SessionExport {
         let moment = SavedState::of(&rollout, &random, policy.state(0));
         tree.grow(taken, || moment, String::new);
     }
-    SessionExport { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")] }
+    SessionExport { scene, tasks: vec![task], episodes: vec![tree.episode(0, "main")], places: Vec::new() }
 }
 
 fn random(author: &Author) -> anyhow::Result<Option<PolicySource>> {

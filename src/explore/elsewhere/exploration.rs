@@ -7,6 +7,7 @@ use anyhow::Context;
 use super::breakpoint::OwnCondition;
 use super::tree::{MOST, OwnTree, State, Taken};
 use crate::agent::DecisionOverride;
+use crate::agent::policy_place::{self, PolicyPlace};
 use crate::agent::policy_source::PolicySource;
 use crate::agent::{Decision, Observation, Policy, PolicyState};
 use crate::domain::{Action, EnvironmentName};
@@ -31,6 +32,8 @@ pub(crate) struct OwnExploration {
     /// Same actions were taken again, and showed the same.
     pub(super) was_retraced: bool,
     acting: Acting,
+    /// Where policies are that acted and are none of the program's own.
+    pub(super) places: Vec<PolicyPlace>,
     instruction: Arc<str>,
     /// Who acts or what is told was changed since the state in hand was reached.
     redirected: bool,
@@ -98,6 +101,7 @@ impl OwnExploration {
     ) -> anyhow::Result<OwnExploration> {
         let mut sessions = Sessions::new(elsewhere);
         let mut env = RemoteEnvironment::begin(sessions.get(0, name)?, seed)?;
+        let places = source.place().into_iter().collect();
         let acting = Acting::new(source, seed, &mut env)?;
         let rollout = Rollout::new(env, String::new(), None);
         let tree = OwnTree::new(start_state(&rollout, &acting)?);
@@ -111,6 +115,7 @@ impl OwnExploration {
             differs_at: None,
             was_retraced: false,
             acting,
+            places,
             instruction: Arc::from(""),
             redirected: false,
             saved: 1,
@@ -233,9 +238,16 @@ impl OwnExploration {
     /// # Errors
     /// When it cannot be made, or has no use for the environment's actions.
     pub(crate) fn choose(&mut self, source: PolicySource) -> anyhow::Result<()> {
+        let place = source.place();
         self.acting = Acting::new(source, self.seed, &mut self.rollout.env)?;
+        self.know_places(place);
         self.redirected = true;
         Ok(())
+    }
+
+    /// Notes where policies are that are none of the program's own, for the run that this becomes.
+    pub(crate) fn know_places(&mut self, places: impl IntoIterator<Item = PolicyPlace>) {
+        policy_place::note(&mut self.places, places);
     }
 
     /// What the policy would do in the state in hand.

@@ -45,6 +45,8 @@ impl OwnExploration {
                 author = by.clone();
             }
             let action = recorded.action_in(&exploration.rollout.env).with_context(|| format!("step {number}"))?;
+            // The policy sees this state too; what it cannot decide is no reason not to show it.
+            let _ = exploration.decide();
             exploration.carry_out(Decision::of(action), author.clone())?;
             let taken = exploration.tree.present().taken.as_ref();
             let is_same = taken.is_some_and(|taken| taken.record.own == recorded.own);

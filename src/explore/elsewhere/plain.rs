@@ -328,7 +328,7 @@ mod tests {
     fn what_was_explored_is_a_run_that_verifies_and_opens_again() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
-        let (name, agent) = (serve(Fault::None), PolicySource::random());
+        let (name, agent) = (serve(Fault::None), PolicySource::random().at("ws://node7:8000".into()));
         let mut exploration = OwnExploration::new(&name, Elsewhere::default(), agent.clone(), 2, None).unwrap();
         for _ in 0..3 {
             exploration.step().unwrap();
@@ -340,6 +340,7 @@ mod tests {
         exploration.save(Some(path.clone())).unwrap();
         let run = RecordedRun::open(&path, None).unwrap();
         assert_eq!(run.episodes.len(), 2);
+        assert_eq!(run.places, Vec::from_iter(agent.place()), "where its policy was is kept");
         let verdict = verify(&run, &mut |_| Ok(None), 1, &Elsewhere::default(), &mut |_| ()).unwrap();
         assert!(verdict.is_equal(), "{verdict:?}");
         let (task, author) = (run.task(&run.episodes[1]).unwrap(), run.author(0, &run.episodes[1]));

@@ -36,7 +36,8 @@ impl OwnExploration {
         let task = |branch: &super::tree::Branch| Task::elsewhere(branch.name.clone(), self.name.clone(), self.seed);
         let tasks = self.tree.branches().iter().map(task).collect();
         let set = TaskSet { format_version: TaskSet::FORMAT, name: "explored".into(), scenes: None, tasks };
-        explored_run::write(path, &set, json::hex(&Sha256::digest(self.name.to_string())), None, &episodes)
+        let scenes_hash = json::hex(&Sha256::digest(self.name.to_string()));
+        explored_run::write(path, &set, scenes_hash, None, (&episodes, &self.places))
     }
 
     /// A branch as the record of an episode.

@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use super::episode_source::EpisodeSource;
 use crate::agent::PolicyState;
+use crate::agent::policy_place::PolicyPlace;
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::domain::Task;
 use crate::episode::branches::{SavedState, Tree};
@@ -36,6 +37,8 @@ pub struct Exploration {
     checkpoints: Arc<Vec<String>>,
     episode: CurrentEpisode,
     acting: ActingPolicy,
+    /// Where policies are that acted and are none of the program's own.
+    places: Vec<PolicyPlace>,
     rollout: Rollout,
     tree: Tree,
     frames: Frames,
@@ -71,6 +74,7 @@ impl Exploration {
             policies,
             tree: Tree::new(SavedState::of(&rollout, &author, PolicyState::Nothing)),
             acting: ActingPolicy { kind, policy: None, author, decision: None, redirected: false },
+            places: Vec::new(),
             rollout,
             episode: CurrentEpisode {
                 number: 1,

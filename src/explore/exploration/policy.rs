@@ -3,6 +3,7 @@
 use anyhow::Context;
 
 use super::Exploration;
+use crate::agent::policy_place::{self, PolicyPlace};
 use crate::agent::registry::{Loaded, PolicyIdentity, PolicyKind};
 use crate::agent::{DecisionOverride, Observation, Policy};
 use crate::episode::record::Author;
@@ -13,7 +14,7 @@ impl Exploration {
     /// # Errors
     /// When it cannot be loaded; the one before stays.
     pub fn choose(&mut self, kind: PolicyKind) -> anyhow::Result<()> {
-        let Loaded { policy, checkpoint } = self.policies.make(kind)?;
+        let Loaded { policy, checkpoint, place } = self.policies.make(kind)?;
         policy.check_fits(&mut Observation::start(&mut self.rollout.env)).with_context(|| policy.name().to_owned())?;
         let before = self.acting.policy.as_ref().map(|_| self.acting.author.clone());
         self.acting.author.policy = policy.name().to_string();
@@ -22,6 +23,7 @@ impl Exploration {
         self.acting.redirected |= before.is_some_and(|before| before != self.acting.author);
         self.acting.policy = Some(policy);
         self.acting.kind = kind;
+        self.know_places(place);
         self.look_back();
         self.make_start();
         Ok(())
@@ -47,6 +49,11 @@ impl Exploration {
             self.policies.choose(&(before + 1).to_string())?;
         }
         chosen
+    }
+
+    /// Notes where policies are that are none of the program's own, for the run that this becomes.
+    pub(crate) fn know_places(&mut self, places: impl IntoIterator<Item = PolicyPlace>) {
+        policy_place::note(&mut self.places, places);
     }
 
     /// The names of the checkpoints that may act.

@@ -21,7 +21,12 @@ impl Exploration {
     pub(crate) fn explored(&self) -> SessionExport {
         let branches = || self.tree.branches().iter().enumerate();
         let tasks = branches().map(|(at, branch)| self.task_at(&self.tree.beginning(at), &branch.name)).collect();
-        SessionExport { scene: self.rollout.env.house.scene().clone(), tasks, episodes: self.branch_episodes() }
+        SessionExport {
+            scene: self.rollout.env.house.scene().clone(),
+            tasks,
+            episodes: self.branch_episodes(),
+            places: self.places.clone(),
+        }
     }
 
     /// Every branch as an episode, under its name.

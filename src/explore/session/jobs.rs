@@ -94,7 +94,7 @@ impl Session {
         };
         let own = self.exploration.who();
         let mut runs = Vec::new();
-        if let Some(Loaded { policy, checkpoint }) = rival {
+        if let Some(Loaded { policy, checkpoint, .. }) = rival {
             let who = PolicyIdentity { name: policy.name().to_string(), checkpoint };
             if who == own {
                 self.emit(SessionEvent::Refused(format!("{} acts already: name another", who.name)));

@@ -189,6 +189,7 @@ pub(crate) mod tests {
             path: name.into(),
             sources: vec![(name.into(), outcomes.len())],
             manifest: RunManifest { seeds: outcomes.len() as u64, ..manifest() },
+            places: Vec::new(),
             scenes: Scenes::in_folder(None),
             set,
             episodes: (0..).zip(outcomes).map(outcome).collect(),
