@@ -108,6 +108,54 @@ fn after_a_kill_the_last_session_comes_first_and_has_every_step_and_branch() {
 }
 
 #[test]
+fn two_explorers_at_once_keep_a_session_each_and_only_what_was_broken_off_is_offered() {
+    let state = tempfile::tempdir().unwrap();
+    let explore = |seed: &str| {
+        let arguments = ["--policy", "random", "--graphics", "ascii", "--seed", seed, "--paused"];
+        let mut session = Session::open(state.path(), (120, 36), "explore", &arguments);
+        session.see("Mind");
+        session.see("step 0");
+        session.press("n");
+        session.see("main 1/1");
+        session
+    };
+    let offered = |wanted: &[&str]| {
+        let mut session = start(state.path(), (120, 36));
+        session.see("house");
+        let text = session.text();
+        let lines: Vec<&str> = text.lines().filter(|line| line.contains("last session")).collect();
+        assert_eq!(lines.len(), wanted.len(), "{text}");
+        assert!(lines.iter().zip(wanted).all(|(line, words)| line.contains(words)), "{text}");
+        session.press("\x03");
+        assert_eq!(session.end(), 0);
+    };
+    let (mut third, mut fourth) = (explore("3"), explore("4"));
+    offered(&[]);
+    third.press("n");
+    third.see("main 2/2");
+    fourth.signal("-KILL");
+    fourth.end();
+    offered(&["kitchen 4"]);
+    // A link that drops.
+    third.signal("-HUP");
+    third.end();
+    offered(&["kitchen 3", "kitchen 4"]);
+    let mut again = start(state.path(), (120, 36));
+    again.see("broken off, step 2");
+    again.press("\r");
+    again.see("kitchen-3");
+    again.see("main 2/2");
+    offered(&["kitchen 4"]);
+    again.leave();
+    offered(&["kitchen 3", "kitchen 4"]);
+    let mut again = start(state.path(), (120, 36));
+    again.press("\x1b[B\r");
+    again.see("kitchen-4");
+    again.see("main 1/1");
+    again.leave();
+}
+
+#[test]
 fn the_list_is_one_key_away_from_the_explorer_and_opens_another_house() {
     let state = tempfile::tempdir().unwrap();
     let arguments = ["--policy", "random", "--graphics", "ascii", "--seed", "3", "--paused"];

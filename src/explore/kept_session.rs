@@ -1,14 +1,12 @@
 //! A session as it is kept while it goes on, in one file of the state folder: everything that was tried in one house.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
 use super::episode_source::EpisodeStart;
 use crate::agent::registry::PolicyKind;
-use crate::data::{atomic_file, json};
+use crate::data::json;
 use crate::domain::task::SceneRef;
 use crate::domain::{Scene, Task, World};
 use crate::episode::record::{Author, Episode};
@@ -45,20 +43,6 @@ pub(crate) struct KeptSession {
     pub(crate) is_unsaved: bool,
 }
 
-/// Where the session before is kept.
-pub(crate) fn before(path: &Path) -> PathBuf {
-    path.with_file_name("session-before.json")
-}
-
-/// Puts a session that nobody saved aside, as another one is about to take its place. What cannot be read is nothing to keep.
-pub(crate) fn put_aside(path: &Path) {
-    if KeptSession::read(path).is_ok_and(|kept| kept.is_unsaved)
-        && let Err(error) = std::fs::rename(path, before(path))
-    {
-        tracing::warn!("{}: {error}", path.display());
-    }
-}
-
 impl KeptSession {
     /// The format version that is read and written.
     pub(crate) const FORMAT: u32 = 1;
@@ -69,21 +53,6 @@ impl KeptSession {
     /// When there is none, or it is broken or of another version.
     pub(crate) fn read(path: &Path) -> anyhow::Result<KeptSession> {
         Ok(json::read::<KeptSession>(path, KeptSession::FORMAT)?.value)
-    }
-
-    /// Writes it whole or not at all. It is not forced onto the disk: it outlives the program, not the machine.
-    ///
-    /// # Errors
-    /// When the folder cannot be written to.
-    pub(crate) fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let bytes = serde_json::to_vec(self)?;
-        let whole = || -> std::io::Result<()> {
-            let mut file = atomic_file::begin(path)?;
-            file.write_all(&bytes)?;
-            file.persist(path)?;
-            Ok(())
-        };
-        whole().with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// How its episode begins.

@@ -16,6 +16,7 @@ pub(crate) mod plain;
 pub(crate) mod plain_input;
 pub mod session;
 pub(crate) mod session_export;
+pub(crate) mod session_file;
 pub(crate) mod side_by_side;
 pub(crate) mod start_list;
 pub(crate) mod steering;

@@ -6,7 +6,8 @@ use std::time::SystemTime;
 use nucleo_matcher::pattern::{AtomKind, CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
-use super::kept_session::{self, KeptSession};
+use super::kept_session::KeptSession;
+use super::session_file;
 use crate::data::dataset::Dataset;
 use crate::domain::Room;
 use crate::run_dir::layout::MANIFEST;
@@ -96,13 +97,19 @@ impl StartEntry {
     }
 }
 
-/// Everything that can be started with: the last session first, then houses, floor plans, task files, checkpoints, runs. What
-/// cannot be read is left out.
+/// Everything that can be started with: the last session and those that were broken off first, then houses, floor plans, task
+/// files, checkpoints, runs. What cannot be read is left out.
 pub(crate) fn list(folders: &StartFolders) -> Vec<StartEntry> {
     let runs = runs(&folders.here.join("runs"));
-    let mut found: Vec<StartEntry> = last_session(&folders.session, &runs).into_iter().collect();
+    let broken_off = session_file::broken_off(&folders.session).into_iter().filter_map(|(when, path)| {
+        let entry = session(&path)?;
+        Some((when, StartEntry { note: format!("broken off, {}", entry.note), ..entry }))
+    });
+    let mut sessions: Vec<(SystemTime, StartEntry)> = broken_off.chain(last_session(&folders.session, &runs)).collect();
+    sessions.sort_by_key(|(when, _)| std::cmp::Reverse(*when));
+    let mut found: Vec<StartEntry> = sessions.into_iter().map(|(_, entry)| entry).collect();
     found.extend(
-        session(&kept_session::before(&folders.session))
+        session(&session_file::before(&folders.session))
             .map(|entry| StartEntry { note: format!("before that, {}", entry.note), ..entry }),
     );
     // As a person would name them: kitchens first.
@@ -120,15 +127,15 @@ pub(crate) fn list(folders: &StartFolders) -> Vec<StartEntry> {
     found
 }
 
-/// The session that was kept last: by the explorer itself, or as a run by a person if that is newer.
-fn last_session(kept: &Path, runs: &[(SystemTime, StartEntry)]) -> Option<StartEntry> {
+/// The session that ended last: kept by the explorer itself, or as a run by a person if that is newer.
+fn last_session(kept: &Path, runs: &[(SystemTime, StartEntry)]) -> Option<(SystemTime, StartEntry)> {
     let own = session(kept).map(|entry| (modified(kept), entry));
     let explored = runs.iter().find(|(_, entry)| entry.name.starts_with("explored-"));
     let saved = explored.map(|(when, run)| {
         let note = format!("saved as {}", run.name);
         (*when, StartEntry { note, ..run.clone() })
     });
-    own.into_iter().chain(saved).max_by_key(|(when, _)| *when).map(|(_, entry)| entry)
+    own.into_iter().chain(saved).max_by_key(|(when, _)| *when)
 }
 
 /// A session in a file, where there is one.
@@ -248,7 +255,9 @@ fn split_number(typed: &str) -> (&str, Option<u64>) {
 mod tests {
     use super::*;
     use crate::agent::registry::Policies;
+    use crate::data::json;
     use crate::explore::exploration::Exploration;
+    use crate::explore::session_file::SessionFile;
     use crate::explore::testing;
 
     fn folders(root: &Path) -> StartFolders {
@@ -275,7 +284,7 @@ mod tests {
         assert_eq!(lines(&bare)[4..], ["checkpoint small "]);
         let mut exploration = testing::exploration();
         exploration.instruct("pick up the mug").unwrap();
-        exploration.as_kept().write(&wanted.session).unwrap();
+        json::write(&wanted.session, &exploration.as_kept()).unwrap();
         std::fs::create_dir_all(folder.path().join("data/tasks")).unwrap();
         let set = br#"{"format_version": 1, "name": "eval", "tasks": []}"#;
         std::fs::write(folder.path().join("data/tasks/eval_100.json"), set).unwrap();
@@ -285,11 +294,19 @@ mod tests {
         assert_eq!(found[0].start, Start::Session(wanted.session.clone()));
         assert!(found[0].note.ends_with("Pick up the mug."), "{:?}", found[0]);
         assert_eq!(lines(&found)[5..], ["tasks eval_100 task 1", "checkpoint small ", "run tried episode 1"]);
-        exploration.as_kept().write(&kept_session::before(&wanted.session)).unwrap();
+        json::write(&session_file::before(&wanted.session), &exploration.as_kept()).unwrap();
         let both = list(&wanted);
-        assert_eq!(both[1].start, Start::Session(kept_session::before(&wanted.session)));
+        assert_eq!(both[1].start, Start::Session(session_file::before(&wanted.session)));
         assert!(both[1].note.starts_with("before that, "), "{:?}", both[1]);
-        std::fs::remove_file(kept_session::before(&wanted.session)).unwrap();
+        std::fs::remove_file(session_file::before(&wanted.session)).unwrap();
+        let other = SessionFile::beside(&wanted.session);
+        other.write(&exploration.as_kept()).unwrap();
+        assert_eq!(list(&wanted).len(), found.len(), "one that is under way is not offered");
+        drop(other);
+        let all = list(&wanted);
+        assert_eq!((all.len(), &all[1].start), (found.len() + 1, &Start::Session(wanted.session.clone())));
+        assert!(all[0].note.starts_with("broken off, step 0"), "{:?}", all[0]);
+        std::fs::remove_file(wanted.session.with_file_name("session-1.json")).unwrap();
         std::fs::write(&wanted.session, b"{ broken").unwrap();
         assert_eq!(lines(&list(&wanted))[..4], houses, "a broken session costs no more than itself");
     }
@@ -317,7 +334,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let wanted = folders(folder.path());
         let mut exploration: Exploration = testing::exploration();
-        exploration.as_kept().write(&wanted.session).unwrap();
+        json::write(&wanted.session, &exploration.as_kept()).unwrap();
         let earlier = SystemTime::now() - std::time::Duration::from_secs(60);
         std::fs::File::options().write(true).open(&wanted.session).unwrap().set_modified(earlier).unwrap();
         let run = folder.path().join("runs/explored-20000101-000000");

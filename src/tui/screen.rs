@@ -27,6 +27,7 @@ use super::theme::Ability;
 use super::update::{ExitReason, Msg};
 use crate::agent::registry::PolicyKind;
 use crate::explore::session::{RunMode, SessionCommand};
+use crate::explore::session_file::SessionFile;
 use crate::explore::start_list::Start;
 
 /// What the screen is started with.
@@ -45,7 +46,7 @@ pub(crate) struct ScreenOptions {
     pub(crate) memory: Option<PathBuf>,
     /// Where instructions are kept for later sessions.
     pub(crate) history: Option<PathBuf>,
-    /// Where the session is kept as it goes on.
+    /// Where the last session is kept; this one is kept beside it as it goes on.
     pub(crate) session: Option<PathBuf>,
     /// The most that a step's picture may cost on the wire, in bytes.
     pub(crate) bandwidth: Option<u64>,
@@ -68,11 +69,12 @@ pub(crate) fn run(
     let control = ended_by_signal(&tell);
     let listens = control.listen();
     let at_work = AtWork::default();
-    let exit = loop {
+    let (exit, kept_in) = loop {
         let is_heard = Arc::new(AtomicBool::new(true));
+        let kept_in = screen.session.as_deref().map(SessionFile::beside);
         let work = |open: Open| {
             let told = Told::new(tell.clone(), is_heard.clone(), control.clone(), at_work.clone());
-            start_worker(open, screen.session.clone(), told)
+            start_worker(open, kept_in.clone(), told)
         };
         let style = StartStyle { scheme: screen.config.scheme, ability };
         let Opened { commands, first, goes_on } = match open(opening, style, &mut display, &messages, work)? {
@@ -97,7 +99,10 @@ pub(crate) fn run(
         };
         display = shown.display;
         if !matches!(exit, Ok(ExitReason::ToList)) {
-            break exit;
+            break (exit, kept_in);
+        }
+        if let Some(file) = kept_in {
+            file.end();
         }
         is_heard.store(false, Ordering::Relaxed);
         control.leave();
@@ -109,6 +114,9 @@ pub(crate) fn run(
     control.leave();
     drop(listens);
     let_work_end(&messages, at_work, Instant::now() + PATIENCE / 2);
+    if let (Ok(ExitReason::Asked), Some(file)) = (&exit, kept_in) {
+        file.end();
+    }
     match exit? {
         ExitReason::WorkerGone => anyhow::bail!(terminal::last_words().unwrap_or_else(|| "the worker stopped".into())),
         exit => Ok(exit),

@@ -1,7 +1,6 @@
 //! The worker of a session on the screen: what it tells, and that its end is waited for.
 
 use std::io;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -11,6 +10,7 @@ use super::opening::Open;
 use super::update::Msg;
 use super::{terminal, worker};
 use crate::explore::session::SessionCommand;
+use crate::explore::session_file::SessionFile;
 use crate::explore::steering::ExplorerControl;
 
 /// How often it is looked whether a worker is still there.
@@ -55,7 +55,7 @@ impl Drop for Told {
 }
 
 /// Starts the worker that opens an exploration, which is kept in that file as it goes on.
-pub(super) fn start_worker(open: Open, session: Option<PathBuf>, told: Told) -> io::Result<Sender<SessionCommand>> {
+pub(super) fn start_worker(open: Open, session: Option<SessionFile>, told: Told) -> io::Result<Sender<SessionCommand>> {
     let tell_event = move |event| {
         told.control.hear(&event);
         told.tell(Msg::Session(event));
@@ -63,7 +63,7 @@ pub(super) fn start_worker(open: Open, session: Option<PathBuf>, told: Told) -> 
     let open = move || {
         let exploration = open()?;
         Ok(match session {
-            Some(path) => exploration.kept_in(path),
+            Some(file) => exploration.kept_in(file),
             None => exploration,
         })
     };

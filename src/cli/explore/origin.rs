@@ -23,6 +23,7 @@ use crate::explore::elsewhere::{OpenOwn, OwnExploration};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::explore::kept_session::KeptSession;
+use crate::explore::session_file::SessionFile;
 use crate::explore::start_list::{self, Start, StartFolders};
 use crate::tui::opening::Opening;
 
@@ -76,7 +77,7 @@ const DATA: &str = "data";
 /// Demonstrations of one scene that are kept at hand.
 const DEMONSTRATIONS: usize = 20;
 
-/// Where a session is kept as it goes on.
+/// Where the last session is kept; those under way lie beside it.
 pub(super) fn kept_session() -> PathBuf {
     logging::path().with_file_name("session.json")
 }
@@ -182,10 +183,12 @@ impl Origin {
         let mut from = self.clone();
         match start {
             Start::Session(path) => {
+                // From here on nobody else takes it up.
+                let taken = SessionFile::take(path, &kept_session())?;
                 let kept = KeptSession::read(path)?;
                 let policies = Policies::new(policy_source::agents(None, kept.author.deciding));
-                let taken_up = Exploration::take_up(&kept, policies).context("the last session cannot be taken up")?;
-                return Ok(taken_up.taken_from(path.clone()).reading_as(self.expect()?));
+                let taken_up = Exploration::take_up(&kept, policies).context("the session cannot be taken up")?;
+                return Ok(taken_up.taken_from(taken).reading_as(self.expect()?));
             }
             Start::Run { folder, number } => {
                 let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, &RecordedPolicy::default())?;

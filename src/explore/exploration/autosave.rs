@@ -1,14 +1,13 @@
 //! The session is kept in a file at every step, and taken up again from there.
 
-use std::path::PathBuf;
-
 use super::Exploration;
 use super::state::{Autosave, Progress, Unsaved};
 use crate::agent::registry::Policies;
 use crate::domain::task::SceneRef;
 use crate::episode::record::{Author, Episode};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
-use crate::explore::kept_session::{self, KeptSession};
+use crate::explore::kept_session::KeptSession;
+use crate::explore::session_file::SessionFile;
 
 /// States up to which a run writes the file at every step; it is written less often in larger trees.
 const EVERY_STEP: usize = 2000;
@@ -20,17 +19,17 @@ impl Exploration {
     }
 
     /// The session was taken up from that file.
-    pub(crate) fn taken_from(mut self, path: PathBuf) -> Exploration {
-        self.autosave.taken_from = Some(path);
+    pub(crate) fn taken_from(mut self, file: SessionFile) -> Exploration {
+        self.autosave.file = Some(file);
         self
     }
 
     /// Keeps the session in that file from now on.
-    pub(crate) fn kept_in(mut self, path: PathBuf) -> Exploration {
-        let taken_from = self.autosave.taken_from.take();
-        let is_ours = taken_from.as_deref() == Some(path.as_path());
-        self.autosave = Autosave { path: Some(path), is_ours, ..Autosave::default() };
-        self.autosave.written = Some(self.reached());
+    pub(crate) fn kept_in(mut self, file: SessionFile) -> Exploration {
+        if let Some(taken) = self.autosave.file.take() {
+            file.go_on_with(&taken);
+        }
+        self.autosave = Autosave { file: Some(file), written: Some(self.reached()) };
         self
     }
 
@@ -62,7 +61,7 @@ impl Exploration {
     /// Writes the session to its file where it has changed; nothing while nothing was tried. What cannot be written is told to the
     /// log alone: the session goes on.
     pub(crate) fn autosave(&mut self, is_running: bool) {
-        let Some(path) = self.autosave.path.clone() else { return };
+        let Some(file) = self.autosave.file.clone() else { return };
         let now = self.reached();
         let is_known = self.autosave.written == Some(now);
         let is_untouched = now.states == 1 && self.unsaved().is_empty();
@@ -74,11 +73,7 @@ impl Exploration {
         if soon {
             return;
         }
-        let kept = self.as_kept();
-        if !std::mem::replace(&mut self.autosave.is_ours, true) {
-            kept_session::put_aside(&path);
-        }
-        if let Err(error) = kept.write(&path) {
+        if let Err(error) = file.write(&self.as_kept()) {
             tracing::warn!("{error:#}");
         }
         self.autosave.written = Some(now);
@@ -147,7 +142,7 @@ mod tests {
     use super::*;
     use crate::agent::registry::PolicyKind;
     use crate::domain::{Action, ActionType};
-    use crate::explore::testing;
+    use crate::explore::{session_file, testing};
 
     /// A session with two branches, a wish that was told on the way, and a name.
     fn explored() -> Exploration {
@@ -173,14 +168,15 @@ mod tests {
     #[test]
     fn a_session_is_kept_at_every_step_and_taken_up_where_it_was_left() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("session.json");
-        let mut before = testing::exploration().kept_in(path.clone());
+        let file = SessionFile::beside(&folder.path().join("session.json"));
+        let path = folder.path().join("session-1.json");
+        let mut before = testing::exploration().kept_in(file.clone());
         before.autosave(true);
         assert!(!path.exists(), "nothing was tried yet");
         before.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         before.autosave(true);
         assert_eq!(KeptSession::read(&path).unwrap().step, 1);
-        let mut before = explored().kept_in(path.clone());
+        let mut before = explored().kept_in(file);
         before.seek(4);
         before.autosave(false);
         let kept = KeptSession::read(&path).unwrap();
@@ -203,25 +199,35 @@ mod tests {
     }
 
     #[test]
-    fn a_session_that_nobody_saved_is_put_aside_when_another_one_begins() {
+    fn a_session_that_nobody_saved_is_put_aside_when_another_one_ends() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("session.json");
-        let mut first = explored().kept_in(path.clone());
+        let last = folder.path().join("session.json");
+        let file = SessionFile::beside(&last);
+        let mut first = explored().kept_in(file.clone());
         first.write_again();
         first.autosave(false);
+        file.end();
         // Taken up again it is the same session.
-        let read = KeptSession::read(&path).unwrap();
+        let taken = SessionFile::take(&last, &last).unwrap();
+        let read = KeptSession::read(&last).unwrap();
         let again = Exploration::take_up(&read, Policies::new(Vec::new())).unwrap();
-        let mut again = again.taken_from(path.clone()).kept_in(path.clone());
+        let file = SessionFile::beside(&last);
+        let mut again = again.taken_from(taken).kept_in(file.clone());
         again.seek(1);
         again.autosave(false);
-        let before = kept_session::before(&path);
+        file.end();
+        let before = session_file::before(&last);
         assert!(!before.exists());
-        let mut other = testing::exploration().kept_in(path.clone());
+        assert_eq!(KeptSession::read(&last).unwrap().step, 1);
+        let file = SessionFile::beside(&last);
+        let mut other = testing::exploration().kept_in(file.clone());
+        other.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         other.act(Action::navigate(ActionType::RotateLeft)).unwrap();
         other.autosave(false);
+        assert_eq!(KeptSession::read(&last).unwrap().step, 1, "it is not over yet");
+        file.end();
         assert_eq!(KeptSession::read(&before).unwrap().episodes.len(), 2, "in the same house, too");
-        assert_eq!(KeptSession::read(&path).unwrap().step, 1);
+        assert_eq!(KeptSession::read(&last).unwrap().step, 2);
     }
 
     #[test]

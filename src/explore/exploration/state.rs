@@ -1,6 +1,5 @@
 //! What an exploration consists of, beside the house and the tree of what was tried.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::agent::registry::PolicyKind;
@@ -8,6 +7,7 @@ use crate::agent::{Decision, Policy, Values};
 use crate::domain::Task;
 use crate::domain::task::SceneRef;
 use crate::episode::record::Author;
+use crate::explore::session_file::SessionFile;
 use crate::house::view::Frame;
 
 /// Which episode it is, and what it began with.
@@ -51,12 +51,9 @@ pub(super) struct Frames {
 /// Where the session is kept, and what of it is there.
 #[derive(Default)]
 pub(super) struct Autosave {
-    pub(super) path: Option<PathBuf>,
+    /// Of a session that was taken up, at first the one that it was in.
+    pub(super) file: Option<SessionFile>,
     pub(super) written: Option<Progress>,
-    /// The file holds this session, not the one of before.
-    pub(super) is_ours: bool,
-    /// The file that the session was taken up from.
-    pub(super) taken_from: Option<PathBuf>,
 }
 
 /// What there is to keep: it changes with every step and word.
