@@ -107,7 +107,7 @@ fn no_result_depends_on_the_clock() {
     let known = [
         "src/agent/served/dialogue.rs",
         "src/cli/eval.rs",
-        "src/explore/elsewhere/save.rs",
+        "src/explore/remote/save.rs",
         "src/explore/exploration/save.rs",
         "src/explore/start_list.rs",
         "src/train/tensorboard.rs",

@@ -116,7 +116,7 @@ fn a_run_whose_server_dies_keeps_what_was_played_and_goes_on_to_the_same_bytes()
     assert!(broken.stderr.contains("torn"), "the folder is named: {}", broken.stderr);
     let kept = sprint.read("torn/episodes.jsonl");
     assert!(!kept.is_empty() && kept.lines().count() < 12 && !kept.contains("\"error\":\""), "{kept}");
-    // Elsewhere, too: what it calls itself is what counts.
+    // RemoteSettings, too: what it calls itself is what counts.
     let again = Server::bind(0);
     let port = again.port;
     again.serve(usize::MAX);

@@ -415,8 +415,8 @@ fn the_papers_size_is_trained_evaluated_verified_explored_and_corrected_through_
     std::fs::create_dir_all(sprint.path("home/encoders")).unwrap();
     write_resnet18(&sprint.path("home/encoders/resnet18.safetensors"), 0.01);
     // No encoder that set-up fetches is there: one that lies elsewhere, and one that is found by its name.
-    let elsewhere = format!("pretrain D --preset sprint --size paper.toml --encoder {} --out agent", mpnet.display());
-    let trained = sprint.run(&elsewhere);
+    let remote = format!("pretrain D --preset sprint --size paper.toml --encoder {} --out agent", mpnet.display());
+    let trained = sprint.run(&remote);
     assert_eq!(trained.code, Some(0), "{}", trained.stderr);
     assert!(trained.stderr.contains("an update takes about"), "{}", trained.stderr);
     let config: serde_json::Value = serde_json::from_str(&sprint.read("agent/config.json")).unwrap();

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::decision::{ActionDistribution, Decision};
 use super::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
 use crate::domain::{Action, ActionType, Class};
-use crate::env::own_view::Possible;
+use crate::env::remote_view::Possible;
 use crate::house::view::{self, Candidate};
 
 /// Draws every action by chance.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::domain::EnvironmentName;
-use crate::env::remote::{Elsewhere, Patience};
+use crate::env::remote::{Patience, RemoteSettings};
 
 /// Seconds that an environment in another process may take for each answer, unless told otherwise.
 const PATIENCE: u64 = 60;
@@ -31,13 +31,13 @@ impl Default for EnvironmentChoice {
 
 impl EnvironmentChoice {
     /// The environment that was named, where that is not House.
-    pub(crate) fn elsewhere(&self) -> Option<&EnvironmentName> {
+    pub(crate) fn remote(&self) -> Option<&EnvironmentName> {
         self.env.as_ref().filter(|name| **name != EnvironmentName::House)
     }
 
     /// How environments in other processes are reached.
-    pub(crate) fn reach(&self) -> Elsewhere {
+    pub(crate) fn reach(&self) -> RemoteSettings {
         let answer = Duration::from_secs(self.env_timeout);
-        Elsewhere { patience: Patience { answer, ..Patience::USUAL }, found_at: self.elsewhere().cloned() }
+        RemoteSettings { patience: Patience { answer, ..Patience::USUAL }, found_at: self.remote().cloned() }
     }
 }

@@ -25,7 +25,7 @@ use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
 use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
-use crate::eval::tasks::{elsewhere, sample};
+use crate::eval::tasks::{remote, sample};
 use crate::house::grading::Grading;
 use crate::language::count::counted;
 use crate::report::summary::RunSummary;
@@ -120,12 +120,12 @@ impl Eval {
         if let Some((many, why)) = evaluation.unasked() {
             say(&format!("{} read by the program itself: {why}", counted(many, "instruction")));
         }
-        let is_elsewhere = evaluation.tasks().iter().any(|task| task.env.is_some());
-        if let Some(name) = self.environment.elsewhere().filter(|_| !is_elsewhere) {
+        let is_remote = evaluation.tasks().iter().any(|task| task.env.is_some());
+        if let Some(name) = self.environment.remote().filter(|_| !is_remote) {
             anyhow::bail!("{}: its tasks play in House, not in {name}: leave out --env", file.display());
         }
         // An environment that cannot be reached, or is of no use, is no reason to begin a run. House's own policies fit House.
-        if is_elsewhere || self.policy.is_from_elsewhere() {
+        if is_remote || self.policy.is_external() {
             evaluation.check_policy(&chosen)?;
         }
         let path = self.folder(&set.value.name, &chosen.name);
@@ -149,10 +149,10 @@ impl Eval {
 
     /// The tasks that are played, and the file that they are from.
     fn task_set(&self) -> anyhow::Result<(Document<TaskSet>, PathBuf)> {
-        match (&self.tasks, self.environment.elsewhere()) {
+        match (&self.tasks, self.environment.remote()) {
             (Some(file), _) => Ok((taskset::read_told(file)?, file.clone())),
             (None, Some(name)) => {
-                let set = elsewhere::set(name, 0, self.limit.unwrap_or(100));
+                let set = remote::set(name, 0, self.limit.unwrap_or(100));
                 let digest = json::hex(&Sha256::digest(serde_json::to_vec(&set)?));
                 Ok((Document { value: set, digest }, PathBuf::from(name.to_string())))
             }

@@ -13,7 +13,7 @@ pub(super) use self::display::{GraphicsName, settings};
 pub(crate) use self::origin::Origin;
 use super::checkpoint;
 use super::exit_status::ExitStatus;
-use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
+use super::policy_name::{ExternalPolicyOptions, PolicyName, PolicyNameParser};
 use crate::agent::registry::PolicyKind;
 use crate::tui::config::ExplorerConfig;
 
@@ -28,7 +28,7 @@ pub(crate) struct Explore {
     #[arg(long, value_name = "POLICY", value_parser = PolicyNameParser::EXPLORER)]
     policy: Option<PolicyName>,
     #[command(flatten)]
-    elsewhere: ElsewhereOptions,
+    remote: ExternalPolicyOptions,
     /// Print a file of settings with a comment on each, and end
     #[arg(long)]
     print_config: bool,
@@ -46,27 +46,27 @@ impl Explore {
         }
         let manual = matches!(self.policy, Some(PolicyName::Manual));
         let kind = match self.policy {
-            None | Some(PolicyName::Agent | PolicyName::Manual | PolicyName::Elsewhere(_)) => PolicyKind::Agent,
+            None | Some(PolicyName::Agent | PolicyName::Manual | PolicyName::External(_)) => PolicyKind::Agent,
             Some(PolicyName::Expert) => PolicyKind::Expert,
             Some(PolicyName::Random) => PolicyKind::Random,
         };
         let is_named = self.policy.is_some() || self.from.is_named();
         // What is wrong with it is said before there is a screen.
         self.from.expect()?;
-        let Explore { display, mut from, policy, elsewhere, .. } = self;
+        let Explore { display, mut from, policy, remote, .. } = self;
         from.checkpoint = from.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
-        if let Some(PolicyName::Elsewhere(named)) = &policy {
+        if let Some(PolicyName::External(named)) = &policy {
             if from.checkpoint.is_some() {
                 bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
             }
-            from.other_policy = Some((named.clone(), elsewhere));
+            from.other_policy = Some((named.clone(), remote));
         }
-        if let Some(open) = from.elsewhere(kind)? {
+        if let Some(open) = from.remote(kind)? {
             if matches!(policy, Some(PolicyName::Agent)) {
                 bail!("the trained agents act in House only: name --policy random or manual with --env");
             }
-            let agent = from.policy_elsewhere(kind)?;
-            return display.show_elsewhere(manual || policy.is_none(), open, agent);
+            let agent = from.external_policy(kind)?;
+            return display.show_remote(manual || policy.is_none(), open, agent);
         }
         if !is_named && !display.plain {
             return display.show_screen(kind, manual, || from.list(), || from.list());

@@ -37,7 +37,7 @@ impl Export {
         let episode = &recorded.episodes[reference.episode];
         let task = recorded.task(episode)?;
         let recording = match &task.env {
-            Some(_) => FrameSequence::elsewhere(task, episode, self.environment.reach())?,
+            Some(_) => FrameSequence::remote(task, episode, self.environment.reach())?,
             None => FrameSequence::of(&recorded.setting(episode)?.2, task, episode)?,
         };
         let mut out = streams::out();

@@ -7,7 +7,7 @@ use clap::Args;
 use super::environment::EnvironmentChoice;
 use super::exit_status::ExitStatus;
 use super::explore::{Display, Origin};
-use super::recorded::{recorded, recorded_elsewhere};
+use super::recorded::{recorded, recorded_remotely};
 use super::recorded_policy::RecordedPolicy;
 
 /// Which episode, and how to show it.
@@ -34,9 +34,9 @@ impl Open {
     /// When it cannot be read, its tasks are not at hand, or the simulator does not come to what was recorded.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         let (episode, tasks, policy) = (&self.episode, self.tasks.as_deref(), &self.policy);
-        let elsewhere = recorded_elsewhere(episode, tasks, policy, self.environment.reach())?;
-        if let Some((open, agent)) = elsewhere {
-            return self.display.paused().show_elsewhere(true, open, agent);
+        let remote = recorded_remotely(episode, tasks, policy, self.environment.reach())?;
+        if let Some((open, agent)) = remote {
+            return self.display.paused().show_remote(true, open, agent);
         }
         let (kind, open) = recorded(episode, tasks, policy)?;
         self.display.paused().show(kind, false, &Origin::default(), open)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::checkpoint;
-use super::policy_name::{ElsewhereOptions, PolicyName, PolicyNameParser};
+use super::policy_name::{ExternalPolicyOptions, PolicyName, PolicyNameParser};
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::{DecisionOverride, DecisionRule};
 
@@ -20,7 +20,7 @@ pub(crate) struct PolicyChoice {
     #[arg(long, value_name = "POLICY", value_parser = PolicyNameParser::HEADLESS, default_value = "agent")]
     policy: PolicyName,
     #[command(flatten)]
-    elsewhere: ElsewhereOptions,
+    remote: ExternalPolicyOptions,
 }
 
 /// How a trained agent decides, where not as its checkpoint says.
@@ -62,14 +62,14 @@ impl Deciding {
 
 impl PolicyChoice {
     /// Whether the policy is none of the program's own.
-    pub(crate) fn is_from_elsewhere(&self) -> bool {
-        matches!(self.policy, PolicyName::Elsewhere(_))
+    pub(crate) fn is_external(&self) -> bool {
+        matches!(self.policy, PolicyName::External(_))
     }
 
     /// Opens what was chosen.
     ///
     /// # Errors
-    /// When the checkpoint or its sentence encoder cannot be used, or a policy from elsewhere.
+    /// When the checkpoint or its sentence encoder cannot be used, or an external policy.
     pub(crate) fn open(&self, sampling: bool, asked: DecisionOverride) -> anyhow::Result<PolicySource> {
         if self.policy != PolicyName::Agent && self.checkpoint.is_some() {
             anyhow::bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
@@ -85,7 +85,7 @@ impl PolicyChoice {
         match &self.policy {
             PolicyName::Expert => Ok(PolicySource::expert()),
             PolicyName::Random => Ok(PolicySource::random()),
-            PolicyName::Elsewhere(elsewhere) => elsewhere.open(self.elsewhere, sampling),
+            PolicyName::External(remote) => remote.open(self.remote, sampling),
             PolicyName::Agent | PolicyName::Manual => {
                 let folder = match &self.checkpoint {
                     Some(named) => checkpoint::folder(named)?,

@@ -25,13 +25,13 @@ pub(crate) enum PolicyName {
     Random,
     /// A person, at first.
     Manual,
-    /// A policy from elsewhere.
-    Elsewhere(Elsewhere),
+    /// An external policy.
+    External(ExternalPolicy),
 }
 
 /// A policy that is none of the program's own.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Elsewhere {
+pub(crate) enum ExternalPolicy {
     /// A policy server.
     Server(PolicyAddress),
     /// A policy that was exported to a file.
@@ -41,16 +41,16 @@ pub(crate) enum Elsewhere {
 impl PolicyName {
     /// Whether its actions can be drawn by chance instead of taking the likeliest.
     pub(crate) fn can_sample(&self) -> bool {
-        matches!(self, PolicyName::Agent | PolicyName::Elsewhere(Elsewhere::File(..)))
+        matches!(self, PolicyName::Agent | PolicyName::External(ExternalPolicy::File(..)))
     }
 }
 
 /// Seconds that a policy server may take for an answer, unless told otherwise.
 const PATIENCE: u64 = 60;
 
-/// How a policy from elsewhere is dealt with.
+/// How an external policy is dealt with.
 #[derive(Args, Clone, Copy, Debug)]
-pub(crate) struct ElsewhereOptions {
+pub(crate) struct ExternalPolicyOptions {
     /// How long a policy server may take for an answer
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400), default_value_t = PATIENCE)]
     pub(super) policy_timeout: u64,
@@ -59,29 +59,29 @@ pub(crate) struct ElsewhereOptions {
     pub(super) trust: bool,
 }
 
-impl Default for ElsewhereOptions {
+impl Default for ExternalPolicyOptions {
     /// Nothing is named.
-    fn default() -> ElsewhereOptions {
-        ElsewhereOptions { policy_timeout: PATIENCE, trust: false }
+    fn default() -> ExternalPolicyOptions {
+        ExternalPolicyOptions { policy_timeout: PATIENCE, trust: false }
     }
 }
 
-impl Elsewhere {
+impl ExternalPolicy {
     /// The kinds, as names of policies and of places begin.
     const KINDS: [&str; 3] = ["ws", Format::Onnx.name(), Format::TorchScript.name()];
 
     /// The kind of a policy that a run names so; `None` for the program's own.
     pub(crate) fn kind_of(policy: &str) -> Option<&'static str> {
         let (kind, _) = policy.split_once(':')?;
-        Elsewhere::KINDS.into_iter().find(|known| *known == kind)
+        ExternalPolicy::KINDS.into_iter().find(|known| *known == kind)
     }
 
     /// The same, found from any folder.
-    fn from_anywhere(&self) -> Elsewhere {
+    fn from_anywhere(&self) -> ExternalPolicy {
         match self {
-            Elsewhere::Server(address) => Elsewhere::Server(address.clone()),
-            Elsewhere::File(format, path) => {
-                Elsewhere::File(*format, std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+            ExternalPolicy::Server(address) => ExternalPolicy::Server(address.clone()),
+            ExternalPolicy::File(format, path) => {
+                ExternalPolicy::File(*format, std::path::absolute(path).unwrap_or_else(|_| path.clone()))
             }
         }
     }
@@ -90,53 +90,55 @@ impl Elsewhere {
     ///
     /// # Errors
     /// When it cannot be used; says what to do.
-    pub(crate) fn open(&self, options: ElsewhereOptions, sampling: bool) -> anyhow::Result<PolicySource> {
+    pub(crate) fn open(&self, options: ExternalPolicyOptions, sampling: bool) -> anyhow::Result<PolicySource> {
         let source = match self {
-            Elsewhere::File(Format::TorchScript, path) if !options.trust => anyhow::bail!(
+            ExternalPolicy::File(Format::TorchScript, path) if !options.trust => anyhow::bail!(
                 "{}: a TorchScript file is a program that runs with your rights: add --trust where you trust its maker, or \
                  export the policy as ONNX",
                 path.display()
             ),
-            Elsewhere::File(format, path) => ExportedPolicy::source(path, *format, sampling),
-            Elsewhere::Server(address) => ServedPolicy::source(address, Duration::from_secs(options.policy_timeout)),
+            ExternalPolicy::File(format, path) => ExportedPolicy::source(path, *format, sampling),
+            ExternalPolicy::Server(address) => {
+                ServedPolicy::source(address, Duration::from_secs(options.policy_timeout))
+            }
         };
         Ok(source?.at(self.from_anywhere().to_string()))
     }
 
     /// The same for an explorer, which opens it when it is to act.
-    pub(crate) fn agent(&self, options: ElsewhereOptions) -> NamedAgent {
+    pub(crate) fn agent(&self, options: ExternalPolicyOptions) -> NamedAgent {
         let (name, own) = (self.to_string(), self.clone());
         policy_source::agent_of(name, move || own.open(options, false))
     }
 }
 
-impl std::fmt::Display for Elsewhere {
+impl std::fmt::Display for ExternalPolicy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Elsewhere::Server(address) => address.fmt(f),
-            Elsewhere::File(format, path) => write!(f, "{}:{}", format.name(), path.display()),
+            ExternalPolicy::Server(address) => address.fmt(f),
+            ExternalPolicy::File(format, path) => write!(f, "{}:{}", format.name(), path.display()),
         }
     }
 }
 
-impl FromStr for Elsewhere {
+impl FromStr for ExternalPolicy {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Elsewhere, String> {
+    fn from_str(text: &str) -> Result<ExternalPolicy, String> {
         if text.starts_with("ws:") || text.starts_with("wss:") {
-            return text.parse().map(Elsewhere::Server);
+            return text.parse().map(ExternalPolicy::Server);
         }
         for format in [Format::Onnx, Format::TorchScript] {
             let file = text.strip_prefix(format.name()).and_then(|rest| rest.strip_prefix(':'));
             if let Some(file) = file {
                 return match file {
                     "" => Err(format!("{text}FILE: the file is missing")),
-                    file => Ok(Elsewhere::File(format, file.into())),
+                    file => Ok(ExternalPolicy::File(format, file.into())),
                 };
             }
         }
         Err(format!(
-            "{text:?} is no policy from elsewhere: it is ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy"
+            "{text:?} is no policy from external: it is ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy"
         ))
     }
 }
@@ -170,8 +172,8 @@ impl PolicyNameParser {
         if let Some((_, _, name)) = self.names().find(|(known, _, _)| *known == text) {
             return Ok(name.clone());
         }
-        if text.starts_with("wss:") || Elsewhere::kind_of(text).is_some() {
-            return text.parse().map(PolicyName::Elsewhere);
+        if text.starts_with("wss:") || ExternalPolicy::kind_of(text).is_some() {
+            return text.parse().map(PolicyName::External);
         }
         let known: Vec<&str> = self.names().map(|(name, _, _)| *name).collect();
         Err(format!(
@@ -193,12 +195,12 @@ impl TypedValueParser for PolicyNameParser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let own = self.names().map(|(name, help, _)| PossibleValue::new(*name).help(*help));
-        let elsewhere = [
+        let external = [
             ("ws:HOST:PORT", "A policy server that speaks vla-eval's or openpi's protocol"),
             ("onnx:FILE", "A policy exported to ONNX, with FILE.json beside it (sprint schema policy)"),
             ("torchscript:FILE", "The same as TorchScript, which runs code: only with --trust"),
         ];
-        Some(Box::new(own.chain(elsewhere.map(|(name, help)| PossibleValue::new(name).help(help)))))
+        Some(Box::new(own.chain(external.map(|(name, help)| PossibleValue::new(name).help(help)))))
     }
 }
 
@@ -210,8 +212,8 @@ mod tests {
     fn own_policies_are_named_and_others_by_where_they_are() {
         let read = |text: &str| PolicyNameParser::HEADLESS.read(text);
         assert_eq!(read("expert"), Ok(PolicyName::Expert));
-        assert!(matches!(read("ws:127.0.0.1:8000"), Ok(PolicyName::Elsewhere(Elsewhere::Server(_)))));
-        let file = |format| Ok(PolicyName::Elsewhere(Elsewhere::File(format, "a/b.onnx".into())));
+        assert!(matches!(read("ws:127.0.0.1:8000"), Ok(PolicyName::External(ExternalPolicy::Server(_)))));
+        let file = |format| Ok(PolicyName::External(ExternalPolicy::File(format, "a/b.onnx".into())));
         assert_eq!(read("onnx:a/b.onnx"), file(Format::Onnx));
         assert_eq!(read("torchscript:a/b.onnx"), file(Format::TorchScript));
         assert!(read("onnx:").unwrap_err().contains("the file is missing"));

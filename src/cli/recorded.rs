@@ -9,11 +9,11 @@ use super::recorded_policy::{RecordedPolicy, SoughtPolicy};
 use super::streams::say;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
-use crate::env::remote::Elsewhere;
+use crate::env::remote::RemoteSettings;
 use crate::episode::record::Author;
-use crate::explore::elsewhere::{OpenOwn, OwnExploration};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
+use crate::explore::remote::{OpenRemote, RemoteExploration};
 use crate::run_dir::manifest::RunManifest;
 use crate::run_dir::reader::RecordedRun;
 
@@ -75,12 +75,12 @@ pub(super) fn recorded(
     let acts = first.cloned().unwrap_or_else(|| author.clone());
     let kind = kind_of(&acts);
     policy.check(&recorded.manifest)?;
-    let (checkpoint, sought) = (policy.checkpoint()?, policy.elsewhere(&recorded, &acts)?);
+    let (checkpoint, sought) = (policy.checkpoint()?, policy.remote(&recorded, &acts)?);
     let explored = recorded.manifest.policy == RunManifest::EXPLORED;
     let open = move || -> anyhow::Result<Exploration> {
         let scenes = recorded.scenes;
         let start = EpisodeOrigin::Tasks { tasks: vec![task], index: 0 };
-        let is_elsewhere = sought.is_some();
+        let is_remote = sought.is_some();
         let agents = policy_source::agents(checkpoint.as_deref(), acts.deciding);
         let policies = Policies::new(sought.map(SoughtPolicy::agent).into_iter().chain(agents).collect());
         let source = EpisodeSource::new(start, 0, scenes);
@@ -90,7 +90,7 @@ pub(super) fn recorded(
         }
         // Without its policy an episode can still be seen, step by step.
         exploration.know_places(recorded.places);
-        let found = match is_elsewhere {
+        let found = match is_remote {
             true => exploration.choose(kind),
             false => summon(&mut exploration, kind, &acts),
         };
@@ -109,12 +109,12 @@ pub(super) fn recorded(
 ///
 /// # Errors
 /// When it cannot be read, or its tasks are not at hand. Opening fails where the environment cannot be reached.
-pub(super) fn recorded_elsewhere(
+pub(super) fn recorded_remotely(
     episode: &str,
     tasks: Option<&Path>,
     policy: &RecordedPolicy,
-    elsewhere: Elsewhere,
-) -> anyhow::Result<Option<(OpenOwn, PolicySource)>> {
+    remote: RemoteSettings,
+) -> anyhow::Result<Option<(OpenRemote, PolicySource)>> {
     let (reference, recorded) = Reference::find(episode, tasks)?;
     let episode = recorded.episodes[reference.episode].clone();
     let task = recorded.task(&episode)?.clone();
@@ -127,7 +127,7 @@ pub(super) fn recorded_elsewhere(
     let acts = named.unwrap_or(&author);
     policy.check(&recorded.manifest)?;
     // Without its policy an episode can still be seen, step by step, and chance acts on.
-    let (source, agent) = match policy.elsewhere(&recorded, acts)? {
+    let (source, agent) = match policy.remote(&recorded, acts)? {
         None => {
             let decides = (acts.sampling, acts.deciding);
             let found = policy_source::find(&acts.policy, acts.checkpoint.as_deref(), decides, None).ok().flatten();
@@ -146,7 +146,7 @@ pub(super) fn recorded_elsewhere(
     let (places, now) = (recorded.places, source.place());
     let step = reference.step.unwrap_or(0);
     let open = move || {
-        let mut exploration = OwnExploration::open(&task, &episode, &author, elsewhere, source, step)?;
+        let mut exploration = RemoteExploration::open(&task, &episode, &author, remote, source, step)?;
         exploration.know_places(places.into_iter().chain(now));
         Ok(exploration)
     };

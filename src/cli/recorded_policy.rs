@@ -6,7 +6,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 
 use super::checkpoint;
-use super::policy_name::{Elsewhere, ElsewhereOptions};
+use super::policy_name::{ExternalPolicy, ExternalPolicyOptions};
 use crate::agent::exported;
 use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::NamedAgent;
@@ -24,9 +24,9 @@ pub(crate) struct RecordedPolicy {
     checkpoint: Option<PathBuf>,
     /// The run's policy server or exported policy: ws:HOST:PORT, onnx:FILE or torchscript:FILE [default: where it was]
     #[arg(long, value_name = "POLICY")]
-    policy: Option<Elsewhere>,
+    policy: Option<ExternalPolicy>,
     #[command(flatten)]
-    options: ElsewhereOptions,
+    options: ExternalPolicyOptions,
 }
 
 /// A policy that is none of the program's own, and where it is looked for.
@@ -34,8 +34,8 @@ pub(crate) struct RecordedPolicy {
 pub(super) struct SoughtPolicy {
     author: Author,
     /// Nothing where neither the run nor the person says.
-    at: Option<Elsewhere>,
-    options: ElsewhereOptions,
+    at: Option<ExternalPolicy>,
+    options: ExternalPolicyOptions,
 }
 
 impl RecordedPolicy {
@@ -50,12 +50,12 @@ impl RecordedPolicy {
     /// Checks that what was named can be the run's policy.
     ///
     /// # Errors
-    /// When a policy from elsewhere was named for a run of the program's own.
+    /// When an external policy was named for a run of the program's own.
     pub(super) fn check(&self, manifest: &RunManifest) -> anyhow::Result<()> {
         let acted = manifest.policy.as_str();
-        let is_elsewhere = acted == RunManifest::EXPLORED || Elsewhere::kind_of(acted).is_some();
+        let is_remote = acted == RunManifest::EXPLORED || ExternalPolicy::kind_of(acted).is_some();
         ensure!(
-            self.policy.is_none() || is_elsewhere,
+            self.policy.is_none() || is_remote,
             "--policy says where a run's policy server or exported policy is, but this run's policy was {acted}: leave it out"
         );
         Ok(())
@@ -65,8 +65,8 @@ impl RecordedPolicy {
     ///
     /// # Errors
     /// When the run's file of places is malformed.
-    pub(super) fn elsewhere(&self, run: &RecordedRun, author: &Author) -> anyhow::Result<Option<SoughtPolicy>> {
-        if Elsewhere::kind_of(&author.policy).is_none() {
+    pub(super) fn remote(&self, run: &RecordedRun, author: &Author) -> anyhow::Result<Option<SoughtPolicy>> {
+        if ExternalPolicy::kind_of(&author.policy).is_none() {
             return Ok(None);
         }
         let recorded = place_of(&run.places, author).map(|place| place.parse().map_err(anyhow::Error::msg));
@@ -85,7 +85,7 @@ impl RecordedPolicy {
         checkpoint: Option<&Path>,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Option<PolicySource>> {
-        let Some(sought) = self.elsewhere(run, author)? else {
+        let Some(sought) = self.remote(run, author)? else {
             let decides = (author.sampling, author.deciding);
             return policy_source::find(&author.policy, author.checkpoint.as_deref(), decides, checkpoint);
         };
@@ -107,14 +107,14 @@ impl SoughtPolicy {
     /// When it is gone, another one, or cannot be used; says what to type instead.
     pub(super) fn open(&self) -> anyhow::Result<PolicySource> {
         let Author { policy, checkpoint, sampling, .. } = &self.author;
-        let name_it = match Elsewhere::kind_of(policy) {
+        let name_it = match ExternalPolicy::kind_of(policy) {
             Some("ws") | None => "--policy ws:HOST:PORT".to_owned(),
             Some(format) => format!("--policy {format}:FILE"),
         };
         let Some(at) = &self.at else {
             bail!("the run does not say where its policy {policy} was: name it with {name_it}");
         };
-        if let (Elsewhere::File(_, path), Some(wanted)) = (at, checkpoint) {
+        if let (ExternalPolicy::File(_, path), Some(wanted)) = (at, checkpoint) {
             let file = path.display();
             ensure!(path.exists(), "{file}: the run's policy {policy} is gone: name its file with {name_it}");
             // Before anything of it runs.
@@ -140,7 +140,7 @@ impl SoughtPolicy {
 
     /// The same for an explorer, which opens it when it is to act.
     pub(super) fn agent(self) -> NamedAgent {
-        let name = self.at.as_ref().map_or_else(|| self.author.policy.clone(), Elsewhere::to_string);
+        let name = self.at.as_ref().map_or_else(|| self.author.policy.clone(), ExternalPolicy::to_string);
         policy_source::agent_of(name, move || self.open())
     }
 }
@@ -159,7 +159,7 @@ fn told(name: &str, hash: Option<&str>) -> String {
 mod tests {
     use super::*;
 
-    fn sought(at: &str, author: Author, options: ElsewhereOptions) -> SoughtPolicy {
+    fn sought(at: &str, author: Author, options: ExternalPolicyOptions) -> SoughtPolicy {
         SoughtPolicy { author, at: Some(at.parse().unwrap()), options }
     }
 
@@ -173,7 +173,7 @@ mod tests {
         let author = Author { checkpoint: Some(exported::hash(&path).unwrap()), ..Author::of("torchscript:policy", 0) };
         let at = format!("torchscript:{}", path.display());
         let refusal = |trust: bool| {
-            let options = ElsewhereOptions { trust, ..ElsewhereOptions::default() };
+            let options = ExternalPolicyOptions { trust, ..ExternalPolicyOptions::default() };
             let error = sought(&at, author.clone(), options).open().err().unwrap();
             format!("{error:#}")
         };

@@ -21,11 +21,11 @@ use crate::episode::instruction_variant::task_instruction;
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
 use crate::eval::options::Options;
+use crate::eval::read_tasks::read_instruction;
 use crate::eval::tasks::check;
-use crate::eval::tasks::elsewhere;
+use crate::eval::tasks::remote;
 use crate::eval::tasks::sample;
 use crate::eval::tasks::sample::{Phrasing, SampleSpec};
-use crate::eval::untold::read_instruction;
 use crate::house::grading::{Grading, describe};
 use crate::language::count::counted;
 
@@ -145,7 +145,7 @@ impl Tasks {
 impl SampleArgs {
     fn run(self) -> anyhow::Result<ExitStatus> {
         ensure!(self.force || !self.out.exists(), "{} exists; --force replaces it", self.out.display());
-        let Some(scenes) = &self.scenes else { return self.elsewhere() };
+        let Some(scenes) = &self.scenes else { return self.remote() };
         let rooms = match self.rooms.is_empty() {
             true => Room::ALL.to_vec(),
             false => self.rooms.clone(),
@@ -196,15 +196,15 @@ impl SampleArgs {
 
 impl SampleArgs {
     /// Writes the episodes of seeds of an environment in another process, which must be there.
-    fn elsewhere(&self) -> anyhow::Result<ExitStatus> {
-        let name = self.environment.elsewhere().context("House's tasks need --scenes: generated, or a dataset")?;
+    fn remote(&self) -> anyhow::Result<ExitStatus> {
+        let name = self.environment.remote().context("House's tasks need --scenes: generated, or a dataset")?;
         let session = Sessions::new(self.environment.reach()).get(0, name)?;
         let start = |seed| anyhow::Ok(RemoteEnvironment::begin(session.clone(), seed)?.fingerprint());
         let (first, again) = (start(self.seed)?, start(self.seed)?);
         if session.capabilities.seeds == Some(false) || first != again {
             streams::say(&format!("{name} begins otherwise each time: its seeds name no episodes"));
         }
-        let mut set = elsewhere::set(name, self.seed, self.count);
+        let mut set = remote::set(name, self.seed, self.count);
         if let Some(stem) = self.out.file_stem() {
             set.name = stem.to_string_lossy().into_owned();
         }
@@ -276,7 +276,7 @@ impl ShowArgs {
         match wanted {
             None => {
                 for (number, task) in (1..).zip(&set.tasks) {
-                    let asked = match task.played_elsewhere() {
+                    let asked = match task.remote_episode() {
                         Some((env, seed)) if task.instruction.is_empty() => format!("what {env} asks with seed {seed}"),
                         _ => task_instruction(task, false),
                     };
@@ -303,7 +303,7 @@ fn say_how_told(tasks: &[Task]) {
 
 /// Prints a task in words.
 fn show(out: &mut impl Write, task: &Task, scenes: &Scenes) -> anyhow::Result<()> {
-    if let Some((env, seed)) = task.played_elsewhere() {
+    if let Some((env, seed)) = task.remote_episode() {
         writeln!(out, "task         {}", task.id)?;
         writeln!(out, "environment  {env}, seed {seed}")?;
         let asked = if task.instruction.is_empty() {

@@ -115,10 +115,10 @@ pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
         found.push(Misfit::new("id", "empty, too long, or with control characters"));
     }
     if let Some(env) = &task.env {
-        found.extend(misfits_elsewhere(task, env));
+        found.extend(remote_misfits(task, env));
         return found;
     }
-    if task.scene == SceneRef::Elsewhere {
+    if task.scene == SceneRef::Remote {
         found.push(Misfit::new("scene", "missing; a task names a scene of House, or env and seed"));
     }
     if let SceneRef::Named(name) = &task.scene
@@ -154,7 +154,7 @@ pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
 }
 
 /// What is wrong with a task in another environment than House.
-fn misfits_elsewhere(task: &Task, env: &EnvironmentName) -> Vec<Misfit> {
+fn remote_misfits(task: &Task, env: &EnvironmentName) -> Vec<Misfit> {
     let mut found = Vec::new();
     if *env == EnvironmentName::House {
         found.push(Misfit::new("env", "House is meant where a task names a scene; leave it out"));
@@ -166,7 +166,7 @@ fn misfits_elsewhere(task: &Task, env: &EnvironmentName) -> Vec<Misfit> {
         found.extend(text("instruction", &task.instruction).err());
     }
     let of_house = [
-        ("scene", task.scene != SceneRef::Elsewhere),
+        ("scene", task.scene != SceneRef::Remote),
         ("start", task.start.is_some()),
         ("sentences", !task.sentences.is_empty()),
         ("roles", !task.roles.is_empty()),

@@ -22,16 +22,16 @@ pub enum SceneRef {
     Named(String),
     /// None: the task plays in the environment that it names.
     #[serde(skip)]
-    Elsewhere,
+    Remote,
 }
 
 impl SceneRef {
-    fn elsewhere() -> SceneRef {
-        SceneRef::Elsewhere
+    fn remote() -> SceneRef {
+        SceneRef::Remote
     }
 
-    fn is_elsewhere(&self) -> bool {
-        *self == SceneRef::Elsewhere
+    fn is_remote(&self) -> bool {
+        *self == SceneRef::Remote
     }
 }
 
@@ -46,7 +46,7 @@ pub struct Task {
     #[schemars(length(min = 1, max = 200))]
     pub id: String,
     /// Where it plays, in House.
-    #[serde(default = "SceneRef::elsewhere", skip_serializing_if = "SceneRef::is_elsewhere")]
+    #[serde(default = "SceneRef::remote", skip_serializing_if = "SceneRef::is_remote")]
     pub scene: SceneRef,
     /// The environment that it plays in, where that is not House: `gym:ID` or `openenv:URL`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -97,10 +97,10 @@ impl Task {
     pub(crate) const OWN_HORIZON: u32 = 1000;
 
     /// An episode of an environment with actions of its own, which says itself what is asked.
-    pub(crate) fn elsewhere(id: String, env: EnvironmentName, seed: u64) -> Task {
+    pub(crate) fn remote(id: String, env: EnvironmentName, seed: u64) -> Task {
         Task {
             id,
-            scene: SceneRef::Elsewhere,
+            scene: SceneRef::Remote,
             env: Some(env),
             seed: Some(seed),
             start: None,
@@ -117,7 +117,7 @@ impl Task {
     }
 
     /// The environment that it plays in and its episode's seed, where that is not House.
-    pub(crate) fn played_elsewhere(&self) -> Option<(&EnvironmentName, u64)> {
+    pub(crate) fn remote_episode(&self) -> Option<(&EnvironmentName, u64)> {
         Some((self.env.as_ref()?, self.seed?))
     }
 

@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use super::own_view::OwnView;
+use super::remote_view::RemoteView;
 use crate::domain::{Action, Class, Instance, Pose};
 use crate::house::grading::Grader;
 use crate::house::view::{Candidate, Frame};
@@ -120,7 +120,7 @@ pub(crate) trait Environment: Send {
     }
 
     /// What it shows and lets an agent do, where its actions are its own in place of ALFRED's 12.
-    fn own(&self) -> Option<OwnView<'_>> {
+    fn own(&self) -> Option<RemoteView<'_>> {
         None
     }
 }
@@ -178,7 +178,7 @@ impl<E: Environment + ?Sized> Environment for Box<E> {
         (**self).house()
     }
 
-    fn own(&self) -> Option<OwnView<'_>> {
+    fn own(&self) -> Option<RemoteView<'_>> {
         (**self).own()
     }
 }

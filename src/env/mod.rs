@@ -6,7 +6,7 @@ pub(crate) mod environment;
 pub(crate) mod goal_frames;
 pub(crate) mod house;
 pub(crate) mod observation;
-pub(crate) mod own_view;
+pub(crate) mod remote_view;
 pub(crate) mod remote;
 
 pub(crate) use environment::{Environment, HouseAccess};

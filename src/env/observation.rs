@@ -16,7 +16,7 @@ const LONGEST_TEXT: usize = 1 << 20;
 
 /// What can be told of one state.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct OwnObservation {
+pub(crate) struct RemoteObservation {
     /// The picture, where there is one.
     pub(crate) picture: Option<Picture>,
     /// What the agent reads, where there is something.
@@ -32,7 +32,7 @@ pub(crate) struct OwnObservation {
     /// It is over because a time limit of the environment's own is reached.
     pub(crate) truncated: bool,
     /// The parts of what is asked.
-    pub(crate) subtasks: Vec<OwnSubtask>,
+    pub(crate) subtasks: Vec<RemoteSubtask>,
     /// What is in view.
     pub(crate) things: Vec<Thing>,
     /// What the last step earned, where that is told.
@@ -60,7 +60,7 @@ pub(crate) enum Legal {
 
 /// A part of what is asked.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct OwnSubtask {
+pub(crate) struct RemoteSubtask {
     pub(crate) text: String,
     pub(crate) is_done: bool,
 }
@@ -88,12 +88,12 @@ const KNOWN: [&str; 12] = [
     "reward",
 ];
 
-impl OwnObservation {
+impl RemoteObservation {
     /// Reads the data of an answer.
     ///
     /// # Errors
     /// Names the field that is wrong.
-    pub(crate) fn read(data: Value, space: &ActionSpace) -> anyhow::Result<OwnObservation> {
+    pub(crate) fn read(data: Value, space: &ActionSpace) -> anyhow::Result<RemoteObservation> {
         let Value::Object(mut data) = data else { anyhow::bail!("data: not an object") };
         let fields = match data.remove("observation") {
             Some(Value::Object(fields)) => fields,
@@ -128,7 +128,7 @@ impl OwnObservation {
         let truncated = truth("truncated")?.unwrap_or(false) && !truth("terminated")?.unwrap_or(false);
         let (text, mission, success) = (words("text")?, words("mission")?, truth("success")?);
         let text = text.or_else(|| if picture.is_none() { others_in_words(&fields) } else { None });
-        let mut observation = OwnObservation {
+        let mut observation = RemoteObservation {
             text,
             mission,
             legal: legal(fields.get("legal"), space)?,
@@ -236,7 +236,7 @@ fn legal(value: Option<&Value>, space: &ActionSpace) -> anyhow::Result<Option<Ve
     entries.iter().enumerate().map(read).collect::<anyhow::Result<_>>().map(Some)
 }
 
-fn subtasks(value: Option<&Value>) -> anyhow::Result<Vec<OwnSubtask>> {
+fn subtasks(value: Option<&Value>) -> anyhow::Result<Vec<RemoteSubtask>> {
     let Some(value) = value.filter(|value| !value.is_null()) else { return Ok(Vec::new()) };
     let entries =
         value.as_array().filter(|entries| entries.len() <= 1000).context("observation.subtasks: not a list")?;
@@ -246,7 +246,7 @@ fn subtasks(value: Option<&Value>) -> anyhow::Result<Vec<OwnSubtask>> {
         let (Some(text), Some(is_done)) = (text, done) else {
             anyhow::bail!("observation.subtasks[{i}]: not a text and whether it is done");
         };
-        Ok(OwnSubtask { text, is_done })
+        Ok(RemoteSubtask { text, is_done })
     };
     entries.iter().enumerate().map(read).collect()
 }
@@ -275,8 +275,8 @@ mod tests {
     use super::*;
     use crate::env::action_space::tests::space;
 
-    fn read(observation: Value) -> anyhow::Result<OwnObservation> {
-        OwnObservation::read(json!({"observation": observation, "reward": 0.5, "done": false}), &space())
+    fn read(observation: Value) -> anyhow::Result<RemoteObservation> {
+        RemoteObservation::read(json!({"observation": observation, "reward": 0.5, "done": false}), &space())
     }
 
     fn encoded(bytes: &[u8]) -> String {
@@ -316,7 +316,7 @@ mod tests {
             let error = format!("{:#}", read(observation).unwrap_err());
             assert!(error.contains(told), "{told}: {error}");
         }
-        let unanswered = OwnObservation::read(json!({"reward": 1}), &space()).unwrap_err().to_string();
+        let unanswered = RemoteObservation::read(json!({"reward": 1}), &space()).unwrap_err().to_string();
         assert!(unanswered.contains("data.observation"), "{unanswered}");
     }
 

@@ -3,7 +3,7 @@
 pub(crate) mod branches;
 pub(crate) mod diagnosis;
 pub(crate) mod failure;
-pub(crate) mod foreign_frames;
+pub(crate) mod remote_frames;
 pub(crate) mod frames;
 pub(crate) mod instruction_variant;
 pub(crate) mod record;

@@ -160,7 +160,7 @@ pub(crate) struct TraceStep {
     pub(crate) kind: ActionType,
     /// The action that was taken, where the environment's actions are its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) own: Option<OwnStep>,
+    pub(crate) own: Option<RemoteStep>,
     /// The thing that it was done to, by its position in the scene or world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) target: Option<Instance>,
@@ -183,7 +183,7 @@ pub(crate) struct TraceStep {
 /// A step in an environment whose actions are its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct OwnStep {
+pub(crate) struct RemoteStep {
     /// The action's name.
     pub(crate) action: String,
     /// Its argument, where it takes one.
@@ -196,7 +196,7 @@ pub(crate) struct OwnStep {
     pub(crate) seen: String,
 }
 
-/// The kind of an action that stands in [`OwnStep`].
+/// The kind of an action that stands in [`RemoteStep`].
 fn own() -> ActionType {
     ActionType::Own(0)
 }
@@ -266,9 +266,9 @@ impl TraceStep {
 
     /// How many subtasks these steps completed. Where an environment's actions are its own, one step may complete several.
     pub(crate) fn completed(steps: &[TraceStep]) -> u32 {
-        let is_elsewhere = steps.iter().any(|step| step.own.is_some());
+        let is_remote = steps.iter().any(|step| step.own.is_some());
         let mut completing = steps.iter().filter_map(|step| step.subtask);
-        if is_elsewhere { completing.max().map_or(0, |last| last + 1) } else { completing.by_ref().count() as u32 }
+        if is_remote { completing.max().map_or(0, |last| last + 1) } else { completing.by_ref().count() as u32 }
     }
 
     /// Whether the same was done, whatever came of it.
@@ -281,8 +281,8 @@ impl TraceStep {
     pub(crate) fn action_in_words(&self) -> String {
         match &self.own {
             None => format!("{:?}", self.action()),
-            Some(OwnStep { action, argument: None, .. }) => action.clone(),
-            Some(OwnStep { action, argument: Some(argument), .. }) => format!("{action} {argument}"),
+            Some(RemoteStep { action, argument: None, .. }) => action.clone(),
+            Some(RemoteStep { action, argument: Some(argument), .. }) => format!("{action} {argument}"),
         }
     }
 
@@ -296,7 +296,7 @@ impl TraceStep {
             own: rollout.env.own().and_then(|view| {
                 let (name, argument) = view.space.parts(action)?;
                 let seen = view.observation.digest.clone();
-                Some(OwnStep { action: name.to_owned(), argument, reward: tick.reward, seen })
+                Some(RemoteStep { action: name.to_owned(), argument, reward: tick.reward, seen })
             }),
             target: action.target.filter(|_| !is_own(&action.kind)),
             class: action.target.and_then(|target| rollout.env.class_of(target)),

@@ -52,7 +52,7 @@ impl Scenes {
                 Ok((Arc::new(scene), Some(world)))
             }
             SceneRef::Named(name) => Ok((self.named(name)?, None)),
-            SceneRef::Elsewhere => bail!("the task plays in another environment than House"),
+            SceneRef::Remote => bail!("the task plays in another environment than House"),
         }
     }
 
@@ -94,7 +94,7 @@ impl Scenes {
         let mut digest = Sha256::new();
         let mut seen = BTreeSet::new();
         for (i, task) in tasks.iter().enumerate() {
-            if let Some((env, _)) = task.played_elsewhere() {
+            if let Some((env, _)) = task.remote_episode() {
                 if seen.insert(env.to_string()) {
                     digest.update(env.to_string());
                 }

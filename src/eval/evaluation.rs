@@ -6,17 +6,17 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
 
-use super::earlier::check_earlier;
+use super::earlier_episodes::check_earlier;
 use super::options::Options;
 use super::plan::EvaluationPlan;
-use super::untold::read_untold;
+use super::read_tasks::read_all;
 use super::{worker, worker_pool};
 use crate::agent::Observation;
 use crate::agent::policy_source::{MakePolicy, PolicySource};
 use crate::control::RunningClock;
 use crate::data::json::Document;
 use crate::domain::{Task, TaskSet};
-use crate::env::remote::{Elsewhere, Sessions};
+use crate::env::remote::{RemoteSettings, Sessions};
 use crate::episode::instruction_variant;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::scenes::Scenes;
@@ -85,7 +85,7 @@ impl Evaluation {
         let mut tasks = set.value.tasks.clone();
         tasks.truncate(options.limit.unwrap_or(usize::MAX));
         let scenes_hash = scenes.check(&tasks)?;
-        let read = read_untold(&mut tasks, &scenes, reader)?;
+        let read = read_all(&mut tasks, &scenes, reader)?;
         check(&tasks, options)?;
         let manifest = RunManifest {
             format_version: RunManifest::FORMAT,
@@ -112,7 +112,7 @@ impl Evaluation {
             tasks: tasks.into(),
             scenes: Arc::new(scenes),
             options,
-            elsewhere: Elsewhere::default(),
+            remote: RemoteSettings::default(),
             read: Arc::new(read),
             clock: Arc::default(),
         };
@@ -120,8 +120,8 @@ impl Evaluation {
     }
 
     /// The same, with environments in other processes reached like this.
-    pub(crate) fn reaching(mut self, elsewhere: Elsewhere) -> Evaluation {
-        self.plan.elsewhere = elsewhere;
+    pub(crate) fn reaching(mut self, remote: RemoteSettings) -> Evaluation {
+        self.plan.remote = remote;
         self
     }
 
@@ -131,7 +131,7 @@ impl Evaluation {
     /// When an environment cannot be reached, or the policy has no use for it.
     pub(crate) fn check_policy(&self, policy: &PolicySource) -> anyhow::Result<()> {
         let made = (policy.make)()?;
-        let mut sessions = Sessions::new(self.plan.elsewhere.clone());
+        let mut sessions = Sessions::new(self.plan.remote.clone());
         let mut seen = Vec::new();
         for task in self.plan.tasks.iter() {
             if seen.contains(&task.env.as_ref()) {

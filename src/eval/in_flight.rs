@@ -68,14 +68,14 @@ impl InFlight {
         episode.steps = own.len() as u32;
         episode.completed = TraceStep::completed(own);
         let end = evaluation.options.end;
-        let is_elsewhere = evaluation.tasks[self.spec.task].env.is_some();
-        if is_elsewhere {
+        let is_remote = evaluation.tasks[self.spec.task].env.is_some();
+        if is_remote {
             episode.of = episode.of.max(episode.completed);
             let mut rewards = own.iter().filter_map(|step| step.own.as_ref()?.reward).peekable();
             episode.earned = rewards.peek().is_some().then(|| rewards.sum());
         }
         episode.success = episode.is_success(end);
-        if !episode.success && episode.error.is_none() && !is_elsewhere {
+        if !episode.success && episode.error.is_none() && !is_remote {
             let task = &evaluation.tasks[self.spec.task];
             // An episode whose failure cannot be told apart, be it by a panic, keeps all else.
             let class = guarded(|| {

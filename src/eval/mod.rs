@@ -1,6 +1,6 @@
 //! Evaluation: task sets, workers that play them, verification and replay.
 
-mod earlier;
+mod earlier_episodes;
 pub mod evaluation;
 pub mod executor;
 pub(crate) mod in_flight;
@@ -11,7 +11,7 @@ pub(crate) mod progress_event;
 pub(crate) mod replay;
 pub mod schemas;
 pub mod tasks;
-pub(crate) mod untold;
+pub(crate) mod read_tasks;
 pub mod verify;
 pub(crate) mod work_queue;
 pub mod worker;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::options::Options;
 use crate::control::RunningClock;
 use crate::domain::Task;
-use crate::env::remote::Elsewhere;
+use crate::env::remote::RemoteSettings;
 use crate::episode::scenes::Scenes;
 use crate::episode::wish::Wish;
 
@@ -17,7 +17,7 @@ pub(crate) struct EvaluationPlan {
     pub(crate) scenes: Arc<Scenes>,
     pub(crate) options: Options,
     /// How environments in other processes are reached.
-    pub(crate) elsewhere: Elsewhere,
+    pub(crate) remote: RemoteSettings,
     /// The time that it takes, which stands still while it is paused.
     pub(crate) clock: Arc<RunningClock>,
     /// What tasks without subtasks were read as, by their places.

@@ -40,7 +40,7 @@ impl Worker {
     pub(crate) fn new(executor: Arc<Executor>, watchdog: Arc<Watchdog>, policy: Option<Box<dyn Policy>>) -> Worker {
         let slots = watchdog.lock().slots.len();
         let rollouts = (0..slots).map(|_| None).collect();
-        let sessions = Sessions::new(executor.evaluation.elsewhere.clone());
+        let sessions = Sessions::new(executor.evaluation.remote.clone());
         Worker { executor, watchdog, policy, rollouts, sessions, is_alone: false }
     }
 
@@ -251,7 +251,7 @@ pub(super) fn environment_of(
     slot: usize,
     task: &Task,
 ) -> anyhow::Result<Box<dyn Environment>> {
-    if let Some((name, seed)) = task.played_elsewhere() {
+    if let Some((name, seed)) = task.remote_episode() {
         return Ok(Box::new(RemoteEnvironment::begin(sessions.get(slot, name)?, seed)?));
     }
     let setting = evaluation.scenes.setting(task)?;

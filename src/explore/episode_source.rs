@@ -182,7 +182,7 @@ const BACK: &str = "reset goes back to its start, sprint explore opens other hou
 fn generated(start: &EpisodeStart) -> anyhow::Result<(Room, u64)> {
     match start.reference {
         SceneRef::Generated { room, seed } => Ok((room, seed)),
-        SceneRef::Named(_) | SceneRef::Elsewhere => {
+        SceneRef::Named(_) | SceneRef::Remote => {
             anyhow::bail!("a session that was taken up has no next one in this floor plan; {BACK}")
         }
     }

@@ -63,7 +63,7 @@ impl KeptSession {
         let scene = match (&self.scene, &self.reference) {
             (Some(scene), _) => scene.clone(),
             (None, SceneRef::Generated { room, seed }) => generate::house(*room, *seed).0,
-            (None, SceneRef::Elsewhere) => anyhow::bail!("scene: missing"),
+            (None, SceneRef::Remote) => anyhow::bail!("scene: missing"),
             (None, SceneRef::Named(name)) => anyhow::bail!("scene: the floor plan {name} is missing"),
         };
         Ok(EpisodeStart {
@@ -85,7 +85,7 @@ impl KeptSession {
         let place = match &self.reference {
             SceneRef::Generated { room, seed } => format!("{} {seed}", room.spoken()),
             SceneRef::Named(name) => name.clone(),
-            SceneRef::Elsewhere => "another environment".into(),
+            SceneRef::Remote => "another environment".into(),
         };
         let branches = match self.episodes.len() {
             0 | 1 => String::new(),

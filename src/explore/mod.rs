@@ -5,7 +5,7 @@ pub(crate) mod annotation;
 pub(crate) mod breakpoints;
 pub(crate) mod chain_report;
 pub(crate) mod choices;
-pub(crate) mod elsewhere;
+pub(crate) mod remote;
 pub mod episode_source;
 pub mod exploration;
 mod explored_run;

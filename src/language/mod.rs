@@ -10,7 +10,7 @@ pub(crate) mod phrases;
 pub(crate) mod prompt;
 pub mod reader;
 pub(crate) mod rules;
-pub(crate) mod story;
+pub(crate) mod task_wording;
 pub(crate) mod summary;
 pub(crate) mod vocabulary;
 

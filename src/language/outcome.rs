@@ -1,6 +1,6 @@
 //! Outcomes: what a chain of subtasks comes to.
 
-use super::story::Story;
+use super::task_wording::TaskWording;
 use crate::domain::skill::SkillKind;
 
 /// What is different in the end.
@@ -17,7 +17,7 @@ pub(super) enum ChainOutcome {
 }
 
 /// The outcomes in the order in which they come about.
-pub(super) fn outcomes(story: &Story<'_>) -> Vec<ChainOutcome> {
+pub(super) fn outcomes(story: &TaskWording<'_>) -> Vec<ChainOutcome> {
     let mut found: Vec<ChainOutcome> = Vec::new();
     for (step, subtask) in story.subtasks.iter().enumerate() {
         match (subtask.skill, subtask.receptacle) {
@@ -43,13 +43,13 @@ pub(super) fn outcomes(story: &Story<'_>) -> Vec<ChainOutcome> {
 }
 
 /// Whether a slice of what was cut at a step appears later.
-fn uses_slice(story: &Story<'_>, step: usize, whole: u8) -> bool {
+fn uses_slice(story: &TaskWording<'_>, step: usize, whole: u8) -> bool {
     let class = story.class(whole);
     let mut later = story.subtasks[step..].iter();
     later.any(|subtask| story.class(subtask.object) == class && story.is_slice(subtask.object))
 }
 
-fn put(story: &Story<'_>, found: &mut Vec<ChainOutcome>, thing: u8, place: u8) {
+fn put(story: &TaskWording<'_>, found: &mut Vec<ChainOutcome>, thing: u8, place: u8) {
     // What it holds was put into it before: the two go together.
     let content = take_content(found, thing);
     let joins = |outcome: &ChainOutcome| match outcome {

@@ -5,19 +5,19 @@ use rand_chacha::ChaCha8Rng;
 
 use super::grammar::{Slots, grammar, with_article};
 use super::place_slots::{destination_slots, origin_slots};
-use super::story::Story;
 use super::summary;
+use super::task_wording::TaskWording;
 use crate::domain::skill::{Role, SkillKind, Subtask};
 use crate::domain::{Class, Instance, Parent, Scene, World};
 
 /// An instruction for a whole chain.
 pub(crate) fn instruction(roles: &[Role], subtasks: &[Subtask], rng: &mut ChaCha8Rng) -> String {
-    Story { roles, subtasks, origins: &[] }.instruction(rng)
+    TaskWording { roles, subtasks, origins: &[] }.instruction(rng)
 }
 
 /// A sentence for one subtask.
 pub(crate) fn sentence(roles: &[Role], subtask: &Subtask, rng: &mut ChaCha8Rng) -> String {
-    let story = Story { roles, subtasks: std::slice::from_ref(subtask), origins: &[] };
+    let story = TaskWording { roles, subtasks: std::slice::from_ref(subtask), origins: &[] };
     finish(story.clause(0, false, rng), rng)
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn origins(scene: &Scene, world: &World, roles: &[Role]) -> Vec<Optio
     roles.iter().map(origin).collect()
 }
 
-impl Story<'_> {
+impl TaskWording<'_> {
     /// An instruction for the whole chain: a summary of what it comes to, or its steps one after another.
     pub(crate) fn instruction(&self, rng: &mut ChaCha8Rng) -> String {
         let text = match self.subtasks.len() {
@@ -253,9 +253,9 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let texts: Vec<String> = (0..20)
             .map(|number| match number % 5 {
-                0 => Story { roles: &roles, subtasks: &subtasks[..1], origins: &origins }.instruction(&mut rng),
+                0 => TaskWording { roles: &roles, subtasks: &subtasks[..1], origins: &origins }.instruction(&mut rng),
                 1 => sentence(&roles, &subtasks[number % 8], &mut rng),
-                2 => Story { roles: &roles, subtasks: &subtasks[..2], origins: &origins }.instruction(&mut rng),
+                2 => TaskWording { roles: &roles, subtasks: &subtasks[..2], origins: &origins }.instruction(&mut rng),
                 3 => instruction(&roles, &subtasks[3..6], &mut rng),
                 _ => instruction(&roles, &subtasks, &mut rng),
             })

@@ -6,11 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use super::grammar::{Slots, grammar, with_article};
 use super::outcome::{ChainOutcome, outcomes};
 use super::place_slots::destination_slots;
-use super::story::Story;
+use super::task_wording::TaskWording;
 use crate::domain::skill::SkillKind;
 
 /// The chain's outcomes in one sentence.
-pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
+pub(super) fn summary(story: &TaskWording<'_>, rng: &mut ChaCha8Rng) -> String {
     let outcomes = outcomes(story);
     let mut text = String::new();
     for (index, outcome) in outcomes.iter().enumerate() {
@@ -23,7 +23,7 @@ pub(super) fn summary(story: &Story<'_>, rng: &mut ChaCha8Rng) -> String {
     text
 }
 
-fn outcome_clause(story: &Story<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rng) -> String {
+fn outcome_clause(story: &TaskWording<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rng) -> String {
     let mut slots = Slots::new();
     match outcome {
         ChainOutcome::Placed { things, content, place } => {
@@ -63,7 +63,7 @@ fn outcome_clause(story: &Story<'_>, outcome: &ChainOutcome, rng: &mut ChaCha8Rn
 }
 
 /// A thing with what was done to it: "a clean mug", "a slice of chilled tomato".
-fn described(story: &Story<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
+fn described(story: &TaskWording<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
     let words = states(story, thing, rng);
     let class = story.class(thing);
     if words.is_empty() {
@@ -86,7 +86,7 @@ fn described(story: &Story<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
 }
 
 /// "two mugs", "the apple and the other apple".
-fn several(story: &Story<'_>, things: &[u8], rng: &mut ChaCha8Rng) -> String {
+fn several(story: &TaskWording<'_>, things: &[u8], rng: &mut ChaCha8Rng) -> String {
     let Some(&first) = things.first() else { return String::new() };
     let class = story.class(first);
     let number = match things.len() {
@@ -103,7 +103,7 @@ fn several(story: &Story<'_>, things: &[u8], rng: &mut ChaCha8Rng) -> String {
 }
 
 /// "a bowl with a slice of apple in it".
-fn with_content(story: &Story<'_>, holder: u8, content: u8, rng: &mut ChaCha8Rng) -> String {
+fn with_content(story: &TaskWording<'_>, holder: u8, content: u8, rng: &mut ChaCha8Rng) -> String {
     let (outer, inner) = (described(story, holder, rng), described(story, content, rng));
     match rng.random_range(0..4) {
         0 => format!("{outer} holding {inner}"),
@@ -114,7 +114,7 @@ fn with_content(story: &Story<'_>, holder: u8, content: u8, rng: &mut ChaCha8Rng
 }
 
 /// What was done to a thing, as an adjective; empty when nothing was.
-fn states(story: &Story<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
+fn states(story: &TaskWording<'_>, thing: u8, rng: &mut ChaCha8Rng) -> String {
     let mut words = Vec::new();
     for (skill, rule) in
         [(SkillKind::Clean, "clean_word"), (SkillKind::Heat, "hot_word"), (SkillKind::Cool, "cold_word")]

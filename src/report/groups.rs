@@ -136,7 +136,7 @@ impl<'a> EpisodesByTask<'a> {
             let name = match &task.scene {
                 SceneRef::Named(name) => name.clone(),
                 SceneRef::Generated { room, .. } => format!("generated {}", room.spoken()),
-                SceneRef::Elsewhere => task.env.as_ref().map_or_else(|| "elsewhere".into(), ToString::to_string),
+                SceneRef::Remote => task.env.as_ref().map_or_else(|| "remote".into(), ToString::to_string),
             };
             scenes.entry(name).or_default().push((task, group.clone()));
         }

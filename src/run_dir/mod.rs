@@ -1,6 +1,6 @@
 //! Run folders: the manifest, the episodes of a run in order, reader and writer, shards.
 
-pub(crate) mod belonging;
+pub(crate) mod record_check;
 pub(crate) mod default_path;
 pub(crate) mod episode_spec;
 pub(crate) mod episodes;

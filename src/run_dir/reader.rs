@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
-use super::belonging::Belonging;
 use super::episode_spec::{EpisodeSpec, own_specs, policy_seed};
 use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::RunManifest;
 use super::policy_places;
+use super::record_check::RecordCheck;
 use crate::agent::policy_place::PolicyPlace;
 use crate::data::json::Document;
 use crate::data::{json, taskset};
@@ -50,7 +50,7 @@ impl RecordedRun {
         manifest.check().with_context(|| manifest_path.display().to_string())?;
         let (set, scenes) = tasks_of(path, &manifest, tasks)?;
         let (episodes, _) = read_episodes(&path.join(EPISODES))?;
-        let belonging = Belonging::new(&manifest, &set.tasks);
+        let belonging = RecordCheck::new(&manifest, &set.tasks);
         if let Some(misfit) = episodes.iter().find_map(|episode| belonging.check(episode).err()) {
             anyhow::bail!("{}: {misfit}", path.join(EPISODES).display());
         }

@@ -49,7 +49,7 @@ impl FrameStore {
             let scene = match &reference {
                 SceneRef::Generated { room, seed } => Arc::new(generate::house(*room, *seed).0),
                 SceneRef::Named(name) => named(datasets, name)?,
-                SceneRef::Elsewhere => anyhow::bail!("agents are trained in House only"),
+                SceneRef::Remote => anyhow::bail!("agents are trained in House only"),
             };
             Ok((reference, scene))
         });

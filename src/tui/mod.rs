@@ -7,7 +7,7 @@ pub(crate) mod annotate;
 pub mod app;
 mod capabilities;
 mod completion;
-pub(crate) mod elsewhere;
+pub(crate) mod remote;
 pub mod config;
 pub(crate) mod editor;
 pub mod graphics;

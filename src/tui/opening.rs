@@ -98,7 +98,7 @@ pub(super) fn pick<W: Write>(
             Msg::StopAsked => display.stop()?,
             Msg::Continued => display.go_on()?,
             Msg::Ready => display.answered(),
-            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Elsewhere(_) => {}
+            Msg::Mouse(_) | Msg::Resize(_) | Msg::Picture(_) | Msg::Remote(_) => {}
         }
     }
 }

@@ -7,7 +7,7 @@ mod house;
 mod inputs;
 mod model;
 mod onnx;
-mod own;
+mod remote;
 mod policy;
 pub(crate) mod spec;
 mod torchscript;

@@ -12,7 +12,7 @@ use super::frame_stack::FrameStack;
 use super::inputs::{planes, stack, tokens};
 use super::model::{Input, Model};
 use super::spec::{InstructionSpec, PolicySpec};
-use super::{house, own};
+use super::{house, remote};
 use crate::agent::decision::Decision;
 use crate::agent::frame_history::SharedEmbedder;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
@@ -81,7 +81,7 @@ impl ExportedPolicy {
         let selection = if self.samples { Selection::Sample(&mut self.state.rng) } else { Selection::Greedy };
         let candidates = here.environment.legal_actions()?;
         let decision = match here.environment.own() {
-            Some(view) => own::decide(&answer, &self.spec, &view, selection)?,
+            Some(view) => remote::decide(&answer, &self.spec, &view, selection)?,
             None => house::decide(&answer, &self.spec, &candidates, selection)?,
         };
         let values = answer.value.map(|state| Values { state, choices: Vec::new() });
@@ -143,7 +143,7 @@ impl Policy for ExportedPolicy {
 
     fn check_fits(&self, start: &mut Observation<'_>) -> anyhow::Result<()> {
         match start.environment.own() {
-            Some(view) => own::check(&self.spec, view.space)?,
+            Some(view) => remote::check(&self.spec, view.space)?,
             None => house::check(&self.spec)?,
         }
         planes(start.environment.frame()?, &self.spec.frames).map(drop)

@@ -8,7 +8,7 @@ use crate::agent::{Decision, Observation, Policy};
 use crate::domain::{Action, ActionType};
 use crate::env::HouseEnvironment;
 use crate::env::remote::testing::{Fault, serve};
-use crate::env::remote::{Elsewhere, RemoteEnvironment, Sessions};
+use crate::env::remote::{RemoteEnvironment, RemoteSettings, Sessions};
 use crate::episode::rollout::{End, Rollout};
 use crate::house::testing::kitchen_house;
 
@@ -122,7 +122,7 @@ fn actions_and_classes_that_house_has_not_are_named() {
 #[test]
 fn a_model_acts_in_an_environment_with_actions_of_its_own_and_is_refused_where_it_does_not_fit() {
     let env = || {
-        let session = Sessions::new(Elsewhere::default()).get(0, &serve(Fault::None)).unwrap();
+        let session = Sessions::new(RemoteSettings::default()).get(0, &serve(Fault::None)).unwrap();
         RemoteEnvironment::begin(session, 2).unwrap()
     };
     let policy = |(width, height): (u64, u64), actions: [&str; 2]| {

@@ -8,7 +8,7 @@ mod deadline_stream;
 mod dialogue;
 mod image;
 mod observation;
-mod own;
+mod remote;
 mod policy;
 mod reply;
 mod server_gone;

@@ -3,7 +3,7 @@
 use rmpv::Value;
 
 use super::dialogue::{Protocol, map};
-use super::{image, own};
+use super::{image, remote};
 use crate::agent::policy::Observation;
 use crate::domain::{ActionType, Class};
 use crate::house::view::Candidate;
@@ -34,7 +34,7 @@ fn legal(candidates: &[Candidate], kind: ActionType) -> Value {
 /// The start of an episode.
 pub(super) fn episode(here: &Observation<'_>, seed: u64) -> Value {
     let (actions, arguments) = match here.environment.own() {
-        Some(view) => own::actions(view.space),
+        Some(view) => remote::actions(view.space),
         None => house_actions(),
     };
     let task = [
@@ -74,7 +74,7 @@ pub(super) fn observation(
             let names = view.space.actions().iter().map(|action| action.name.as_str().into()).collect();
             let last = here.last.and_then(|action| Some(view.space.parts(action)?.0.into()));
             let text = view.observation.text.as_deref().map(Value::from);
-            (Value::Array(names), own::legal(&view), last, text)
+            (Value::Array(names), remote::legal(&view), last, text)
         }
         None => {
             let names = Value::Array(ActionType::ALL.map(|kind| kind.name().into()).into());

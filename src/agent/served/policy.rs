@@ -8,7 +8,7 @@ use super::array::field;
 use super::dialogue::{Dialogue, Protocol};
 use super::server_gone::ServerGone;
 use super::state::ServedState;
-use super::{observation, own, reply};
+use super::{observation, remote, reply};
 use crate::agent::decision::Decision;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState};
 use crate::agent::policy_source::PolicySource;
@@ -106,7 +106,7 @@ impl ServedPolicy {
         }
         let answer = dialogue.ask(told, here.step)?;
         let decision = match here.environment.own() {
-            Some(view) => own::decision(&answer, &view),
+            Some(view) => remote::decision(&answer, &view),
             None => reply::decision(&answer, &candidates),
         };
         let decision =

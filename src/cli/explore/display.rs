@@ -13,10 +13,10 @@ use crate::cli::exit_status::ExitStatus;
 use crate::cli::logging;
 use crate::cli::streams::Printable;
 use crate::data::text_file;
-use crate::explore::elsewhere::{self, OpenOwn};
 use crate::explore::exploration::Exploration;
 use crate::explore::plain;
 use crate::explore::plain_input::PlainInput;
+use crate::explore::remote::{self, OpenRemote};
 use crate::tui::config::ExplorerConfig;
 use crate::tui::graphics::Protocol;
 use crate::tui::opening::Opening;
@@ -67,17 +67,16 @@ impl Display {
     ///
     /// # Errors
     /// When the environment cannot be reached, or there is no terminal.
-    pub(crate) fn show_elsewhere(self, manual: bool, open: OpenOwn, agent: PolicySource) -> anyhow::Result<ExitStatus> {
+    pub(crate) fn show_remote(self, manual: bool, open: OpenRemote, agent: PolicySource) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, control) = PlainInput::steered(BufReader::new(std::io::stdin()))?;
             let out = Printable::new(std::io::stdout().lock());
             let _listens = control.listen();
-            let obeyed =
-                elsewhere::plain::run(open()?, &agent, input, &control, out)? || std::io::stdin().is_terminal();
+            let obeyed = remote::plain::run(open()?, &agent, input, &control, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });
         }
         let options = self.screen_options(PolicyKind::Random, manual)?;
-        Ok(match crate::tui::elsewhere::run(options, open, agent)? {
+        Ok(match crate::tui::remote::run(options, open, agent)? {
             ExitReason::Signal(_) => ExitStatus::Interrupted,
             ExitReason::Asked | ExitReason::ToList | ExitReason::WorkerGone => ExitStatus::Ok,
         })

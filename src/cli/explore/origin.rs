@@ -10,7 +10,7 @@ use crate::agent::policy_source::{self, PolicySource};
 use crate::agent::registry::{Policies, PolicyKind};
 use crate::cli::environment::EnvironmentChoice;
 use crate::cli::policies::Deciding;
-use crate::cli::policy_name::{Elsewhere, ElsewhereOptions};
+use crate::cli::policy_name::{ExternalPolicy, ExternalPolicyOptions};
 use crate::cli::recorded::recorded;
 use crate::cli::recorded_policy::RecordedPolicy;
 use crate::cli::wish_reader::WishReaderArgs;
@@ -19,10 +19,10 @@ use crate::data::{dataset::Dataset, taskset};
 use crate::domain::Room;
 use crate::episode::scenes::Scenes;
 use crate::episode::wish::Expect;
-use crate::explore::elsewhere::{OpenOwn, OwnExploration};
 use crate::explore::episode_source::{EpisodeOrigin, EpisodeSource};
 use crate::explore::exploration::Exploration;
 use crate::explore::kept_session::KeptSession;
+use crate::explore::remote::{OpenRemote, RemoteExploration};
 use crate::explore::session_file::SessionFile;
 use crate::explore::start_list::{self, Start, StartFolders};
 use crate::tui::opening::Opening;
@@ -61,9 +61,9 @@ pub(crate) struct Origin {
     /// The seed of the house and of chance [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// A policy from elsewhere, which acts as the agent.
+    /// An external policy, which acts as the agent.
     #[arg(skip)]
-    pub(super) other_policy: Option<(Elsewhere, ElsewhereOptions)>,
+    pub(super) other_policy: Option<(ExternalPolicy, ExternalPolicyOptions)>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -104,7 +104,7 @@ impl Default for Origin {
 
 impl Origin {
     /// Who acts in an environment with actions of its own: chance, unless a policy that can was named.
-    pub(super) fn policy_elsewhere(&self, kind: PolicyKind) -> anyhow::Result<PolicySource> {
+    pub(super) fn external_policy(&self, kind: PolicyKind) -> anyhow::Result<PolicySource> {
         if let Some(checkpoint) = &self.checkpoint {
             return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false, self.deciding.asked());
         }
@@ -118,7 +118,7 @@ impl Origin {
     }
 
     /// How an exploration of another environment than House is opened, where one was named.
-    pub(super) fn elsewhere(&self, kind: PolicyKind) -> anyhow::Result<Option<OpenOwn>> {
+    pub(super) fn remote(&self, kind: PolicyKind) -> anyhow::Result<Option<OpenRemote>> {
         let task = match &self.task {
             None => None,
             Some(task) => {
@@ -128,16 +128,16 @@ impl Origin {
                 set.tasks.into_iter().nth(index).filter(|task| task.env.is_some())
             }
         };
-        let named = self.environment.elsewhere().cloned();
+        let named = self.environment.remote().cloned();
         let Some(name) = named.or_else(|| task.as_ref().and_then(|task| task.env.clone())) else { return Ok(None) };
         if self.scene.is_some() || self.room.is_some() || (self.task.is_some() && task.is_none()) {
             bail!("--scene, --room and House's tasks are about House, but --env names {name}");
         }
-        let (reach, agent) = (self.environment.reach(), self.policy_elsewhere(kind)?);
+        let (reach, agent) = (self.environment.reach(), self.external_policy(kind)?);
         let seed = self.seed.or_else(|| task.as_ref().and_then(|task| task.seed)).unwrap_or(0);
         let of_task = task.map(|task| task.instruction).filter(|instruction| !instruction.is_empty());
         let told = self.instruction.clone().or(of_task);
-        Ok(Some(Box::new(move || OwnExploration::new(&name, reach, agent, seed, told.as_deref()))))
+        Ok(Some(Box::new(move || RemoteExploration::new(&name, reach, agent, seed, told.as_deref()))))
     }
 
     /// What is made of what is typed.
@@ -157,7 +157,7 @@ impl Origin {
             || self.checkpoint.is_some()
             || self.room.is_some()
             || self.seed.is_some()
-            || self.environment.elsewhere().is_some()
+            || self.environment.remote().is_some()
             || !self.deciding.asked().is_none()
     }
 
@@ -206,9 +206,9 @@ impl Origin {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
         let asked = self.deciding.asked();
-        let elsewhere = self.other_policy.iter().map(|(named, options)| named.agent(*options));
+        let remote = self.other_policy.iter().map(|(named, options)| named.agent(*options));
         let agents = policy_source::agents(self.checkpoint.as_deref(), asked);
-        let policies = Policies::new(elsewhere.chain(agents).collect());
+        let policies = Policies::new(remote.chain(agents).collect());
         let exploration = Exploration::new(source, policies, kind, None)?.deciding(asked);
         exploration.expecting(self.expect()?, self.instruction.as_deref())
     }

@@ -8,8 +8,8 @@ use anyhow::Context;
 use super::session::{Patience, Session};
 use crate::domain::{Action, Class, EnvironmentName, Instance};
 use crate::env::environment::{Environment, Snapshot, Transition};
-use crate::env::observation::OwnObservation;
-use crate::env::own_view::OwnView;
+use crate::env::observation::RemoteObservation;
+use crate::env::remote_view::RemoteView;
 use crate::house::view::{Candidate, Frame};
 use crate::house::{Outcome, Reason};
 
@@ -18,7 +18,7 @@ pub(crate) struct RemoteEnvironment {
     session: Arc<Session>,
     label: String,
     seed: u64,
-    present: OwnObservation,
+    present: RemoteObservation,
     frame: Option<Frame>,
 }
 
@@ -30,7 +30,7 @@ impl RemoteEnvironment {
     pub(crate) fn begin(session: Arc<Session>, seed: u64) -> anyhow::Result<RemoteEnvironment> {
         let label = session.name.to_string();
         let mut environment =
-            RemoteEnvironment { session, label, seed, present: OwnObservation::default(), frame: None };
+            RemoteEnvironment { session, label, seed, present: RemoteObservation::default(), frame: None };
         environment.reset()?;
         Ok(environment)
     }
@@ -40,7 +40,7 @@ impl RemoteEnvironment {
         &self.session
     }
 
-    fn show(&mut self, observation: OwnObservation) {
+    fn show(&mut self, observation: RemoteObservation) {
         (self.present, self.frame) = (observation, None);
     }
 }
@@ -98,8 +98,8 @@ impl Environment for RemoteEnvironment {
         self.present.grading()
     }
 
-    fn own(&self) -> Option<OwnView<'_>> {
-        Some(OwnView { space: &self.session.space, observation: &self.present })
+    fn own(&self) -> Option<RemoteView<'_>> {
+        Some(RemoteView { space: &self.session.space, observation: &self.present })
     }
 
     fn snapshot(&self) -> Option<Snapshot> {
@@ -122,29 +122,29 @@ impl Environment for RemoteEnvironment {
 
 /// How environments in other processes are reached.
 #[derive(Clone, Debug)]
-pub struct Elsewhere {
+pub struct RemoteSettings {
     /// How long is waited for them.
     pub(crate) patience: Patience,
     /// Where the environment of every task is found now, if not under the name in the task: a server's address may change.
     pub(crate) found_at: Option<EnvironmentName>,
 }
 
-impl Default for Elsewhere {
-    fn default() -> Elsewhere {
-        Elsewhere { patience: Patience::USUAL, found_at: None }
+impl Default for RemoteSettings {
+    fn default() -> RemoteSettings {
+        RemoteSettings { patience: Patience::USUAL, found_at: None }
     }
 }
 
 /// Sessions that are used again for episode after episode; by whoever plays, in the slots of its policy.
 pub(crate) struct Sessions {
-    elsewhere: Elsewhere,
+    remote: RemoteSettings,
     open: BTreeMap<(usize, EnvironmentName), Arc<Session>>,
 }
 
 impl Sessions {
     /// None is open yet.
-    pub(crate) fn new(elsewhere: Elsewhere) -> Sessions {
-        Sessions { elsewhere, open: BTreeMap::new() }
+    pub(crate) fn new(remote: RemoteSettings) -> Sessions {
+        Sessions { remote, open: BTreeMap::new() }
     }
 
     /// A session for a slot: the one that it had, unless that broke.
@@ -152,13 +152,13 @@ impl Sessions {
     /// # Errors
     /// When the environment cannot be reached.
     pub(crate) fn get(&mut self, slot: usize, name: &EnvironmentName) -> anyhow::Result<Arc<Session>> {
-        let name = self.elsewhere.found_at.as_ref().unwrap_or(name);
+        let name = self.remote.found_at.as_ref().unwrap_or(name);
         let key = (slot, name.clone());
         self.open.retain(|_, session| !session.is_broken());
         if let Some(session) = self.open.get(&key) {
             return Ok(session.clone());
         }
-        let session = Arc::new(Session::open(name, self.elsewhere.patience)?);
+        let session = Arc::new(Session::open(name, self.remote.patience)?);
         self.open.insert(key, session.clone());
         Ok(session)
     }
@@ -170,11 +170,11 @@ mod tests {
 
     use super::super::testing::{Fault, serve};
     use super::*;
-    use crate::env::own_view::Possible;
+    use crate::env::remote_view::Possible;
 
     fn sessions(answer: Duration) -> Sessions {
         let patience = Patience { answer, ..Patience::USUAL };
-        Sessions::new(Elsewhere { patience, found_at: None })
+        Sessions::new(RemoteSettings { patience, found_at: None })
     }
 
     fn begin(fault: Fault, answer: Duration) -> RemoteEnvironment {

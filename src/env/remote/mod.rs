@@ -9,5 +9,5 @@ pub(crate) mod session;
 pub(crate) mod testing;
 
 pub(crate) use child::end_all as end_children;
-pub(crate) use environment::{Elsewhere, RemoteEnvironment, Sessions};
+pub(crate) use environment::{RemoteEnvironment, RemoteSettings, Sessions};
 pub(crate) use session::Patience;

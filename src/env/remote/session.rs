@@ -12,7 +12,7 @@ use super::child::{self, Child};
 use super::connection::{self, Connection};
 use crate::domain::{Action, EnvironmentName};
 use crate::env::action_space::ActionSpace;
-use crate::env::observation::OwnObservation;
+use crate::env::observation::RemoteObservation;
 
 /// How often an idle connection answers the other side's pings.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -109,7 +109,7 @@ impl Session {
     ///
     /// # Errors
     /// When it breaks or refuses.
-    pub(super) fn reset(&self, seed: u64) -> anyhow::Result<OwnObservation> {
+    pub(super) fn reset(&self, seed: u64) -> anyhow::Result<RemoteObservation> {
         let observation = self.observed(&json!({"type": "reset", "data": {"seed": seed}}))?;
         self.choose_format()?;
         Ok(observation)
@@ -119,7 +119,7 @@ impl Session {
     ///
     /// # Errors
     /// When it breaks.
-    pub(super) fn step(&self, action: Action) -> anyhow::Result<Option<OwnObservation>> {
+    pub(super) fn step(&self, action: Action) -> anyhow::Result<Option<RemoteObservation>> {
         let data = self.capabilities.step(&self.space, action)?;
         match self.ask(&json!({"type": "step", "data": data}))? {
             Answer::Data(data) => self.read(data).map(Some),
@@ -144,11 +144,11 @@ impl Session {
     ///
     /// # Errors
     /// When it breaks or refuses.
-    pub(super) fn restore(&self, id: &str) -> anyhow::Result<OwnObservation> {
+    pub(super) fn restore(&self, id: &str) -> anyhow::Result<RemoteObservation> {
         self.observed(&json!({"type": "restore", "data": {"id": id}}))
     }
 
-    fn observed(&self, request: &Value) -> anyhow::Result<OwnObservation> {
+    fn observed(&self, request: &Value) -> anyhow::Result<RemoteObservation> {
         let data = self.data(request)?;
         self.read(data)
     }
@@ -162,8 +162,8 @@ impl Session {
     }
 
     /// What cannot be read is the end of the session: nothing more is known of the state.
-    fn read(&self, data: Value) -> anyhow::Result<OwnObservation> {
-        OwnObservation::read(data, &self.space).map_err(|error| {
+    fn read(&self, data: Value) -> anyhow::Result<RemoteObservation> {
+        RemoteObservation::read(data, &self.space).map_err(|error| {
             lock(&self.link).connection = None;
             error.context(format!("{} sent what cannot be read", self.name))
         })

@@ -82,7 +82,7 @@ pub(crate) fn read<'a>(
     let lies = lying(scene, world);
     let best = reader.read(&said, &Context { before: &before, house: Some(&house), lies: &lies });
     let best = with_the_held(reader, &said, &house, world, &best).unwrap_or(best);
-    let best = elsewhere(reader, &said, &before, &house, &best).unwrap_or(best);
+    let best = remote(reader, &said, &before, &house, &best).unwrap_or(best);
     let mut readings = vec![best];
     let others = readings[0].alternatives().into_iter().filter(|other| other.confidence >= OFFERED);
     readings.extend(others.collect::<Vec<_>>());
@@ -205,7 +205,7 @@ fn with_the_held(
 }
 
 /// What the words mean where any thing may be meant, if that is plain and only this house lacks it.
-fn elsewhere(
+fn remote(
     reader: &Reader,
     text: &str,
     before: &[ReadSubtask],

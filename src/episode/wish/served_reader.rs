@@ -10,8 +10,8 @@ use serde_json::json;
 
 use crate::domain::Class;
 use crate::language::instruction::visible;
-use crate::language::reader::asked;
-use crate::language::reader::{WishReading, asked::prompt};
+use crate::language::reader::answered_by_model;
+use crate::language::reader::{WishReading, answered_by_model::prompt};
 use crate::nets::completion_server::{Completion, CompletionServer, Pace};
 
 /// The most tokens of an answer: a list of a few steps.
@@ -93,7 +93,7 @@ impl ServedReader {
         let choice = Completion::first_of(&body);
         let said = || visible(&String::from_utf8_lossy(&body)).chars().take(100).collect::<String>();
         let choice = choice.ok_or_else(|| format!("the server's answer is no completion: {}", said()))?;
-        asked::reading(&choice.text, text, house, &self.name)
+        answered_by_model::reading(&choice.text, text, house, &self.name)
     }
 }
 

@@ -31,7 +31,7 @@ pub(super) fn scene_of<'a>(
 ) -> anyhow::Result<&'a Arc<Scene>> {
     match reference {
         SceneRef::Named(name) => scenes.get(name).with_context(|| format!("no scene {name:?}")),
-        SceneRef::Generated { .. } | SceneRef::Elsewhere => {
+        SceneRef::Generated { .. } | SceneRef::Remote => {
             anyhow::bail!("generated scenes hold no recordings to replay")
         }
     }

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::data::{json, json_positions, schema, taskset, text_file};
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
-use crate::eval::untold::read_instruction;
+use crate::eval::read_tasks::read_instruction;
 use crate::language::count::counted;
 
 /// A mistake in a task file.

@@ -1,5 +1,5 @@
 //! Task sets: sampled, and checked.
 
 pub mod check;
-pub mod elsewhere;
+pub mod remote;
 pub mod sample;

@@ -178,7 +178,7 @@ pub(crate) fn sample_dataset(
     let fits = |trajectory: &Trajectory| match &trajectory.scene {
         SceneRef::Named(name) => wanted(name) && scenes.get(name).is_some_and(|scene| spec.rooms.contains(&scene.room)),
         SceneRef::Generated { room, .. } => spec.only_scenes.is_empty() && spec.rooms.contains(room),
-        SceneRef::Elsewhere => false,
+        SceneRef::Remote => false,
     };
     let mut spans: Vec<(u32, usize)> = Vec::new();
     for (number, trajectory) in (0..).zip(dataset.trajectories()?) {
@@ -215,7 +215,7 @@ pub(crate) fn sample_dataset(
             let span = first..first + spec.length;
             let id = format!("{}-{first}-{place}", trajectory.id);
             let scene = match &trajectory.scene {
-                SceneRef::Elsewhere => None,
+                SceneRef::Remote => None,
                 SceneRef::Named(name) => scenes.get(name).cloned(),
                 SceneRef::Generated { room, seed } => Some(generate::house(*room, *seed).0.into()),
             };

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::verdict::{Agreement, Mismatch};
 use crate::agent::policy_source::PolicySource;
-use crate::env::remote::Elsewhere;
+use crate::env::remote::RemoteSettings;
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::episode::rollout::EndedBy;
 use crate::eval::options::Options;
@@ -25,7 +25,7 @@ pub(super) fn play_again(
     specs: &[EpisodeSpec],
     source: &PolicySource,
     jobs: usize,
-    elsewhere: &Elsewhere,
+    remote: &RemoteSettings,
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<BTreeMap<EpisodeKey, Agreement>> {
     let recorded: BTreeMap<EpisodeKey, &Episode> =
@@ -33,7 +33,7 @@ pub(super) fn play_again(
     let plan = EvaluationPlan {
         tasks: run.set.tasks.clone().into(),
         scenes: Arc::new(run.scenes.clone()),
-        elsewhere: elsewhere.clone(),
+        remote: remote.clone(),
         read: Arc::default(),
         clock: Arc::default(),
         options: Options {

@@ -1,6 +1,6 @@
 //! Verifying a run: its episodes are played again, and must come out the same, step by step.
 
-mod elsewhere;
+mod remote;
 mod evaluated;
 mod sources;
 mod step_by_step;
@@ -15,7 +15,7 @@ use std::path::Path;
 use anyhow::Context;
 
 use crate::data::json;
-use crate::env::remote::{Elsewhere, Sessions};
+use crate::env::remote::{RemoteSettings, Sessions};
 use crate::episode::record::{Episode, EpisodeKey};
 use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::{EpisodeSpec, episode_specs};
@@ -33,20 +33,20 @@ pub fn verify(
     run: &RecordedRun,
     find: &mut FindPolicy<'_>,
     jobs: usize,
-    elsewhere: &Elsewhere,
+    remote: &RemoteSettings,
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<Verdict> {
     let mut verdict = Verdict { summarised: summarised(&run.path)?, ..Verdict::default() };
     let mut sources = Sources::new(find);
     let specs: BTreeMap<EpisodeKey, EpisodeSpec> =
         episode_specs(&run.manifest, &run.set.tasks).into_iter().map(|spec| (spec.key(&run.set.tasks), spec)).collect();
-    let mut sessions = Sessions::new(elsewhere.clone());
-    let mut again = evaluated_again(run, &specs, &mut sources, (jobs, elsewhere), progress)?;
+    let mut sessions = Sessions::new(remote.clone());
+    let mut again = evaluated_again(run, &specs, &mut sources, (jobs, remote), progress)?;
     for (number, episode) in (1..).zip(&run.episodes) {
         let agreement = match again.remove(&episode.key()) {
             Some(agreement) => agreement,
             None if run.task(episode)?.env.is_some() => {
-                elsewhere::retrace(run, episode, &mut sessions).with_context(|| format!("episode {number}"))?
+                remote::retrace(run, episode, &mut sessions).with_context(|| format!("episode {number}"))?
             }
             None => {
                 let (task_index, task, setting) = run.setting(episode).with_context(|| format!("episode {number}"))?;
@@ -77,7 +77,7 @@ fn evaluated_again(
     run: &RecordedRun,
     specs: &BTreeMap<EpisodeKey, EpisodeSpec>,
     sources: &mut Sources<'_, '_>,
-    (jobs, elsewhere): (usize, &Elsewhere),
+    (jobs, remote): (usize, &RemoteSettings),
     progress: &mut dyn FnMut(usize),
 ) -> anyhow::Result<BTreeMap<EpisodeKey, Agreement>> {
     // What an error cut short, a step without an end among them, is not played on.
@@ -87,7 +87,7 @@ fn evaluated_again(
     wanted.sort_by_key(|spec| spec.index);
     let author = run.author(0, &Episode::default());
     match if wanted.is_empty() { None } else { sources.find(&author)? } {
-        Some(source) => evaluated::play_again(run, &wanted, &source, jobs, elsewhere, progress),
+        Some(source) => evaluated::play_again(run, &wanted, &source, jobs, remote, progress),
         None => Ok(BTreeMap::new()),
     }
 }

@@ -7,7 +7,7 @@ use crate::agent::policy::each_alone;
 use crate::agent::policy_source::{MakePolicy, PolicySource};
 use crate::agent::{Decision, Decisions, Observation, Policy, RandomPolicy};
 use crate::domain::{Action, ActionType, Class, Role, SkillKind, Subtask};
-use crate::env::remote::Elsewhere;
+use crate::env::remote::RemoteSettings;
 use crate::episode::branches::{SavedState, TakenStep, Tree};
 use crate::episode::record::{Author, TraceStep};
 use crate::episode::rollout::Rollout;
@@ -72,7 +72,7 @@ fn verified(explored: &SessionExport) -> Verdict {
     session_export::write(explored, &path).unwrap();
     let run = RecordedRun::open(&path, None).unwrap();
     assert_eq!(run.episodes, explored.episodes);
-    verify(&run, &mut random, 2, &Elsewhere::default(), &mut |_| ()).unwrap()
+    verify(&run, &mut random, 2, &RemoteSettings::default(), &mut |_| ()).unwrap()
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn a_policy_that_is_not_at_hand_is_named_and_its_actions_are_replayed() {
     let path = folder.path().join("run");
     session_export::write(&explored, &path).unwrap();
     let run = RecordedRun::open(&path, None).unwrap();
-    let verdict = verify(&run, &mut |_| Ok(None), 1, &Elsewhere::default(), &mut |_| ()).unwrap();
+    let verdict = verify(&run, &mut |_| Ok(None), 1, &RemoteSettings::default(), &mut |_| ()).unwrap();
     assert_eq!((verdict.steps, verdict.choices, verdict.missing), (8, 0, vec!["random".to_string()]));
 }
 
@@ -128,7 +128,7 @@ fn evaluated(name: &str, jobs: usize, source: &PolicySource) -> (tempfile::TempD
 }
 
 fn verified_by(run: &RecordedRun, jobs: usize, source: &PolicySource) -> Verdict {
-    verify(run, &mut |_| Ok(Some(source.clone())), jobs, &Elsewhere::default(), &mut |_| ()).unwrap()
+    verify(run, &mut |_| Ok(Some(source.clone())), jobs, &RemoteSettings::default(), &mut |_| ()).unwrap()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::episode::record::{Episode, OwnStep, TraceStep};
+use crate::episode::record::{Episode, RemoteStep, TraceStep};
 use crate::episode::rollout::EndedBy;
 use crate::language::count::counted;
 
@@ -102,7 +102,7 @@ impl Mismatch {
 
 /// What an environment with actions of its own showed after a step, in words.
 fn seen(step: &TraceStep) -> String {
-    let earned = |own: &OwnStep| own.reward.map_or(String::new(), |reward| format!(", reward {reward}"));
+    let earned = |own: &RemoteStep| own.reward.map_or(String::new(), |reward| format!(", reward {reward}"));
     step.own.as_ref().map_or_else(|| "nothing".into(), |own| format!("{}{}", own.seen, earned(own)))
 }
 

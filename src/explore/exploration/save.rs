@@ -143,7 +143,7 @@ mod tests {
         assert!(exploration.keep(Some(path.clone())).unwrap_err().to_string().contains("holds a run already"));
         let run = RecordedRun::open(&path, None).unwrap();
         let mut find = |_: &Author| Ok(Some(PolicySource::random()));
-        let verdict = verify(&run, &mut find, 1, &crate::env::remote::Elsewhere::default(), &mut |_| ()).unwrap();
+        let verdict = verify(&run, &mut find, 1, &crate::env::remote::RemoteSettings::default(), &mut |_| ()).unwrap();
         assert!(verdict.differences.is_empty(), "{verdict:?}");
         assert_eq!((verdict.episodes, verdict.steps, verdict.choices), (2, 6 + 5, 6 + 4));
 

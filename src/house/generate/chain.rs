@@ -72,7 +72,7 @@ impl<'a> Stock<'a> {
     }
 
     /// Whether some object of the class is not in a receptacle of that class yet.
-    fn is_elsewhere(&self, content: Class, receptacle: Class) -> bool {
+    fn is_remote(&self, content: Class, receptacle: Class) -> bool {
         self.world.objects.iter().filter(|object| object.class == content).any(|object| match object.parent {
             Parent::In(holder) => self.world.class_of(self.scene, holder) != Some(receptacle),
             _ => true,
@@ -87,7 +87,7 @@ impl<'a> Stock<'a> {
 
     /// A class of furniture that people put `content` into, and where it is not yet.
     fn place(&self, rng: &mut ChaCha8Rng, content: Class) -> Option<Class> {
-        let takes = |class: &Class| class.holds(content) && self.is_elsewhere(content, *class);
+        let takes = |class: &Class| class.holds(content) && self.is_remote(content, *class);
         let fitting: Vec<Class> = self.fixed.iter().copied().filter(takes).collect();
         fitting.choose(rng).copied()
     }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::builder::{Builder, INSET, inset, surface};
 use super::floor::{RoomFloor, Wall, before, pick};
-use super::site::Site;
+use super::piece_frame::PieceFrame;
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::scene::Surface;
 
@@ -121,7 +121,7 @@ fn runs(
 }
 
 /// Reserves the floor before every unit that people use.
-fn aprons(floor: &mut RoomFloor, site: &Site, units: &[(Unit, i32)], depth: i32) -> bool {
+fn aprons(floor: &mut RoomFloor, site: &PieceFrame, units: &[(Unit, i32)], depth: i32) -> bool {
     let mut u = 0;
     units.iter().all(|&(unit, width)| {
         let front = before(&site.moved(u, 0), width, depth);
@@ -130,7 +130,7 @@ fn aprons(floor: &mut RoomFloor, site: &Site, units: &[(Unit, i32)], depth: i32)
     })
 }
 
-fn fridge(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32) {
+fn fridge(out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, width: i32) {
     let height = pick(rng, [1650, 1900], 25);
     let levels = rng.random_range(3..=4);
     let (low, high) = (pick(rng, [280, 420], 20), height - 420);
@@ -143,7 +143,7 @@ fn fridge(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32) {
 }
 
 /// Builds one straight counter with what stands on it, under it and over it.
-fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: CounterDimensions, site: Site, units: &[(Unit, i32)]) {
+fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: CounterDimensions, site: PieceFrame, units: &[(Unit, i32)]) {
     if units.is_empty() {
         return;
     }
@@ -182,7 +182,7 @@ fn counter(out: &mut Builder, rng: &mut ChaCha8Rng, build: CounterDimensions, si
 }
 
 /// A basin in a hole of the slab, and its faucet. Returns the slab around it.
-fn sink(out: &mut Builder, site: Site, width: i32, height: i32, depth: i32) -> Vec<Cuboid> {
+fn sink(out: &mut Builder, site: PieceFrame, width: i32, height: i32, depth: i32) -> Vec<Cuboid> {
     let (u0, u1) = (width / 2 - 260, width / 2 + 260);
     let (v0, v1) = (130, depth - 70);
     let ground = height - BASIN;
@@ -204,7 +204,7 @@ fn sink(out: &mut Builder, site: Site, width: i32, height: i32, depth: i32) -> V
 fn below(
     out: &mut Builder,
     rng: &mut ChaCha8Rng,
-    site: Site,
+    site: PieceFrame,
     unit: Unit,
     width: i32,
     top: i32,
@@ -243,7 +243,7 @@ fn below(
 }
 
 /// A drawer in the front of a carcass of that depth.
-pub(crate) fn drawer(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], depth: i32) {
+pub(crate) fn drawer(out: &mut Builder, site: PieceFrame, u: [i32; 2], y: [i32; 2], depth: i32) {
     let body = site.cuboid(u, y, [depth - 320, depth]);
     // Its contents lie in the part that comes out of the carcass when it opens.
     let ground = surface(site.floor + y[0] + 20, site.rect([u[0] + 60, u[1] - 60], [depth - 120, depth - 60]));
@@ -252,7 +252,7 @@ pub(crate) fn drawer(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], de
 }
 
 /// A cabinet with a door in front.
-pub(crate) fn cabinet(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], v: [i32; 2]) {
+pub(crate) fn cabinet(out: &mut Builder, site: PieceFrame, u: [i32; 2], y: [i32; 2], v: [i32; 2]) {
     let body = site.cuboid(u, y, v);
     let (back, front) = (v[0] + 80.max((v[1] - v[0]) / 3), v[1] - 90);
     let ground = surface(site.floor + y[0] + 20, site.rect([u[0] + 80, u[1] - 80], [back.min(front), front]));
@@ -260,13 +260,13 @@ pub(crate) fn cabinet(out: &mut Builder, site: Site, u: [i32; 2], y: [i32; 2], v
     out.add("Cabinet", pivot, site.facing, vec![body], vec![ground]);
 }
 
-fn wall_cabinet(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32, from: i32) {
+fn wall_cabinet(out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, width: i32, from: i32) {
     let top = from + pick(rng, [600, 700], 20);
     cabinet(out, site, [5, width - 5], [from, top], [0, 330]);
 }
 
 /// What stands on a unit of the counter.
-fn appliance(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, unit: Unit, width: i32, height: i32) {
+fn appliance(out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, unit: Unit, width: i32, height: i32) {
     let mid = width / 2;
     match unit {
         Unit::Microwave => {
@@ -293,7 +293,7 @@ fn appliance(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, unit: Unit, wi
 }
 
 /// A bathroom's vanity: a counter with one or two basins.
-pub(crate) fn vanity(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, width: i32, depth: i32, height: i32) {
+pub(crate) fn vanity(out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, width: i32, depth: i32, height: i32) {
     let mut units = Vec::new();
     let mut left = width;
     let basins = if width >= 1600 { 2 } else { 1 };

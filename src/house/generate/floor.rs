@@ -3,8 +3,8 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use super::piece_frame::PieceFrame;
 use super::rooms::{Range, RoomPlan};
-use super::site::Site;
 use crate::domain::place::{Cuboid, Rect};
 use crate::domain::{Cell, Heading};
 
@@ -20,7 +20,7 @@ const CEILING: i32 = 2600;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wall {
     /// Its frame; u runs along the wall.
-    pub(crate) site: Site,
+    pub(crate) site: PieceFrame,
     /// How long it is.
     pub(crate) length: i32,
 }
@@ -176,7 +176,7 @@ fn stands(cells: &[Cell], front: &Rect) -> bool {
 }
 
 /// The strip of floor before a piece of that width and depth.
-pub(crate) fn before(site: &Site, width: i32, depth: i32) -> Rect {
+pub(crate) fn before(site: &PieceFrame, width: i32, depth: i32) -> Rect {
     site.rect([0, width], [depth, depth + USE])
 }
 
@@ -231,7 +231,7 @@ fn walls(bounds: &Rect, notch: Option<&Rect>) -> Vec<Wall> {
                 (_, 1) => Heading::North,
                 _ => Heading::South,
             };
-            Wall { site: Site { origin: *from, facing: along.left(), floor: FLOOR }, length: dx.abs() + dz.abs() }
+            Wall { site: PieceFrame { origin: *from, facing: along.left(), floor: FLOOR }, length: dx.abs() + dz.abs() }
         })
         .collect()
 }

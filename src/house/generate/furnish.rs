@@ -6,9 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use super::builder::Builder;
 use super::counters;
 use super::floor::{RoomFloor, Wall, before, overlap, pick};
+use super::piece_frame::PieceFrame;
 use super::pieces::{self, PieceDimensions};
 use super::rooms::{FurniturePiece, RoomPlan};
-use super::site::Site;
 use crate::domain::place::Rect;
 use crate::domain::{Cell, Heading, Point};
 
@@ -60,7 +60,7 @@ fn one(piece: &FurniturePiece, floor: &mut RoomFloor, out: &mut Builder, rng: &m
 }
 
 /// A place along a wall, often in a corner or next to what stands there.
-fn along(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> Site {
+fn along(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> PieceFrame {
     let wall = floor.walls[rng.random_range(0..floor.walls.len() as u32) as usize];
     let room = (wall.length - build.width).max(0);
     let u = match rng.random_range(0..4) {
@@ -72,11 +72,11 @@ fn along(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> Sit
 }
 
 /// A place away from the walls.
-fn middle(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> Site {
+fn middle(floor: &RoomFloor, rng: &mut ChaCha8Rng, build: PieceDimensions) -> PieceFrame {
     let bounds = floor.bounds();
     let facing = Heading::ALL[rng.random_range(0..4u32) as usize];
     let origin = [0, 1].map(|axis| pick(rng, [bounds.min[axis] + 300, bounds.max[axis] - 300], 25));
-    let site = Site { origin, facing, floor: super::floor::FLOOR };
+    let site = PieceFrame { origin, facing, floor: super::floor::FLOOR };
     site.moved(-build.width / 2, -build.depth / 2)
 }
 

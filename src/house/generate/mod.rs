@@ -8,7 +8,7 @@ mod floor;
 mod furnish;
 mod pieces;
 mod rooms;
-mod site;
+mod piece_frame;
 mod tasks;
 
 pub use tasks::task;

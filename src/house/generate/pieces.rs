@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use super::builder::{Builder, INSET, inset, surface, top};
 use super::counters::{cabinet, drawer, vanity};
 use super::floor::pick;
-use super::site::Site;
+use super::piece_frame::PieceFrame;
 use crate::domain::scene::Surface;
 
 /// How large a piece is, in millimetres, and what its front and top have.
@@ -24,7 +24,7 @@ pub(crate) struct PieceDimensions {
 }
 
 /// Builds a piece that stands on the floor.
-pub(crate) fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
+pub(crate) fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, build: PieceDimensions) {
     match kind {
         "Vanity" => vanity(out, rng, site, build.width, build.depth, build.height),
         "Bed" => bed(out, site, build),
@@ -42,7 +42,7 @@ pub(crate) fn stand(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: S
 }
 
 /// A box with a top to put things on: tables, desks, dressers, stands.
-fn table(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+fn table(kind: &str, out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, drawers, lamp: lit } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let mut surface = top(&body);
@@ -75,7 +75,7 @@ fn table(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
 }
 
 /// A seat with a back, and with arms.
-fn seat(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+fn seat(kind: &str, out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let back = 200;
     let arm = 130;
@@ -90,7 +90,7 @@ fn seat(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
     out.add(kind, site.point(width / 2, 0, depth / 2), site.facing, body, vec![seat]);
 }
 
-fn bed(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn bed(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let body =
         vec![site.cuboid([0, width], [0, height], [60, depth]), site.cuboid([0, width], [0, height + 400], [0, 60])];
@@ -98,7 +98,7 @@ fn bed(out: &mut Builder, site: Site, build: PieceDimensions) {
     out.add("Bed", site.point(width / 2, 0, depth / 2), site.facing, body, vec![lying]);
 }
 
-fn toilet(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn toilet(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let body =
         vec![site.cuboid([30, width - 30], [0, 420], [180, depth]), site.cuboid([0, width], [0, height], [0, 190])];
@@ -106,14 +106,14 @@ fn toilet(out: &mut Builder, site: Site, build: PieceDimensions) {
     out.add("Toilet", site.point(width / 2, 0, depth / 2), site.facing, body, vec![tank]);
 }
 
-fn tub(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn tub(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 130, inset(site.rect([0, width], [0, depth]), 200));
     out.add("Bathtub", site.point(width / 2, 140, depth / 2), site.facing, vec![body], vec![ground]);
 }
 
-fn bin(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn bin(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 60, inset(site.rect([0, width], [0, depth]), 80));
@@ -121,26 +121,26 @@ fn bin(out: &mut Builder, site: Site, build: PieceDimensions) {
 }
 
 /// A box with a door: a safe.
-fn shell(kind: &str, out: &mut Builder, site: Site, build: PieceDimensions) {
+fn shell(kind: &str, out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let body = site.cuboid([0, width], [0, height], [0, depth]);
     let ground = surface(site.floor + 50, site.rect([110, width - 110], [depth / 2, depth - 100]));
     out.add(kind, site.point(width / 2, height / 2, depth / 2), site.facing, vec![body], vec![ground]);
 }
 
-fn lamp(kind: &str, out: &mut Builder, site: Site, width: i32, height: i32) {
+fn lamp(kind: &str, out: &mut Builder, site: PieceFrame, width: i32, height: i32) {
     lamp_at(out, site, kind, [width / 2, width / 2], 0, width, height);
 }
 
 /// A lamp of that width and height around (u, v), standing at height `y`.
-fn lamp_at(out: &mut Builder, site: Site, kind: &str, [u, v]: [i32; 2], y: i32, width: i32, height: i32) {
+fn lamp_at(out: &mut Builder, site: PieceFrame, kind: &str, [u, v]: [i32; 2], y: i32, width: i32, height: i32) {
     let half = width / 2;
     let body = site.cuboid([u - half, u + half], [y, y + height], [(v - half).max(0), v + half]);
     out.add(kind, site.point(u, y, v), site.facing, vec![body], vec![]);
 }
 
 /// A rack: one Shelf for each board.
-fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDimensions) {
+fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let boards = (build.drawers.max(1)).min(height / 250 + 1);
     let low = if boards == 1 { height } else { pick(rng, [150, 300], 25).min(height) };
@@ -154,7 +154,7 @@ fn shelves(out: &mut Builder, rng: &mut ChaCha8Rng, site: Site, build: PieceDime
 }
 
 /// A tall cupboard with two doors.
-fn wardrobe(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn wardrobe(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     for half in 0..2 {
         let u = [width * half / 2 + 5, width * (half + 1) / 2 - 5];
@@ -163,7 +163,7 @@ fn wardrobe(out: &mut Builder, site: Site, build: PieceDimensions) {
     }
 }
 
-fn cart(out: &mut Builder, site: Site, build: PieceDimensions) {
+fn cart(out: &mut Builder, site: PieceFrame, build: PieceDimensions) {
     let PieceDimensions { width, depth, height, .. } = build;
     let boards = [230, height];
     let body = boards.map(|y| site.cuboid([0, width], [y - 30, y], [0, depth]));
@@ -173,7 +173,7 @@ fn cart(out: &mut Builder, site: Site, build: PieceDimensions) {
 }
 
 /// Something that hangs on the wall around u = 0: a holder of towels or of paper.
-pub(crate) fn hang(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: Site) {
+pub(crate) fn hang(kind: &str, out: &mut Builder, rng: &mut ChaCha8Rng, site: PieceFrame) {
     let (half, y, deep) = match kind {
         "ToiletPaperHanger" => (70, pick(rng, [650, 900], 25), 90),
         "HandTowelHolder" => (140, pick(rng, [1450, 1600], 25), 70),

@@ -15,7 +15,7 @@ use crate::house::House;
 use crate::house::expert::Expert;
 use crate::house::grading::{Grader, Grading};
 use crate::language::phrases::origins;
-use crate::language::story::Story;
+use crate::language::task_wording::TaskWording;
 
 /// How many chains are drawn before a house is given up for a length.
 const DRAWS: usize = 60;
@@ -42,7 +42,7 @@ pub fn task(scene: &Scene, world: &World, reference: SceneRef, length: usize, rn
         let start = start(scene, world, &chain, rng)?;
         let Solved { chain, steps } = solve(&shared, start.clone(), chain).ok()?;
         let origins = origins(scene, &start, &chain.roles);
-        let story = Story { roles: &chain.roles, subtasks: &chain.subtasks, origins: &origins };
+        let story = TaskWording { roles: &chain.roles, subtasks: &chain.subtasks, origins: &origins };
         let (instruction, sentences) = (story.instruction(rng), story.sentences(rng));
         Some(Task {
             id: format!("{}-{length}-{:08x}", scene.name, rng.random::<u32>()),

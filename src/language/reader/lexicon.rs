@@ -269,7 +269,7 @@ mod tests {
             include_str!("forbidden.rs"),
             include_str!("pronouns.rs"),
             include_str!("switching.rs"),
-            include_str!("told.rs"),
+            include_str!("details.rs"),
             include_str!("unread.rs"),
             include_str!("features.rs"),
         ];

@@ -1,6 +1,6 @@
 //! Reads a wish: typed text as an ordered list of subtasks, with how sure that is and what was not understood.
 
-pub(crate) mod asked;
+pub(crate) mod answered_by_model;
 mod clause;
 pub mod clauses;
 pub mod features;
@@ -16,7 +16,7 @@ mod forbidden;
 mod pronouns;
 mod reading;
 mod switching;
-mod told;
+mod details;
 mod units;
 mod unread;
 

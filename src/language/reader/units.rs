@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use super::answers::{ALTERNATIVES, Answer, alternatives, ranked, set_all_apart};
 use super::clauses::{Chunk, Clause, clauses};
 use super::corrections::corrected;
+use super::details::Details;
 use super::features::{
     Before, are_about_different_things, are_in_two_places, do_not_mix, features, in_pieces, named_outright, places,
     speaks_of,
@@ -16,7 +17,6 @@ use super::reading::{ReadSubtask, WishReading};
 use super::shape::Shape;
 use super::spelling::Spelling;
 use super::tokens::{Token, Typed, tokens};
-use super::told::Told;
 use super::unread::{Part, is_foreign, is_means, says_nothing, unread};
 use crate::domain::skill::SkillKind;
 use crate::domain::{Class, Instance, Scene, World};
@@ -194,7 +194,7 @@ impl Reader {
         let may = |shape: Shape| match shape {
             Shape::Many => false,
             Shape::Stack => place && one_place,
-            Shape::Changed(kind) => place && goes_elsewhere(clauses, kind),
+            Shape::Changed(kind) => place && is_remote(clauses, kind),
             Shape::Two | Shape::One(SkillKind::Put) => place,
             Shape::Look => thing,
             Shape::One(_) => true,
@@ -210,7 +210,7 @@ impl Reader {
         let house = context.house;
         path.probability *= score.exp();
         let [thing, place] = named_outright(clauses);
-        let told = Told::of(clauses, house);
+        let told = Details::of(clauses, house);
         let evidence = |class: Class| {
             let lies = context.lies.iter().any(|(thing, place)| *thing == class && told.places.contains(place));
             let known = path.read.iter().chain(context.before).any(|read| read.object == Some(class));
@@ -344,7 +344,7 @@ fn says_only_it(clauses: &[Clause]) -> bool {
 }
 
 /// Whether a place is spoken of besides the one where a thing is changed: "chill it in the fridge" puts nothing anywhere.
-fn goes_elsewhere(clauses: &[Clause], kind: SkillKind) -> bool {
+fn is_remote(clauses: &[Clause], kind: SkillKind) -> bool {
     let says = |lemma: &str, pieces: &[Chunk]| {
         let mut heads = places(pieces).filter_map(Chunk::head);
         lemma == "put" || heads.any(|head| !head.classes.iter().any(|class| is_means(kind, *class)))

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::nouns::Noun;
 use super::outcome::{ChainOutcome, outcomes};
 use super::passage::{Passage, Summarizer, Summary, TakeSummary};
-use super::story::Story;
+use super::task_wording::TaskWording;
 use crate::domain::skill::SkillKind;
 
 /// No summary has more words.
@@ -66,7 +66,7 @@ enum DetailLevel {
 }
 
 struct SummaryBuilder<'a> {
-    story: Story<'a>,
+    story: TaskWording<'a>,
     nouns: Vec<Noun>,
     manner: DetailLevel,
     rng: RefCell<ChaCha8Rng>,
@@ -74,7 +74,7 @@ struct SummaryBuilder<'a> {
 
 impl<'a> SummaryBuilder<'a> {
     fn new(passage: &Passage<'a>, manner: DetailLevel, rng: ChaCha8Rng) -> SummaryBuilder<'a> {
-        let story = Story { roles: passage.roles, subtasks: passage.subtasks, origins: &[] };
+        let story = TaskWording { roles: passage.roles, subtasks: passage.subtasks, origins: &[] };
         let mut builder = SummaryBuilder { story, nouns: Vec::new(), manner, rng: RefCell::new(rng) };
         builder.nouns = (0..passage.roles.len() as u8).map(|role| builder.noun(passage, role)).collect();
         builder

@@ -19,7 +19,7 @@ use crate::house::expert::TurnTiming;
 use crate::house::grading::Grading;
 use crate::house::view::Candidate;
 use crate::language::phrases;
-use crate::language::story::Story;
+use crate::language::task_wording::TaskWording;
 
 /// The longest run of random actions, in steps.
 const LONGEST: u32 = 4;
@@ -90,7 +90,7 @@ pub(crate) fn phrasings(
 ) -> Vec<Annotation> {
     let Task { roles, subtasks, .. } = task;
     let origins = phrases::origins(scene, start, roles);
-    let story = Story { roles, subtasks, origins: &origins };
+    let story = TaskWording { roles, subtasks, origins: &origins };
     let annotate = |_| Annotation { goal: story.instruction(rng), steps: story.sentences(rng) };
     (0..times.max(1)).map(annotate).collect()
 }

@@ -122,7 +122,7 @@ pub(crate) fn run(screen: AnnotateScreen, session: AnnotationSession, scenes: Sc
             Msg::StopAsked => display.stop()?,
             Msg::Continued => display.go_on()?,
             Msg::Signal(number) => break ExitReason::Signal(number),
-            Msg::Mouse(_) | Msg::Resize(_) | Msg::Session(_) | Msg::Elsewhere(_) | Msg::WorkerGone => {}
+            Msg::Mouse(_) | Msg::Resize(_) | Msg::Session(_) | Msg::Remote(_) | Msg::WorkerGone => {}
         }
     };
     drop(guard);

@@ -16,11 +16,11 @@ use ratatui::layout::Size;
 use crate::explore::session::{SessionCommand, SessionEvent};
 use crate::explore::verb::Verb;
 use crate::tui::app::App;
-use crate::tui::elsewhere::OwnEvent;
 use crate::tui::graphics::Picture;
 use crate::tui::keys;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
+use crate::tui::remote::RemoteEvent;
 use on_event::on_event;
 
 /// Something that happened.
@@ -51,7 +51,7 @@ pub enum Msg {
     /// The worker stopped.
     WorkerGone,
     /// An exploration of an environment with actions of its own tells something.
-    Elsewhere(Box<OwnEvent>),
+    Remote(Box<RemoteEvent>),
 }
 
 /// Changes the state by one message.
@@ -140,7 +140,7 @@ pub(crate) fn update(app: &mut App, msg: Msg) -> Vec<Effect> {
         Msg::Signal(number) => vec![Effect::Quit(ExitReason::Signal(number))],
         Msg::WorkerGone => vec![Effect::Quit(ExitReason::WorkerGone)],
         // It has a screen of its own.
-        Msg::Elsewhere(_) => vec![],
+        Msg::Remote(_) => vec![],
     }
 }
 

@@ -11,7 +11,7 @@ use crate::agent::Decision;
 use crate::domain::Task;
 use crate::env::Environment;
 use crate::env::observation::Picture;
-use crate::env::remote::{Elsewhere, RemoteEnvironment, Sessions};
+use crate::env::remote::{RemoteEnvironment, RemoteSettings, Sessions};
 use crate::house::House;
 use crate::house::view::Frame;
 
@@ -20,9 +20,9 @@ impl FrameSequence {
     ///
     /// # Errors
     /// When the environment cannot be reached, or shows something else than was recorded.
-    pub(crate) fn elsewhere(task: &Task, episode: &Episode, elsewhere: Elsewhere) -> anyhow::Result<FrameSequence> {
-        let (name, seed) = task.played_elsewhere().context("the task names no environment")?;
-        let env = RemoteEnvironment::begin(Sessions::new(elsewhere).get(0, name)?, seed)?;
+    pub(crate) fn remote(task: &Task, episode: &Episode, remote: RemoteSettings) -> anyhow::Result<FrameSequence> {
+        let (name, seed) = task.remote_episode().context("the task names no environment")?;
+        let env = RemoteEnvironment::begin(Sessions::new(remote).get(0, name)?, seed)?;
         let is_same = env.fingerprint().as_ref() == Some(&episode.start_hash);
         ensure!(is_same, "task {:?}: {name} begins otherwise than was recorded", episode.task);
         let mut rollout = Rollout::new(env, episode.instruction.clone(), None);
@@ -60,7 +60,7 @@ impl FrameSequence {
     }
 }
 
-fn subtasks(view: &crate::env::own_view::OwnView<'_>) -> Vec<String> {
+fn subtasks(view: &crate::env::remote_view::RemoteView<'_>) -> Vec<String> {
     view.observation.subtasks.iter().map(|subtask| subtask.text.clone()).collect()
 }
 

@@ -8,7 +8,7 @@ use super::lexicon::lexicon;
 use crate::domain::Class;
 
 /// What a unit says besides its skill and classes.
-pub(super) struct Told {
+pub(super) struct Details {
     /// Words before the noun.
     pub looks: Vec<String>,
     /// Where it is said to be.
@@ -19,13 +19,13 @@ pub(super) struct Told {
     pub takes_first: bool,
 }
 
-impl Told {
-    pub(super) fn of(clauses: &[Clause], house: Option<&BTreeSet<Class>>) -> Told {
+impl Details {
+    pub(super) fn of(clauses: &[Clause], house: Option<&BTreeSet<Class>>) -> Details {
         let doing: Vec<&Clause> =
             clauses.iter().filter(|clause| !matches!(clause.lemma, "" | "go" | "wait" | "open" | "close")).collect();
         let takes_first = doing.len() > 1 && doing[0].lemma == "take";
         let Some(clause) = doing.first().copied().or(clauses.first()) else {
-            return Told { looks: Vec::new(), place: None, places: Vec::new(), takes_first };
+            return Details { looks: Vec::new(), place: None, places: Vec::new(), takes_first };
         };
         let pieces = chunks(clause);
         let thing = direct(clause.lemma, &pieces).or(pieces.first());
@@ -36,7 +36,7 @@ impl Told {
         let heads: Vec<_> = places.filter_map(Chunk::head).filter(|head| head.is_name()).collect();
         let place = heads.iter().find_map(|head| one_meant(&head.text, head.classes, house));
         let places = heads.first().map_or_else(Vec::new, |head| head.classes.to_vec());
-        Told { looks, place, places, takes_first }
+        Details { looks, place, places, takes_first }
     }
 }
 

@@ -8,12 +8,12 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::keys::KEYS;
 use super::layout::{Areas, areas};
-use super::state::{OwnApp, OwnMode, Typed};
-use crate::explore::elsewhere::view::{OwnChoice, OwnPicture, StepMark};
+use super::state::{RemoteApp, RemoteMode, Typed};
+use crate::explore::remote::view::{RemoteChoice, RemotePicture, StepMark};
 use crate::tui::theme::THEME;
 use crate::tui::view::panel::{fit, panel, wrap};
 
-impl Widget for &OwnApp {
+impl Widget for &RemoteApp {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let places = areas(area);
         match &self.shown {
@@ -21,7 +21,7 @@ impl Widget for &OwnApp {
             Some(shown) => self.page(shown, &places, buf),
         }
         self.waits(&places, buf);
-        if self.mode == OwnMode::Help {
+        if self.mode == RemoteMode::Help {
             help(area, buf);
         }
         self.scheme.paint(buf);
@@ -46,8 +46,8 @@ fn line(buf: &mut Buffer, area: Rect, spans: Vec<Span<'_>>) {
     Line::from(spans).render(area, buf);
 }
 
-impl OwnApp {
-    fn page(&self, shown: &OwnPicture, places: &Areas, buf: &mut Buffer) {
+impl RemoteApp {
+    fn page(&self, shown: &RemotePicture, places: &Areas, buf: &mut Buffer) {
         let who = format!("{} acts{}", shown.policy, if self.is_running { ", running" } else { "" });
         let name = format!("{}, seed {}", shown.name, shown.seed);
         let width = usize::from(places.head.width);
@@ -76,7 +76,7 @@ impl OwnApp {
         };
         line(buf, below, vec![Span::styled(fit(&exact.content, usize::from(below.width)), exact.style)]);
         let hints: &[&str] = match self.mode {
-            OwnMode::Choosing => &["? keys", "j k choose", "Enter does it", "m watches"],
+            RemoteMode::Choosing => &["? keys", "j k choose", "Enter does it", "m watches"],
             _ => &[
                 "? keys",
                 "q leave",
@@ -93,12 +93,12 @@ impl OwnApp {
         line(buf, places.keys, vec![Span::styled(whole(hints, usize::from(places.keys.width)), THEME.quiet)]);
     }
 
-    fn told(&self, shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
+    fn told(&self, shown: &RemotePicture, area: Rect, buf: &mut Buffer) {
         let typing = match self.mode {
-            OwnMode::Typing(Typed::Instruction) => Some("tell: "),
-            OwnMode::Typing(Typed::Comparison) => Some("compare with: "),
-            OwnMode::Typing(Typed::Condition) => Some("stop at: "),
-            OwnMode::Typing(Typed::Command) => Some(": "),
+            RemoteMode::Typing(Typed::Instruction) => Some("tell: "),
+            RemoteMode::Typing(Typed::Comparison) => Some("compare with: "),
+            RemoteMode::Typing(Typed::Condition) => Some("stop at: "),
+            RemoteMode::Typing(Typed::Command) => Some(": "),
             _ => None,
         };
         if let Some(label) = typing {
@@ -113,12 +113,12 @@ impl OwnApp {
         line(buf, area, vec![Span::styled(label, THEME.quiet), Span::styled(words, THEME.instruction)]);
     }
 
-    fn seen(&self, shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
+    fn seen(&self, shown: &RemotePicture, area: Rect, buf: &mut Buffer) {
         let size = shown.observation.picture.as_ref().map(|seen| format!("{} x {}", seen.width, seen.height));
         let inside = panel(buf, area, "seen", &size.unwrap_or_default());
         if let Some(picture) = &self.picture {
             // What floats over the cells would hide the list of keys.
-            if !(self.mode == OwnMode::Help && self.graphics.protocol.floats()) {
+            if !(self.mode == RemoteMode::Help && self.graphics.protocol.floats()) {
                 picture.render(inside, buf);
             }
             return;
@@ -133,7 +133,7 @@ impl OwnApp {
         }
     }
 
-    fn choices(&self, shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
+    fn choices(&self, shown: &RemotePicture, area: Rect, buf: &mut Buffer) {
         let parts = shown.observation.subtasks.len() as u16;
         let things = shown.observation.things.len() as u16;
         let below = (parts + if parts > 0 { 1 } else { 0 } + if things > 0 { 2 } else { 0 }).min(area.height / 2);
@@ -142,10 +142,10 @@ impl OwnApp {
         let inside = panel(buf, upper, "actions", &right);
         let height = usize::from(inside.height);
         let first =
-            if self.mode == OwnMode::Choosing { self.marked.saturating_sub(height.saturating_sub(1)) } else { 0 };
+            if self.mode == RemoteMode::Choosing { self.marked.saturating_sub(height.saturating_sub(1)) } else { 0 };
         let rows = inside.rows().zip(shown.choices.iter().enumerate().skip(first));
         for (row, (place, choice)) in rows {
-            let marked = self.mode == OwnMode::Choosing && place == self.marked;
+            let marked = self.mode == RemoteMode::Choosing && place == self.marked;
             line(buf, row, choice_line(place, choice, marked, usize::from(row.width)));
         }
         let mut rest = Rect { y: upper.bottom(), height: below, ..area };
@@ -177,7 +177,7 @@ impl OwnApp {
     }
 }
 
-fn choice_line(place: usize, choice: &OwnChoice, marked: bool, width: usize) -> Vec<Span<'static>> {
+fn choice_line(place: usize, choice: &RemoteChoice, marked: bool, width: usize) -> Vec<Span<'static>> {
     let number = if place < 9 { format!("{} ", place + 1) } else { "  ".into() };
     let bar = 8;
     let share = choice.probability.unwrap_or(0.0).clamp(0.0, 1.0);
@@ -200,7 +200,7 @@ fn choice_line(place: usize, choice: &OwnChoice, marked: bool, width: usize) -> 
     ]
 }
 
-fn compared(both: &[(String, Vec<OwnChoice>)], area: Rect, buf: &mut Buffer) {
+fn compared(both: &[(String, Vec<RemoteChoice>)], area: Rect, buf: &mut Buffer) {
     let half = area.height / 2;
     for (i, (told, choices)) in both.iter().enumerate() {
         let area = Rect { y: area.y + half * i as u16, height: half, ..area };
@@ -216,7 +216,7 @@ fn compared(both: &[(String, Vec<OwnChoice>)], area: Rect, buf: &mut Buffer) {
 }
 
 /// Each column stands for a stretch of steps; the most telling mark of them is shown.
-fn timeline(shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
+fn timeline(shown: &RemotePicture, area: Rect, buf: &mut Buffer) {
     let label = format!("step {}/{} ", shown.step, shown.length);
     let width = usize::from(area.width).saturating_sub(label.len());
     let steps = shown.marks.len();
@@ -241,7 +241,7 @@ fn timeline(shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
     line(buf, area, spans);
 }
 
-fn last(shown: &OwnPicture, area: Rect, buf: &mut Buffer) {
+fn last(shown: &RemotePicture, area: Rect, buf: &mut Buffer) {
     let mut words = match &shown.taken {
         None => "at the start".to_owned(),
         Some(taken) if taken.outcome == "ok" => taken.action.clone(),

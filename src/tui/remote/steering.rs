@@ -2,25 +2,25 @@
 
 use std::sync::mpsc::Sender;
 
-use super::worker::{OwnEvent, Told};
+use super::worker::{RemoteEvent, Told};
 use crate::control::Order;
-use crate::explore::elsewhere::command::OwnCommand;
+use crate::explore::remote::command::RemoteCommand;
 use crate::explore::steering::ExplorerControl;
 
 /// Orders as commands.
-pub(super) fn obeyed_by(commands: Sender<OwnCommand>) -> impl Fn(Order) -> bool + Send + 'static {
+pub(super) fn obeyed_by(commands: Sender<RemoteCommand>) -> impl Fn(Order) -> bool + Send + 'static {
     move |order| {
         let command = match order {
-            Order::Pause | Order::Stop => OwnCommand::Pause,
-            Order::Resume => OwnCommand::Run,
-            Order::Instruct(text) => OwnCommand::Instruct(text),
+            Order::Pause | Order::Stop => RemoteCommand::Pause,
+            Order::Resume => RemoteCommand::Run,
+            Order::Instruct(text) => RemoteCommand::Instruct(text),
         };
         commands.send(command).is_ok()
     }
 }
 
 /// Tells those who steer the explorer what happens.
-pub(super) fn heard_by(control: &ExplorerControl, event: &OwnEvent) {
+pub(super) fn heard_by(control: &ExplorerControl, event: &RemoteEvent) {
     let Told::Shown(shown, runs, said) = &event.0 else { return };
     let (mut step, mut told) = (shown.step, None);
     control.note(|seen| {

@@ -9,7 +9,7 @@ use crate::domain::skill::{Role, SkillKind, Subtask};
 
 /// What is known of a task when it is put into words.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Story<'a> {
+pub(crate) struct TaskWording<'a> {
     /// The parts that instances play.
     pub(crate) roles: &'a [Role],
     /// The steps, in order.
@@ -18,7 +18,7 @@ pub(crate) struct Story<'a> {
     pub(crate) origins: &'a [Option<Class>],
 }
 
-impl Story<'_> {
+impl TaskWording<'_> {
     /// The role's class.
     pub(super) fn class(&self, role: u8) -> Class {
         self.roles.get(usize::from(role)).map_or(Class::NONE, |role| role.class)

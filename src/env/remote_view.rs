@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use super::action_space::{ActionSpace, ArgumentList};
-use super::observation::{Legal, OwnObservation};
+use super::observation::{Legal, RemoteObservation};
 use crate::domain::Action;
 
 /// What an environment with actions of its own shows now, and what can be done in it.
-pub(crate) struct OwnView<'a> {
+pub(crate) struct RemoteView<'a> {
     /// Everything that can ever be done.
     pub(crate) space: &'a Arc<ActionSpace>,
     /// The present state.
-    pub(crate) observation: &'a OwnObservation,
+    pub(crate) observation: &'a RemoteObservation,
 }
 
 /// An action that is possible now.
@@ -30,7 +30,7 @@ impl Possible {
     }
 }
 
-impl OwnView<'_> {
+impl RemoteView<'_> {
     /// What is asked, in one line; empty where the environment does not say.
     pub(crate) fn mission(&self) -> String {
         let mission = self.observation.mission.as_deref().unwrap_or_default();

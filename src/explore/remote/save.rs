@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use sha2::{Digest, Sha256};
 
-use super::exploration::OwnExploration;
+use super::exploration::RemoteExploration;
 use crate::data::json;
 use crate::domain::{Task, TaskSet};
 use crate::episode::record::{Episode, TraceStep};
@@ -13,7 +13,7 @@ use crate::episode::rollout::EndedBy;
 use crate::explore::explored_run;
 use crate::run_dir::default_path;
 
-impl OwnExploration {
+impl RemoteExploration {
     /// Writes every branch as an episode of a run, into `path` or a new folder.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ impl OwnExploration {
     fn write(&self, path: &Path) -> anyhow::Result<()> {
         let branches = 0..self.tree.branches().len();
         let episodes: Vec<Episode> = branches.map(|branch| self.episode(branch)).collect();
-        let task = |branch: &super::tree::Branch| Task::elsewhere(branch.name.clone(), self.name.clone(), self.seed);
+        let task = |branch: &super::tree::Branch| Task::remote(branch.name.clone(), self.name.clone(), self.seed);
         let tasks = self.tree.branches().iter().map(task).collect();
         let set = TaskSet { format_version: TaskSet::FORMAT, name: "explored".into(), scenes: None, tasks };
         let scenes_hash = json::hex(&Sha256::digest(self.name.to_string()));

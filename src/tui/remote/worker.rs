@@ -4,34 +4,34 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use crate::agent::policy_source::PolicySource;
-use crate::explore::elsewhere::command::OwnCommand;
-use crate::explore::elsewhere::view::{OwnChoice, OwnPicture};
-use crate::explore::elsewhere::{OpenOwn, OwnExploration};
+use crate::explore::remote::command::RemoteCommand;
+use crate::explore::remote::view::{RemoteChoice, RemotePicture};
+use crate::explore::remote::{OpenRemote, RemoteExploration};
 
 /// Steps of a run follow each other no quicker.
 const PACE: Duration = Duration::from_millis(120);
 
 /// What the worker tells.
 #[derive(Clone, Debug)]
-pub struct OwnEvent(pub(super) Told);
+pub struct RemoteEvent(pub(super) Told);
 
 /// The same, for the screen alone.
 #[derive(Clone, Debug)]
 pub(super) enum Told {
     /// What is to be shown now, whether it goes on by itself, and what there is to say: whether it is a complaint, and the words.
-    Shown(Box<OwnPicture>, bool, Option<(bool, String)>),
+    Shown(Box<RemotePicture>, bool, Option<(bool, String)>),
     /// What the policy would do told one thing and another.
-    Compared(Vec<(String, Vec<OwnChoice>)>),
+    Compared(Vec<(String, Vec<RemoteChoice>)>),
     /// It could not be opened.
     Failed(String),
 }
 
 /// Starts the worker.
 pub(super) fn start(
-    open: OpenOwn,
+    open: OpenRemote,
     agent: PolicySource,
-    tell: impl Fn(OwnEvent) -> bool + Send + 'static,
-) -> std::io::Result<Sender<OwnCommand>> {
+    tell: impl Fn(RemoteEvent) -> bool + Send + 'static,
+) -> std::io::Result<Sender<RemoteCommand>> {
     let (commands, inbox) = channel();
     let work = move || match open() {
         Ok(exploration) => {
@@ -39,27 +39,27 @@ pub(super) fn start(
             worker.show(None);
             worker.serve(&inbox);
         }
-        Err(error) => drop(tell(OwnEvent(Told::Failed(format!("{error:#}"))))),
+        Err(error) => drop(tell(RemoteEvent(Told::Failed(format!("{error:#}"))))),
     };
     std::thread::Builder::new().name("worker".into()).spawn(work)?;
     Ok(commands)
 }
 
 struct Worker {
-    exploration: OwnExploration,
+    exploration: RemoteExploration,
     agent: PolicySource,
     is_running: bool,
-    tell: Box<dyn Fn(OwnEvent) -> bool + Send>,
+    tell: Box<dyn Fn(RemoteEvent) -> bool + Send>,
 }
 
 impl Worker {
     fn show(&mut self, said: Option<(bool, String)>) {
         let picture = Box::new(self.exploration.picture());
-        (self.tell)(OwnEvent(Told::Shown(picture, self.is_running, said)));
+        (self.tell)(RemoteEvent(Told::Shown(picture, self.is_running, said)));
     }
 
     /// Obeys, and goes on by itself between commands while it runs, until nobody commands any more.
-    fn serve(&mut self, inbox: &Receiver<OwnCommand>) {
+    fn serve(&mut self, inbox: &Receiver<RemoteCommand>) {
         let mut due = Instant::now();
         loop {
             let command = match self.is_running {
@@ -67,8 +67,8 @@ impl Worker {
                 false => inbox.recv().map_err(|_| RecvTimeoutError::Disconnected),
             };
             match command {
-                Ok(OwnCommand::Compare(text)) => match self.exploration.compared(&text) {
-                    Ok(both) => drop((self.tell)(OwnEvent(Told::Compared(both.into())))),
+                Ok(RemoteCommand::Compare(text)) => match self.exploration.compared(&text) {
+                    Ok(both) => drop((self.tell)(RemoteEvent(Told::Compared(both.into())))),
                     Err(error) => self.show(Some((true, format!("{error:#}")))),
                 },
                 Ok(command) => {
@@ -103,20 +103,20 @@ impl Worker {
         Some((false, format!("stopped at: {stopped}")))
     }
 
-    fn obey(&mut self, command: OwnCommand) -> anyhow::Result<Option<String>> {
+    fn obey(&mut self, command: RemoteCommand) -> anyhow::Result<Option<String>> {
         let exploration = &mut self.exploration;
-        let runs_on = matches!(command, OwnCommand::Break(_) | OwnCommand::Instruct(_) | OwnCommand::Save(_));
+        let runs_on = matches!(command, RemoteCommand::Break(_) | RemoteCommand::Instruct(_) | RemoteCommand::Save(_));
         self.is_running &= runs_on;
         match command {
-            OwnCommand::Run => {
+            RemoteCommand::Run => {
                 anyhow::ensure!(
                     exploration.end().is_none(),
                     "the episode is over: h goes back, r to the start, N to the next one"
                 );
                 self.is_running = true;
             }
-            OwnCommand::Pause | OwnCommand::Quit | OwnCommand::Look | OwnCommand::Compare(_) => {}
-            OwnCommand::Step(count) => {
+            RemoteCommand::Pause | RemoteCommand::Quit | RemoteCommand::Look | RemoteCommand::Compare(_) => {}
+            RemoteCommand::Step(count) => {
                 for _ in 0..count {
                     let taken = exploration.step()?;
                     if exploration.end().is_some() {
@@ -127,42 +127,41 @@ impl Worker {
                     }
                 }
             }
-            OwnCommand::Move(by) => {
+            RemoteCommand::Move(by) => {
                 let step = i64::from(exploration.tree().present().step) + by;
                 exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
             }
-            OwnCommand::Goto(step) => {
+            RemoteCommand::Goto(step) => {
                 let last = exploration.tree().length();
                 anyhow::ensure!(step <= last || step == u32::MAX, "there is no step {step}: the branch ends at {last}");
                 exploration.seek(step);
             }
-            OwnCommand::Act(text) => {
+            RemoteCommand::Act(text) => {
                 let action = exploration.action(&text)?;
                 let taken = exploration.act(action)?;
                 return Ok(taken.forked.map(|branch| format!("branch {branch} begins")));
             }
-            OwnCommand::Instruct(text) => exploration.instruct(&text)?,
-            OwnCommand::Chance => exploration.choose(PolicySource::random())?,
-            OwnCommand::Agent => exploration.choose(self.agent.clone())?,
-            OwnCommand::Begin(seed) => exploration.begin(seed)?,
-            OwnCommand::Next => exploration.begin(exploration.seed().wrapping_add(1))?,
-            OwnCommand::Reset => exploration.seek(0),
-            OwnCommand::Branch(number) => exploration.switch(number.wrapping_sub(1))?,
-            OwnCommand::Branches => {
+            RemoteCommand::Instruct(text) => exploration.instruct(&text)?,
+            RemoteCommand::Chance => exploration.choose(PolicySource::random())?,
+            RemoteCommand::Agent => exploration.choose(self.agent.clone())?,
+            RemoteCommand::Begin(seed) => exploration.begin(seed)?,
+            RemoteCommand::Next => exploration.begin(exploration.seed().wrapping_add(1))?,
+            RemoteCommand::Reset => exploration.seek(0),
+            RemoteCommand::Branch(number) => exploration.switch(number.wrapping_sub(1))?,
+            RemoteCommand::Branches => {
                 let tree = exploration.tree();
-                let named =
-                    |branch: &crate::explore::elsewhere::tree::Branch| format!("{}: {}", branch.name, branch.why);
+                let named = |branch: &crate::explore::remote::tree::Branch| format!("{}: {}", branch.name, branch.why);
                 let names: Vec<String> = tree.branches().iter().map(named).collect();
                 return Ok(Some(names.join("; ")));
             }
-            OwnCommand::Break(condition) => {
+            RemoteCommand::Break(condition) => {
                 let known = exploration.conditions.iter().position(|known| *known == condition);
                 match known {
                     Some(at) => drop(exploration.conditions.remove(at)),
                     None => exploration.conditions.push(condition),
                 }
             }
-            OwnCommand::Save(path) => return exploration.save(path).map(Some),
+            RemoteCommand::Save(path) => return exploration.save(path).map(Some),
         }
         Ok(None)
     }

@@ -15,7 +15,7 @@ use crate::run_dir::reader::RecordedRun;
 /// # Errors
 /// When the environment cannot be reached, or fails.
 pub(super) fn retrace(run: &RecordedRun, episode: &Episode, sessions: &mut Sessions) -> anyhow::Result<Agreement> {
-    let (name, seed) = run.task(episode)?.played_elsewhere().context("the task names no environment")?;
+    let (name, seed) = run.task(episode)?.remote_episode().context("the task names no environment")?;
     let env = RemoteEnvironment::begin(sessions.get(0, name)?, seed)?;
     let mut agreement = Agreement::default();
     let start = env.fingerprint().unwrap_or_default();

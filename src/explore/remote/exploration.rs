@@ -4,27 +4,27 @@ use std::sync::Arc;
 
 use anyhow::Context;
 
-use super::breakpoint::OwnCondition;
-use super::tree::{MOST, OwnTree, State, Taken};
+use super::breakpoint::RemoteCondition;
+use super::tree::{MOST, RemoteTree, State, Taken};
 use crate::agent::DecisionOverride;
 use crate::agent::policy_place::{self, PolicyPlace};
 use crate::agent::policy_source::PolicySource;
 use crate::agent::{Decision, Observation, Policy, PolicyState};
 use crate::domain::{Action, EnvironmentName};
 use crate::env::Environment;
-use crate::env::own_view::{OwnView, Possible};
-use crate::env::remote::{Elsewhere, RemoteEnvironment, Sessions};
+use crate::env::remote::{RemoteEnvironment, RemoteSettings, Sessions};
+use crate::env::remote_view::{Possible, RemoteView};
 use crate::episode::record::{Author, TraceStep};
 use crate::episode::rollout::{Rollout, Tick};
 use crate::language::instruction;
 
 /// An episode in an environment with actions of its own.
-pub(crate) struct OwnExploration {
+pub(crate) struct RemoteExploration {
     pub(super) sessions: Sessions,
     pub(super) name: EnvironmentName,
     pub(super) seed: u64,
     pub(super) rollout: Rollout<RemoteEnvironment>,
-    pub(super) tree: OwnTree,
+    pub(super) tree: RemoteTree,
     /// The state that the environment is in.
     pub(super) real: usize,
     /// Taking the same actions again showed something else from that step on.
@@ -40,11 +40,11 @@ pub(crate) struct OwnExploration {
     /// How many states a run folder holds already.
     pub(super) saved: usize,
     /// When a run stops.
-    pub(crate) conditions: Vec<OwnCondition>,
+    pub(crate) conditions: Vec<RemoteCondition>,
 }
 
 /// Opens an exploration, on whichever thread it lives.
-pub(crate) type OpenOwn = Box<dyn FnOnce() -> anyhow::Result<OwnExploration> + Send>;
+pub(crate) type OpenRemote = Box<dyn FnOnce() -> anyhow::Result<RemoteExploration> + Send>;
 
 /// Who acts.
 struct Acting {
@@ -56,7 +56,7 @@ struct Acting {
 
 /// What came of a step.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct OwnStepTaken {
+pub(crate) struct RemoteStepTaken {
     /// Which step, from 1.
     pub(crate) step: u32,
     /// In words.
@@ -71,7 +71,7 @@ pub(crate) struct OwnStepTaken {
     pub(crate) forked: Option<String>,
 }
 
-impl OwnStepTaken {
+impl RemoteStepTaken {
     /// The step in a line.
     pub(crate) fn in_words(&self) -> String {
         let reward =
@@ -87,25 +87,25 @@ fn author_of(source: &PolicySource, seed: u64) -> Author {
     Author { policy: source.name.clone(), checkpoint, seed, sampling: false, deciding: DecisionOverride::default() }
 }
 
-impl OwnExploration {
+impl RemoteExploration {
     /// Begins the episode of that seed.
     ///
     /// # Errors
     /// When the environment cannot be reached, or the policy has no use for its actions.
     pub(crate) fn new(
         name: &EnvironmentName,
-        elsewhere: Elsewhere,
+        remote: RemoteSettings,
         source: PolicySource,
         seed: u64,
         told: Option<&str>,
-    ) -> anyhow::Result<OwnExploration> {
-        let mut sessions = Sessions::new(elsewhere);
+    ) -> anyhow::Result<RemoteExploration> {
+        let mut sessions = Sessions::new(remote);
         let mut env = RemoteEnvironment::begin(sessions.get(0, name)?, seed)?;
         let places = source.place().into_iter().collect();
         let acting = Acting::new(source, seed, &mut env)?;
         let rollout = Rollout::new(env, String::new(), None);
-        let tree = OwnTree::new(start_state(&rollout, &acting)?);
-        let mut exploration = OwnExploration {
+        let tree = RemoteTree::new(start_state(&rollout, &acting)?);
+        let mut exploration = RemoteExploration {
             sessions,
             name: name.clone(),
             seed,
@@ -144,7 +144,7 @@ impl OwnExploration {
         self.acting.author.seed = seed;
         self.acting.decided = None;
         self.acting.policy.reset(0, seed);
-        self.tree = OwnTree::new(start_state(&rollout, &self.acting)?);
+        self.tree = RemoteTree::new(start_state(&rollout, &self.acting)?);
         (self.rollout, self.seed, self.real, self.saved) = (rollout, seed, 0, 1);
         (self.differs_at, self.was_retraced, self.redirected) = (None, false, false);
         self.instruction = self.mission().into();
@@ -167,7 +167,7 @@ impl OwnExploration {
     }
 
     /// What was tried.
-    pub(crate) fn tree(&self) -> &OwnTree {
+    pub(crate) fn tree(&self) -> &RemoteTree {
         &self.tree
     }
 
@@ -189,7 +189,7 @@ impl OwnExploration {
     /// Everything that can be done in the state in hand.
     pub(crate) fn possible(&self) -> Vec<Action> {
         let Some(view) = self.rollout.env.own() else { return Vec::new() };
-        let shown = OwnView { space: view.space, observation: &self.tree.present().observation };
+        let shown = RemoteView { space: view.space, observation: &self.tree.present().observation };
         shown.possible().iter().flat_map(Possible::actions).collect()
     }
 
@@ -293,7 +293,7 @@ impl OwnExploration {
     ///
     /// # Errors
     /// When the episode is over, or something fails.
-    pub(crate) fn step(&mut self) -> anyhow::Result<OwnStepTaken> {
+    pub(crate) fn step(&mut self) -> anyhow::Result<RemoteStepTaken> {
         if self.follows() {
             self.seek(self.tree.present().step + 1);
             return self.told_of_present().context("no step was taken yet");
@@ -307,13 +307,13 @@ impl OwnExploration {
     ///
     /// # Errors
     /// When the episode is over, or the environment fails.
-    pub(crate) fn act(&mut self, action: Action) -> anyhow::Result<OwnStepTaken> {
+    pub(crate) fn act(&mut self, action: Action) -> anyhow::Result<RemoteStepTaken> {
         // The policy sees this state too, so that it has seen every one; what it cannot decide is no reason not to act.
         let _ = self.decide();
         self.carry_out(Decision::of(action), Author::hand())
     }
 
-    pub(super) fn carry_out(&mut self, decision: Decision, author: Author) -> anyhow::Result<OwnStepTaken> {
+    pub(super) fn carry_out(&mut self, decision: Decision, author: Author) -> anyhow::Result<RemoteStepTaken> {
         if let Some(end) = self.end() {
             anyhow::bail!("the episode is over ({end}): go back, or begin another");
         }
@@ -340,19 +340,26 @@ impl OwnExploration {
         let forked = self.tree.grow(state, || why);
         self.real = self.tree.here();
         self.redirected = false;
-        Ok(OwnStepTaken { step, action: words, outcome: outcome.to_string(), reward, completed: completed_one, forked })
+        Ok(RemoteStepTaken {
+            step,
+            action: words,
+            outcome: outcome.to_string(),
+            reward,
+            completed: completed_one,
+            forked,
+        })
     }
 
     /// What the environment shows where it is.
-    pub(super) fn seen(&self) -> anyhow::Result<crate::env::observation::OwnObservation> {
+    pub(super) fn seen(&self) -> anyhow::Result<crate::env::observation::RemoteObservation> {
         Ok(self.rollout.env.own().context("the environment shows nothing")?.observation.clone())
     }
 
     /// The step that led to the state in hand.
-    pub(crate) fn told_of_present(&self) -> Option<OwnStepTaken> {
+    pub(crate) fn told_of_present(&self) -> Option<RemoteStepTaken> {
         let state = self.tree.present();
         let taken = state.taken.as_ref()?;
-        Some(OwnStepTaken {
+        Some(RemoteStepTaken {
             step: state.step,
             action: taken.words.clone(),
             outcome: taken.record.outcome.to_string(),
@@ -371,7 +378,7 @@ impl OwnExploration {
     }
 
     /// The condition that stops a run in the state in hand.
-    pub(crate) fn stopped_by(&self) -> Option<&OwnCondition> {
+    pub(crate) fn stopped_by(&self) -> Option<&RemoteCondition> {
         self.conditions.iter().find(|condition| condition.holds(self.tree.present()))
     }
 }

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use super::command::OwnCommand;
-use super::exploration::{OwnExploration, OwnStepTaken};
-use super::view::OwnChoice;
+use super::command::RemoteCommand;
+use super::exploration::{RemoteExploration, RemoteStepTaken};
+use super::view::RemoteChoice;
 use crate::agent::policy_source::PolicySource;
 use crate::control::Order;
 use crate::data::text_file;
@@ -30,7 +30,7 @@ struct Plain<'a, W> {
 /// # Errors
 /// When reading or writing fails.
 pub(crate) fn run(
-    mut exploration: OwnExploration,
+    mut exploration: RemoteExploration,
     agent: &PolicySource,
     input: PlainInput,
     control: &ExplorerControl,
@@ -47,19 +47,19 @@ pub(crate) fn run(
             Asked::Over => break,
             Asked::Ordered(Order::Stop) => break,
             Asked::Ordered(Order::Pause) => continue,
-            Asked::Ordered(Order::Resume) => Ok(OwnCommand::Run),
-            Asked::Ordered(Order::Instruct(text)) => Ok(OwnCommand::Instruct(text)),
+            Asked::Ordered(Order::Resume) => Ok(RemoteCommand::Run),
+            Asked::Ordered(Order::Instruct(text)) => Ok(RemoteCommand::Instruct(text)),
             Asked::Line(line) => {
                 let line = line?;
                 let line = text_file::line(&line).trim();
                 if line.is_empty() || line.starts_with('#') {
                     continue;
                 }
-                OwnCommand::parse(line)
+                RemoteCommand::parse(line)
             }
         };
         let done = match command {
-            Ok(OwnCommand::Quit) => break,
+            Ok(RemoteCommand::Quit) => break,
             Ok(command) => plain.obey(&mut exploration, command),
             Err(complaint) => Err(anyhow::anyhow!(complaint)),
         };
@@ -74,56 +74,56 @@ pub(crate) fn run(
 }
 
 impl<W: Write> Plain<'_, W> {
-    fn obey(&mut self, exploration: &mut OwnExploration, command: OwnCommand) -> anyhow::Result<()> {
+    fn obey(&mut self, exploration: &mut RemoteExploration, command: RemoteCommand) -> anyhow::Result<()> {
         let exact_before = exploration.exactness();
         match command {
-            OwnCommand::Step(count) => self.steps(exploration, count)?,
-            OwnCommand::Run => self.steps(exploration, MOST)?,
-            OwnCommand::Pause | OwnCommand::Quit => {}
-            OwnCommand::Move(by) => {
+            RemoteCommand::Step(count) => self.steps(exploration, count)?,
+            RemoteCommand::Run => self.steps(exploration, MOST)?,
+            RemoteCommand::Pause | RemoteCommand::Quit => {}
+            RemoteCommand::Move(by) => {
                 let step = i64::from(exploration.tree().present().step) + by;
                 exploration.seek(step.clamp(0, i64::from(u32::MAX)) as u32);
                 at(exploration, &mut self.out)?;
             }
-            OwnCommand::Goto(step) => {
+            RemoteCommand::Goto(step) => {
                 exploration.seek(step);
                 at(exploration, &mut self.out)?;
             }
-            OwnCommand::Act(text) => {
+            RemoteCommand::Act(text) => {
                 let action = exploration.action(&text)?;
                 let taken = exploration.act(action)?;
                 self.told(exploration, &taken)?;
             }
-            OwnCommand::Instruct(text) => {
+            RemoteCommand::Instruct(text) => {
                 exploration.instruct(&text)?;
                 writeln!(self.out, "told: {}", exploration.instruction())?;
                 self.control.say(format!("told: {}", exploration.instruction()));
             }
-            OwnCommand::Compare(text) => {
+            RemoteCommand::Compare(text) => {
                 for (told, choices) in exploration.compared(&text)? {
                     writeln!(self.out, "told: {told}")?;
                     list(&choices, &mut self.out)?;
                 }
             }
-            OwnCommand::Chance => {
+            RemoteCommand::Chance => {
                 exploration.choose(PolicySource::random())?;
                 writeln!(self.out, "{} acts", exploration.policy())?;
             }
-            OwnCommand::Agent => {
+            RemoteCommand::Agent => {
                 exploration.choose(self.agent.clone())?;
                 writeln!(self.out, "{} acts", exploration.policy())?;
             }
-            OwnCommand::Begin(seed) => begin(exploration, seed, &mut self.out)?,
-            OwnCommand::Next => begin(exploration, exploration.seed().wrapping_add(1), &mut self.out)?,
-            OwnCommand::Reset => {
+            RemoteCommand::Begin(seed) => begin(exploration, seed, &mut self.out)?,
+            RemoteCommand::Next => begin(exploration, exploration.seed().wrapping_add(1), &mut self.out)?,
+            RemoteCommand::Reset => {
                 exploration.seek(0);
                 at(exploration, &mut self.out)?;
             }
-            OwnCommand::Branch(number) => {
+            RemoteCommand::Branch(number) => {
                 exploration.switch(number.wrapping_sub(1))?;
                 at(exploration, &mut self.out)?;
             }
-            OwnCommand::Branches => {
+            RemoteCommand::Branches => {
                 let tree = exploration.tree();
                 for (place, branch) in (1..).zip(tree.branches()) {
                     let mark = if place == tree.branch() + 1 { "*" } else { " " };
@@ -136,7 +136,7 @@ impl<W: Write> Plain<'_, W> {
                     )?;
                 }
             }
-            OwnCommand::Break(condition) => {
+            RemoteCommand::Break(condition) => {
                 let set = exploration.conditions.iter().position(|known| *known == condition);
                 match set {
                     Some(at) => drop(exploration.conditions.remove(at)),
@@ -145,11 +145,11 @@ impl<W: Write> Plain<'_, W> {
                 let all: Vec<String> = exploration.conditions.iter().map(ToString::to_string).collect();
                 writeln!(self.out, "stops at: {}", if all.is_empty() { "nothing".into() } else { all.join(", ") })?;
             }
-            OwnCommand::Save(path) => {
+            RemoteCommand::Save(path) => {
                 let wrote = exploration.save(path)?;
                 writeln!(self.out, "{wrote}")?;
             }
-            OwnCommand::Look => look(exploration, &mut self.out)?,
+            RemoteCommand::Look => look(exploration, &mut self.out)?,
         }
         let exact = exploration.exactness();
         if exact != exact_before {
@@ -158,7 +158,7 @@ impl<W: Write> Plain<'_, W> {
         Ok(())
     }
 
-    fn steps(&mut self, exploration: &mut OwnExploration, count: u32) -> anyhow::Result<()> {
+    fn steps(&mut self, exploration: &mut RemoteExploration, count: u32) -> anyhow::Result<()> {
         for _ in 0..count {
             let taken = exploration.step()?;
             self.told(exploration, &taken)?;
@@ -176,11 +176,11 @@ impl<W: Write> Plain<'_, W> {
     }
 
     /// Hears what is ordered while it runs; whether the run ends here.
-    fn is_paused(&mut self, exploration: &mut OwnExploration) -> anyhow::Result<bool> {
+    fn is_paused(&mut self, exploration: &mut RemoteExploration) -> anyhow::Result<bool> {
         while let Some(order) = self.input.order() {
             match order {
                 Order::Resume => {}
-                Order::Instruct(text) => self.obey(exploration, OwnCommand::Instruct(text))?,
+                Order::Instruct(text) => self.obey(exploration, RemoteCommand::Instruct(text))?,
                 Order::Pause => return Ok(true),
                 Order::Stop => {
                     self.leaves = true;
@@ -192,7 +192,7 @@ impl<W: Write> Plain<'_, W> {
     }
 
     /// Tells those who steer it how it stands.
-    fn note(&self, exploration: &OwnExploration, runs: bool) {
+    fn note(&self, exploration: &RemoteExploration, runs: bool) {
         self.control.note(|seen| {
             (seen.runs, seen.step) = (runs, exploration.tree().present().step);
             seen.instruction = Some(exploration.instruction().to_owned());
@@ -200,7 +200,7 @@ impl<W: Write> Plain<'_, W> {
         });
     }
 
-    fn told(&mut self, exploration: &OwnExploration, taken: &OwnStepTaken) -> anyhow::Result<()> {
+    fn told(&mut self, exploration: &RemoteExploration, taken: &RemoteStepTaken) -> anyhow::Result<()> {
         let mut line = taken.in_words();
         if let Some(branch) = &taken.forked {
             line += &format!("; branch {branch} begins");
@@ -215,20 +215,20 @@ impl<W: Write> Plain<'_, W> {
     }
 }
 
-fn begin(exploration: &mut OwnExploration, seed: u64, out: &mut impl Write) -> anyhow::Result<()> {
+fn begin(exploration: &mut RemoteExploration, seed: u64, out: &mut impl Write) -> anyhow::Result<()> {
     exploration.begin(seed)?;
     writeln!(out, "seed {seed}; told: {}", exploration.instruction())?;
     Ok(())
 }
 
-fn at(exploration: &OwnExploration, out: &mut impl Write) -> anyhow::Result<()> {
+fn at(exploration: &RemoteExploration, out: &mut impl Write) -> anyhow::Result<()> {
     let tree = exploration.tree();
     let branch = &tree.branches()[tree.branch()];
     writeln!(out, "at step {} of {}, branch {}", tree.present().step, tree.length(), branch.name)?;
     Ok(())
 }
 
-fn look(exploration: &mut OwnExploration, out: &mut impl Write) -> anyhow::Result<()> {
+fn look(exploration: &mut RemoteExploration, out: &mut impl Write) -> anyhow::Result<()> {
     let shown = exploration.picture();
     at(exploration, out)?;
     if let Some(text) = &shown.observation.text {
@@ -251,7 +251,7 @@ fn look(exploration: &mut OwnExploration, out: &mut impl Write) -> anyhow::Resul
     Ok(())
 }
 
-fn list(choices: &[OwnChoice], out: &mut impl Write) -> anyhow::Result<()> {
+fn list(choices: &[RemoteChoice], out: &mut impl Write) -> anyhow::Result<()> {
     for choice in choices.iter().take(40) {
         let share = choice.probability.map_or("     ".into(), |share| format!("{share:.3}"));
         writeln!(out, "  {share} {}{}", choice.words, if choice.is_chosen { "  <" } else { "" })?;
@@ -262,14 +262,15 @@ fn list(choices: &[OwnChoice], out: &mut impl Write) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::env::remote::Elsewhere;
+    use crate::env::remote::RemoteSettings;
     use crate::env::remote::testing::{Fault, serve};
     use crate::eval::verify::verify;
     use crate::run_dir::reader::RecordedRun;
 
     fn told(fault: Fault, lines: &str) -> (bool, String) {
         let agent = PolicySource::random();
-        let exploration = OwnExploration::new(&serve(fault), Elsewhere::default(), agent.clone(), 2, None).unwrap();
+        let exploration =
+            RemoteExploration::new(&serve(fault), RemoteSettings::default(), agent.clone(), 2, None).unwrap();
         let mut out = Vec::new();
         let (input, control) = PlainInput::steered(std::io::Cursor::new(lines.to_owned())).unwrap();
         let obeyed = run(exploration, &agent, input, &control, &mut out).unwrap();
@@ -329,7 +330,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         let (name, agent) = (serve(Fault::None), PolicySource::random().at("ws://node7:8000".into()));
-        let mut exploration = OwnExploration::new(&name, Elsewhere::default(), agent.clone(), 2, None).unwrap();
+        let mut exploration = RemoteExploration::new(&name, RemoteSettings::default(), agent.clone(), 2, None).unwrap();
         for _ in 0..3 {
             exploration.step().unwrap();
         }
@@ -341,10 +342,11 @@ mod tests {
         let run = RecordedRun::open(&path, None).unwrap();
         assert_eq!(run.episodes.len(), 2);
         assert_eq!(run.places, Vec::from_iter(agent.place()), "where its policy was is kept");
-        let verdict = verify(&run, &mut |_| Ok(None), 1, &Elsewhere::default(), &mut |_| ()).unwrap();
+        let verdict = verify(&run, &mut |_| Ok(None), 1, &RemoteSettings::default(), &mut |_| ()).unwrap();
         assert!(verdict.is_equal(), "{verdict:?}");
         let (task, author) = (run.task(&run.episodes[1]).unwrap(), run.author(0, &run.episodes[1]));
-        let opened = OwnExploration::open(task, &run.episodes[1], &author, Elsewhere::default(), agent, 2).unwrap();
+        let opened =
+            RemoteExploration::open(task, &run.episodes[1], &author, RemoteSettings::default(), agent, 2).unwrap();
         assert_eq!((opened.tree().present().step, opened.instruction()), (2, "Go home."));
         assert_eq!(opened.exactness(), "exact: by snapshots");
     }

@@ -2,14 +2,14 @@
 
 use anyhow::Context;
 
-use super::exploration::OwnExploration;
+use super::exploration::RemoteExploration;
 use crate::agent::Decision;
 use crate::agent::policy_source::PolicySource;
 use crate::domain::Task;
-use crate::env::remote::Elsewhere;
+use crate::env::remote::RemoteSettings;
 use crate::episode::record::{Author, Episode};
 
-impl OwnExploration {
+impl RemoteExploration {
     /// Takes the steps of a recorded episode again, and stays at that one of them. Where something else is seen than was
     /// recorded, it says so and stays usable.
     ///
@@ -19,17 +19,17 @@ impl OwnExploration {
         task: &Task,
         episode: &Episode,
         author: &Author,
-        elsewhere: Elsewhere,
+        remote: RemoteSettings,
         source: PolicySource,
         step: u32,
-    ) -> anyhow::Result<OwnExploration> {
-        let (name, seed) = task.played_elsewhere().context("the task plays in House")?;
-        let mut exploration = OwnExploration::new(name, elsewhere, source, seed, None)?;
+    ) -> anyhow::Result<RemoteExploration> {
+        let (name, seed) = task.remote_episode().context("the task plays in House")?;
+        let mut exploration = RemoteExploration::new(name, remote, source, seed, None)?;
         if exploration.tree.start().observation.digest != episode.start_hash {
             exploration.differs_at = Some(0);
         }
         let mission = exploration.mission();
-        let tell = |exploration: &mut OwnExploration, text: &str| match text == mission {
+        let tell = |exploration: &mut RemoteExploration, text: &str| match text == mission {
             true => exploration.instruct(""),
             false => exploration.instruct(text),
         };

@@ -6,7 +6,7 @@ use super::tree::State;
 
 /// When to stop.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum OwnCondition {
+pub(crate) enum RemoteCondition {
     /// A part of what is asked was done.
     Subtask,
     /// A step earned something.
@@ -21,20 +21,20 @@ pub(crate) enum OwnCondition {
     Step(u32),
 }
 
-impl OwnCondition {
+impl RemoteCondition {
     /// Reads `subtask`, `reward`, `refused`, `action open`, `sees door` or `step 12`.
     ///
     /// # Errors
     /// Says what conditions there are.
-    pub(crate) fn parse(text: &str) -> Result<OwnCondition, String> {
+    pub(crate) fn parse(text: &str) -> Result<RemoteCondition, String> {
         let (word, rest) = text.trim().split_once(' ').map_or((text.trim(), ""), |(word, rest)| (word, rest.trim()));
         match (word, rest) {
-            ("subtask", "") => Ok(OwnCondition::Subtask),
-            ("reward", "") => Ok(OwnCondition::Reward),
-            ("refused", "") => Ok(OwnCondition::Refused),
-            ("action", name) if !name.is_empty() => Ok(OwnCondition::Action(name.into())),
-            ("sees", name) if !name.is_empty() => Ok(OwnCondition::Sees(name.into())),
-            ("step", number) if number.parse::<u32>().is_ok() => Ok(OwnCondition::Step(number.parse().unwrap_or(0))),
+            ("subtask", "") => Ok(RemoteCondition::Subtask),
+            ("reward", "") => Ok(RemoteCondition::Reward),
+            ("refused", "") => Ok(RemoteCondition::Refused),
+            ("action", name) if !name.is_empty() => Ok(RemoteCondition::Action(name.into())),
+            ("sees", name) if !name.is_empty() => Ok(RemoteCondition::Sees(name.into())),
+            ("step", number) if number.parse::<u32>().is_ok() => Ok(RemoteCondition::Step(number.parse().unwrap_or(0))),
             _ => Err(format!("{text:?} is none of subtask, reward, refused, action NAME, sees NAME, step N")),
         }
     }
@@ -44,28 +44,28 @@ impl OwnCondition {
         let Some(taken) = &state.taken else { return false };
         let record = &taken.record;
         match self {
-            OwnCondition::Subtask => record.subtask.is_some(),
-            OwnCondition::Reward => state.observation.reward.is_some_and(|reward| reward != 0.0),
-            OwnCondition::Refused => !record.outcome.is_done(),
-            OwnCondition::Action(name) => record.own.as_ref().is_some_and(|own| own.action == *name),
-            OwnCondition::Sees(name) => {
+            RemoteCondition::Subtask => record.subtask.is_some(),
+            RemoteCondition::Reward => state.observation.reward.is_some_and(|reward| reward != 0.0),
+            RemoteCondition::Refused => !record.outcome.is_done(),
+            RemoteCondition::Action(name) => record.own.as_ref().is_some_and(|own| own.action == *name),
+            RemoteCondition::Sees(name) => {
                 let name = name.to_lowercase();
                 state.observation.things.iter().any(|thing| thing.name.to_lowercase().contains(&name))
             }
-            OwnCondition::Step(step) => state.step == *step,
+            RemoteCondition::Step(step) => state.step == *step,
         }
     }
 }
 
-impl fmt::Display for OwnCondition {
+impl fmt::Display for RemoteCondition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            OwnCondition::Subtask => f.write_str("subtask"),
-            OwnCondition::Reward => f.write_str("reward"),
-            OwnCondition::Refused => f.write_str("refused"),
-            OwnCondition::Action(name) => write!(f, "action {name}"),
-            OwnCondition::Sees(name) => write!(f, "sees {name}"),
-            OwnCondition::Step(step) => write!(f, "step {step}"),
+            RemoteCondition::Subtask => f.write_str("subtask"),
+            RemoteCondition::Reward => f.write_str("reward"),
+            RemoteCondition::Refused => f.write_str("refused"),
+            RemoteCondition::Action(name) => write!(f, "action {name}"),
+            RemoteCondition::Sees(name) => write!(f, "sees {name}"),
+            RemoteCondition::Step(step) => write!(f, "step {step}"),
         }
     }
 }
@@ -77,10 +77,10 @@ mod tests {
     #[test]
     fn a_condition_reads_as_it_is_written_and_others_are_refused() {
         for text in ["subtask", "reward", "refused", "action open", "sees red ball", "step 12"] {
-            assert_eq!(OwnCondition::parse(text).unwrap().to_string(), text);
+            assert_eq!(RemoteCondition::parse(text).unwrap().to_string(), text);
         }
         for text in ["", "step", "step x", "action", "drop 0.1"] {
-            assert!(OwnCondition::parse(text).unwrap_err().contains("action NAME"), "{text}");
+            assert!(RemoteCondition::parse(text).unwrap_err().contains("action NAME"), "{text}");
         }
     }
 }

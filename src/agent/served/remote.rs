@@ -9,7 +9,7 @@ use super::dialogue::map;
 use crate::agent::decision::Decision;
 use crate::domain::Action;
 use crate::env::action_space::ActionSpace;
-use crate::env::own_view::{OwnView, Possible};
+use crate::env::remote_view::{Possible, RemoteView};
 
 /// The actions, a map each, and the lists of arguments.
 pub(super) fn actions(space: &ActionSpace) -> (Value, Value) {
@@ -49,7 +49,7 @@ fn told(value: &serde_json::Value) -> Value {
 }
 
 /// What stands for each action in the list of what is possible: true, false, or the arguments that it could have.
-pub(super) fn legal(view: &OwnView<'_>) -> Value {
+pub(super) fn legal(view: &RemoteView<'_>) -> Value {
     let possible = view.possible();
     let entry = |place: usize| match possible.iter().find(|one| usize::from(one.action) == place) {
         None => false.into(),
@@ -66,7 +66,7 @@ pub(super) fn legal(view: &OwnView<'_>) -> Value {
 ///
 /// # Errors
 /// Says which field is wrong and what it may be.
-pub(super) fn decision(answer: &Value, view: &OwnView<'_>) -> Result<Decision, String> {
+pub(super) fn decision(answer: &Value, view: &RemoteView<'_>) -> Result<Decision, String> {
     let names: Vec<&str> = view.space.actions().iter().map(|action| action.name.as_str()).collect();
     let possible = view.possible();
     let one = |place: usize| possible.iter().find(|one| usize::from(one.action) == place);
@@ -86,7 +86,7 @@ pub(super) fn decision(answer: &Value, view: &OwnView<'_>) -> Result<Decision, S
 }
 
 /// Adds the argument: the named one, else the likeliest of those that are possible, else the first.
-fn complete(answer: &Value, name: &str, possible: Option<&Possible>, view: &OwnView<'_>) -> anyhow::Result<Action> {
+fn complete(answer: &Value, name: &str, possible: Option<&Possible>, view: &RemoteView<'_>) -> anyhow::Result<Action> {
     if let Some((which, said)) = argument(answer) {
         let value = heard(said).with_context(|| format!("{which}: it is neither text nor a number"))?;
         return view.space.find(name, Some(&value));
@@ -117,11 +117,11 @@ mod tests {
 
     use super::*;
     use crate::env::action_space::tests::space;
-    use crate::env::observation::{Legal, OwnObservation};
+    use crate::env::observation::{Legal, RemoteObservation};
 
     fn decided<const N: usize>(fields: [(&str, Value); N], legal: Option<Vec<Legal>>) -> Result<Decision, String> {
-        let (space, observation) = (Arc::new(space()), OwnObservation { legal, ..OwnObservation::default() });
-        decision(&map(fields), &OwnView { space: &space, observation: &observation })
+        let (space, observation) = (Arc::new(space()), RemoteObservation { legal, ..RemoteObservation::default() });
+        decision(&map(fields), &RemoteView { space: &space, observation: &observation })
     }
 
     fn done<const N: usize>(fields: [(&str, Value); N]) -> String {
@@ -163,12 +163,12 @@ mod tests {
 
     #[test]
     fn a_server_hears_of_lists_and_of_what_is_possible() {
-        let (space, observation) = (Arc::new(space()), OwnObservation::default());
+        let (space, observation) = (Arc::new(space()), RemoteObservation::default());
         let (told, lists) = actions(&space);
         assert_eq!(field(&told.as_array().unwrap()[2], "argument").and_then(|name| name.as_str()), Some("thing"));
         let things = Value::Array(vec!["door".into(), 7.into()]);
         assert_eq!(field(&lists, "thing"), Some(&things));
-        let legal = legal(&OwnView { space: &space, observation: &observation });
+        let legal = legal(&RemoteView { space: &space, observation: &observation });
         assert_eq!(legal, Value::Array(vec![true.into(), true.into(), things, false.into()]));
     }
 }

@@ -5,7 +5,7 @@ use crate::domain::{EnvironmentName, Task, TaskSet};
 /// The episodes of so many seeds, from that one on. The set is called like the environment, as far as a folder's name allows.
 pub(crate) fn set(name: &EnvironmentName, first: u64, count: u32) -> TaskSet {
     let seeds = (0..u64::from(count)).map(|at| first.saturating_add(at));
-    let tasks = seeds.map(|seed| Task::elsewhere(seed.to_string(), name.clone(), seed)).collect();
+    let tasks = seeds.map(|seed| Task::remote(seed.to_string(), name.clone(), seed)).collect();
     let text = match name {
         EnvironmentName::OpenEnv(address) => format!("{}-{}", address.host, address.port),
         EnvironmentName::Gym(id) => id.clone(),

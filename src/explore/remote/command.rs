@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::breakpoint::OwnCondition;
+use super::breakpoint::RemoteCondition;
 
 /// Something that is asked.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum OwnCommand {
+pub(crate) enum RemoteCommand {
     /// Take so many steps, or follow what was tried.
     Step(u32),
     /// Go on until something stops it.
@@ -36,7 +36,7 @@ pub(crate) enum OwnCommand {
     /// Take that branch in hand, from 1.
     Branch(usize),
     /// Stop there, or where it is set already, no longer.
-    Break(OwnCondition),
+    Break(RemoteCondition),
     /// Write a run.
     Save(Option<PathBuf>),
     /// Show what is seen, what can be done, and how likely each is.
@@ -51,12 +51,12 @@ pub(crate) enum OwnCommand {
 pub(crate) const HELP: &str = "step [N], run, back [N], forward [N], goto N, act NAME [ARGUMENT], instruct [TEXT], \
     compare TEXT, chance, agent, begin SEED, next, reset, branch N, branches, break CONDITION, save [FOLDER], look, quit";
 
-impl OwnCommand {
+impl RemoteCommand {
     /// Reads a line.
     ///
     /// # Errors
     /// Says what there is.
-    pub(crate) fn parse(line: &str) -> Result<OwnCommand, String> {
+    pub(crate) fn parse(line: &str) -> Result<RemoteCommand, String> {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).map_or((line, ""), |(word, rest)| (word, rest.trim()));
         let number = |missing: u32| match rest {
@@ -75,25 +75,25 @@ impl OwnCommand {
             return Err(format!("{word}: 0 times is nothing to do"));
         }
         match word {
-            "step" | "n" => Ok(OwnCommand::Step(number(1)?)),
-            "run" => Ok(OwnCommand::Run),
-            "back" | "h" => Ok(OwnCommand::Move(-i64::from(number(1)?))),
-            "forward" | "l" => Ok(OwnCommand::Move(i64::from(number(1)?))),
-            "goto" => Ok(OwnCommand::Goto(needed()?.min(u64::from(u32::MAX)) as u32)),
-            "act" => Ok(OwnCommand::Act(text()?)),
-            "instruct" | "i" => Ok(OwnCommand::Instruct(rest.to_owned())),
-            "compare" => Ok(OwnCommand::Compare(text()?)),
-            "chance" => Ok(OwnCommand::Chance),
-            "agent" => Ok(OwnCommand::Agent),
-            "begin" => Ok(OwnCommand::Begin(needed()?)),
-            "next" => Ok(OwnCommand::Next),
-            "reset" => Ok(OwnCommand::Reset),
-            "branch" => Ok(OwnCommand::Branch(needed()? as usize)),
-            "branches" => Ok(OwnCommand::Branches),
-            "break" => Ok(OwnCommand::Break(OwnCondition::parse(rest)?)),
-            "save" => Ok(OwnCommand::Save((!rest.is_empty()).then(|| rest.into()))),
-            "look" => Ok(OwnCommand::Look),
-            "quit" | "q" => Ok(OwnCommand::Quit),
+            "step" | "n" => Ok(RemoteCommand::Step(number(1)?)),
+            "run" => Ok(RemoteCommand::Run),
+            "back" | "h" => Ok(RemoteCommand::Move(-i64::from(number(1)?))),
+            "forward" | "l" => Ok(RemoteCommand::Move(i64::from(number(1)?))),
+            "goto" => Ok(RemoteCommand::Goto(needed()?.min(u64::from(u32::MAX)) as u32)),
+            "act" => Ok(RemoteCommand::Act(text()?)),
+            "instruct" | "i" => Ok(RemoteCommand::Instruct(rest.to_owned())),
+            "compare" => Ok(RemoteCommand::Compare(text()?)),
+            "chance" => Ok(RemoteCommand::Chance),
+            "agent" => Ok(RemoteCommand::Agent),
+            "begin" => Ok(RemoteCommand::Begin(needed()?)),
+            "next" => Ok(RemoteCommand::Next),
+            "reset" => Ok(RemoteCommand::Reset),
+            "branch" => Ok(RemoteCommand::Branch(needed()? as usize)),
+            "branches" => Ok(RemoteCommand::Branches),
+            "break" => Ok(RemoteCommand::Break(RemoteCondition::parse(rest)?)),
+            "save" => Ok(RemoteCommand::Save((!rest.is_empty()).then(|| rest.into()))),
+            "look" => Ok(RemoteCommand::Look),
+            "quit" | "q" => Ok(RemoteCommand::Quit),
             _ => Err(format!("{word:?} is none of: {HELP}")),
         }
     }
@@ -105,11 +105,11 @@ mod tests {
 
     #[test]
     fn a_line_reads_as_what_is_asked_and_others_say_what_there_is() {
-        assert_eq!(OwnCommand::parse(" step 3 "), Ok(OwnCommand::Step(3)));
-        assert_eq!(OwnCommand::parse("back"), Ok(OwnCommand::Move(-1)));
-        assert_eq!(OwnCommand::parse("act open red door"), Ok(OwnCommand::Act("open red door".into())));
-        assert_eq!(OwnCommand::parse("instruct"), Ok(OwnCommand::Instruct(String::new())));
-        assert_eq!(OwnCommand::parse("break reward"), Ok(OwnCommand::Break(OwnCondition::Reward)));
+        assert_eq!(RemoteCommand::parse(" step 3 "), Ok(RemoteCommand::Step(3)));
+        assert_eq!(RemoteCommand::parse("back"), Ok(RemoteCommand::Move(-1)));
+        assert_eq!(RemoteCommand::parse("act open red door"), Ok(RemoteCommand::Act("open red door".into())));
+        assert_eq!(RemoteCommand::parse("instruct"), Ok(RemoteCommand::Instruct(String::new())));
+        assert_eq!(RemoteCommand::parse("break reward"), Ok(RemoteCommand::Break(RemoteCondition::Reward)));
         for (line, told) in [
             ("dance", "none of: step"),
             ("goto x", "not a number"),
@@ -118,7 +118,7 @@ mod tests {
             ("step 0", "nothing to do"),
             ("break it", "sees NAME"),
         ] {
-            assert!(OwnCommand::parse(line).unwrap_err().contains(told), "{line}");
+            assert!(RemoteCommand::parse(line).unwrap_err().contains(told), "{line}");
         }
     }
 }

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::exploration::{OwnExploration, OwnStepTaken};
+use super::exploration::{RemoteExploration, RemoteStepTaken};
 use crate::agent::Decision;
 use crate::domain::Action;
-use crate::env::observation::OwnObservation;
+use crate::env::observation::RemoteObservation;
 
 /// One thing that can be done.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct OwnChoice {
+pub(crate) struct RemoteChoice {
     /// The action.
     pub(crate) action: Action,
     /// In words.
@@ -22,21 +22,21 @@ pub(crate) struct OwnChoice {
 
 /// Everything that is shown.
 #[derive(Clone, Debug)]
-pub(crate) struct OwnPicture {
+pub(crate) struct RemotePicture {
     pub(crate) name: String,
     pub(crate) seed: u64,
     pub(crate) instruction: String,
     /// The instruction is not what the environment asks.
     pub(crate) is_told: bool,
-    pub(crate) observation: Arc<OwnObservation>,
+    pub(crate) observation: Arc<RemoteObservation>,
     pub(crate) step: u32,
     pub(crate) length: u32,
     /// Name, place from 1, and number of the branches.
     pub(crate) branch: (String, usize, usize),
-    pub(crate) choices: Vec<OwnChoice>,
+    pub(crate) choices: Vec<RemoteChoice>,
     /// Why nothing was decided here.
     pub(crate) undecided: Option<String>,
-    pub(crate) taken: Option<OwnStepTaken>,
+    pub(crate) taken: Option<RemoteStepTaken>,
     pub(crate) earned: f64,
     pub(crate) end: Option<&'static str>,
     pub(crate) exactness: String,
@@ -61,9 +61,9 @@ pub(crate) enum StepMark {
     Done,
 }
 
-impl OwnExploration {
+impl RemoteExploration {
     /// Everything that is shown now. What the policy would do is asked, which may take its time.
-    pub(crate) fn picture(&mut self) -> OwnPicture {
+    pub(crate) fn picture(&mut self) -> RemotePicture {
         let decided = match self.end() {
             None => self.decide().cloned().map(Some).map_err(|error| format!("{error:#}")),
             Some(_) => Ok(None),
@@ -81,7 +81,7 @@ impl OwnExploration {
                 () => StepMark::Plain,
             })
         };
-        OwnPicture {
+        RemotePicture {
             marks: tree.story().into_iter().filter_map(mark).collect(),
             unsaved: self.unsaved(),
             name: self.name().to_string(),
@@ -104,16 +104,16 @@ impl OwnExploration {
     }
 
     /// Everything that can be done here, the likeliest first.
-    pub(crate) fn choices(&self, decided: Option<&Decision>) -> Vec<OwnChoice> {
+    pub(crate) fn choices(&self, decided: Option<&Decision>) -> Vec<RemoteChoice> {
         let shares = decided.and_then(|decision| decision.own.as_ref());
         let share = |action: Action| shares?.iter().find(|(other, _)| *other == action).map(|(_, share)| *share);
-        let choice = |action: Action| OwnChoice {
+        let choice = |action: Action| RemoteChoice {
             action,
             words: self.words(action),
             probability: share(action),
             is_chosen: decided.is_some_and(|decision| decision.action == action),
         };
-        let mut choices: Vec<OwnChoice> = self.possible().into_iter().map(choice).collect();
+        let mut choices: Vec<RemoteChoice> = self.possible().into_iter().map(choice).collect();
         let chosen = decided.map(|decision| decision.action);
         // What a policy chooses may not be listed where any text can be said.
         if let Some(chosen) = chosen.filter(|chosen| !choices.iter().any(|choice| choice.action == *chosen)) {
@@ -127,7 +127,7 @@ impl OwnExploration {
     ///
     /// # Errors
     /// When the environment or the policy fails.
-    pub(crate) fn compared(&mut self, other: &str) -> anyhow::Result<[(String, Vec<OwnChoice>); 2]> {
+    pub(crate) fn compared(&mut self, other: &str) -> anyhow::Result<[(String, Vec<RemoteChoice>); 2]> {
         let told = self.instruction().to_owned();
         let other = crate::language::instruction::parse(other)?;
         let first = self.decision_when_told(&told)?;

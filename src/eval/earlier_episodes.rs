@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::plan::EvaluationPlan;
 use crate::episode::instruction_variant;
-use crate::run_dir::belonging::Belonging;
 use crate::run_dir::episode_spec::policy_seed;
 use crate::run_dir::layout::EPISODES;
 use crate::run_dir::manifest::RunManifest;
+use crate::run_dir::record_check::RecordCheck;
 use crate::run_dir::writer::RunWriter;
 
 /// Checks that each episode that a folder holds already is one of this run.
@@ -16,7 +16,7 @@ use crate::run_dir::writer::RunWriter;
 /// Names the first that is not, and why.
 pub(super) fn check_earlier(plan: &EvaluationPlan, manifest: &RunManifest, folder: &RunWriter) -> anyhow::Result<()> {
     let EvaluationPlan { tasks, scenes, options, .. } = plan;
-    let belonging = Belonging::new(manifest, tasks);
+    let belonging = RecordCheck::new(manifest, tasks);
     let places: BTreeMap<&str, usize> = (0..).zip(tasks.iter()).map(|(at, task)| (task.id.as_str(), at)).collect();
     let mut starts: BTreeMap<usize, String> = BTreeMap::new();
     for episode in &folder.earlier {
@@ -24,17 +24,17 @@ pub(super) fn check_earlier(plan: &EvaluationPlan, manifest: &RunManifest, folde
         if let (None, Some(&at)) = (&misfit, places.get(episode.task.as_str())) {
             let (variant, chance) = (episode.variant, policy_seed(at, episode.seed));
             let told = instruction_variant::instruction_for(tasks, at, variant, options.step_by_step, chance);
-            let is_elsewhere = tasks[at].env.is_some();
+            let is_remote = tasks[at].env.is_some();
             let start = match starts.get(&at) {
                 // Where an episode starts elsewhere, and what it asks, only its environment knows.
-                _ if is_elsewhere => episode.start_hash.clone(),
+                _ if is_remote => episode.start_hash.clone(),
                 Some(start) => start.clone(),
                 None => starts.entry(at).or_insert(scenes.setting(&tasks[at])?.world.digest()).clone(),
             };
             // An episode that could not be begun has no start.
             let begun = !episode.start_hash.is_empty();
             misfit = match () {
-                () if episode.instruction != told && !(is_elsewhere && tasks[at].instruction.is_empty()) => {
+                () if episode.instruction != told && !(is_remote && tasks[at].instruction.is_empty()) => {
                     Some("instruction: not what the run tells")
                 }
                 () if begun && episode.start_hash != start => Some("start_hash: not the task's start"),

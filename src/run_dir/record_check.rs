@@ -9,17 +9,17 @@ use crate::domain::Task;
 use crate::episode::record::{Episode, EpisodeKey};
 
 /// What the records of a run can be.
-pub(crate) struct Belonging<'a> {
+pub(crate) struct RecordCheck<'a> {
     manifest: &'a RunManifest,
     tasks: HashMap<&'a str, &'a Task>,
     /// The episodes of a share; nothing for a whole run.
     share: Option<BTreeSet<EpisodeKey>>,
 }
 
-impl<'a> Belonging<'a> {
-    pub(crate) fn new(manifest: &'a RunManifest, tasks: &'a [Task]) -> Belonging<'a> {
+impl<'a> RecordCheck<'a> {
+    pub(crate) fn new(manifest: &'a RunManifest, tasks: &'a [Task]) -> RecordCheck<'a> {
         let keys = || own_specs(manifest, tasks).into_iter().map(|spec| spec.key(tasks)).collect();
-        Belonging {
+        RecordCheck {
             manifest,
             tasks: tasks.iter().map(|task| (task.id.as_str(), task)).collect(),
             share: manifest.shard.map(|_| keys()),
@@ -102,7 +102,7 @@ mod tests {
         let checked = |change: &dyn Fn(&mut Episode)| {
             let mut episode = good.clone();
             change(&mut episode);
-            Belonging::new(&manifest, &set.tasks).check(&episode).err().unwrap_or_default()
+            RecordCheck::new(&manifest, &set.tasks).check(&episode).err().unwrap_or_default()
         };
         assert_eq!(checked(&|_| ()), "");
         assert_eq!(checked(&|it| (it.completed, it.success) = (length, true)), "");
@@ -137,7 +137,7 @@ mod tests {
             of: task.subtasks.len() as u32,
             ..Episode::default()
         });
-        let told = Belonging::new(&share, &set.tasks).check(&last.unwrap()).unwrap_err();
+        let told = RecordCheck::new(&share, &set.tasks).check(&last.unwrap()).unwrap_err();
         assert!(told.contains("another share"), "{told}");
     }
 }

@@ -8,7 +8,7 @@ mod steering;
 mod view;
 mod worker;
 
-pub(crate) use worker::OwnEvent;
+pub(crate) use worker::RemoteEvent;
 
 use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -24,9 +24,9 @@ use super::taken_terminal::{QUEUE, TakenTerminal, TerminalOptions};
 use super::terminal;
 use super::update::{ExitReason, Msg};
 use crate::agent::policy_source::PolicySource;
-use crate::explore::elsewhere::OpenOwn;
+use crate::explore::remote::OpenRemote;
 use keys::KeyAnswer;
-use state::OwnApp;
+use state::RemoteApp;
 
 /// How often the screen tells how long it waits already.
 const TICK: Duration = Duration::from_millis(250);
@@ -35,7 +35,7 @@ const TICK: Duration = Duration::from_millis(250);
 ///
 /// # Errors
 /// When there is no terminal, or the environment cannot be opened.
-pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> anyhow::Result<ExitReason> {
+pub(crate) fn run(screen: ScreenOptions, open: OpenRemote, agent: PolicySource) -> anyhow::Result<ExitReason> {
     let options =
         TerminalOptions { protocol: screen.protocol, memory: screen.memory.as_deref(), log: screen.log.as_ref() };
     let TakenTerminal { guard, mut display, graphics, ability, messages, tell } = TakenTerminal::take(&options)?;
@@ -43,11 +43,11 @@ pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> 
     let heard = control.clone();
     let commands = worker::start(open, agent, move |event| {
         steering::heard_by(&heard, &event);
-        tell.send(Msg::Elsewhere(Box::new(event))).is_ok()
+        tell.send(Msg::Remote(Box::new(event))).is_ok()
     })?;
     control.command(steering::obeyed_by(commands.clone()));
     let listens = control.listen();
-    let mut app = OwnApp::new(display.size()?, graphics, ability, screen.config.scheme, commands);
+    let mut app = RemoteApp::new(display.size()?, graphics, ability, screen.config.scheme, commands);
     app.traffic.limit = screen.bandwidth;
     if screen.runs && !screen.manual {
         app.run_when_open();
@@ -63,7 +63,7 @@ pub(crate) fn run(screen: ScreenOptions, open: OpenOwn, agent: PolicySource) -> 
 }
 
 fn run_loop<W: Write>(
-    app: &mut OwnApp,
+    app: &mut RemoteApp,
     display: &mut PacedDisplay<W>,
     messages: &Receiver<Msg>,
 ) -> anyhow::Result<ExitReason> {
@@ -112,7 +112,7 @@ fn run_loop<W: Write>(
                 },
                 Msg::Paste(text) => app.paste(&text),
                 Msg::Resize(_) => display.repaint()?,
-                Msg::Elsewhere(event) => app.on_event(*event)?,
+                Msg::Remote(event) => app.on_event(*event)?,
                 Msg::Signal(number) => return Ok(ExitReason::Signal(number)),
                 Msg::StopAsked => display.stop()?,
                 Msg::Continued => display.go_on()?,

@@ -10,7 +10,7 @@ use crate::agent::decision::Decision;
 use crate::agent::select::Selection;
 use crate::domain::Action;
 use crate::env::action_space::ActionSpace;
-use crate::env::own_view::OwnView;
+use crate::env::remote_view::RemoteView;
 
 /// Checks that the environment has all actions of a description.
 ///
@@ -38,7 +38,7 @@ const LISTED: usize = 30;
 pub(super) fn decide(
     answer: &Answer,
     spec: &PolicySpec,
-    view: &OwnView<'_>,
+    view: &RemoteView<'_>,
     mut selection: Selection<'_>,
 ) -> anyhow::Result<Decision> {
     let mut open: Vec<(f32, Vec<(Action, f32)>)> = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn decide(
 }
 
 /// The logit of what an action is done to; all alike where the policy tells none.
-fn argument_logit(action: Action, answer: &Answer, spec: &PolicySpec, view: &OwnView<'_>) -> f32 {
+fn argument_logit(action: Action, answer: &Answer, spec: &PolicySpec, view: &RemoteView<'_>) -> f32 {
     let argument = view.space.parts(action).and_then(|(_, argument)| argument);
     let Some(argument) = argument.filter(|_| !spec.arguments.is_empty()) else { return 0.0 };
     let words = match argument {
@@ -96,7 +96,7 @@ mod tests {
 
     use super::*;
     use crate::env::action_space::tests::space;
-    use crate::env::observation::{Legal, OwnObservation};
+    use crate::env::observation::{Legal, RemoteObservation};
 
     fn decided(actions: &[&str], logits: &[f32], arguments: &[(&str, f32)]) -> anyhow::Result<(String, Vec<f32>)> {
         let names: Vec<&str> = arguments.iter().map(|(name, _)| *name).collect();
@@ -104,10 +104,10 @@ mod tests {
             json!({"format_version": 1, "frames": {"height": 2, "width": 2}, "actions": actions, "arguments": names}),
         )?;
         let legal = Some(vec![Legal::Whole(true), Legal::Whole(false), Legal::Whole(true), Legal::Whole(false)]);
-        let (space, observation) = (Arc::new(space()), OwnObservation { legal, ..OwnObservation::default() });
+        let (space, observation) = (Arc::new(space()), RemoteObservation { legal, ..RemoteObservation::default() });
         let arguments = arguments.iter().map(|(_, logit)| *logit).collect();
         let answer = Answer { actions: logits.to_vec(), arguments, value: None };
-        let view = OwnView { space: &space, observation: &observation };
+        let view = RemoteView { space: &space, observation: &observation };
         let made = decide(&answer, &spec, &view, Selection::Greedy)?;
         let shares = made.own.unwrap_or_default().into_iter().map(|(_, share)| share).collect();
         Ok((space.words(made.action), shares))

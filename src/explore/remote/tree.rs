@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::agent::PolicyState;
 use crate::domain::Action;
 use crate::env::environment::Snapshot;
-use crate::env::observation::OwnObservation;
+use crate::env::observation::RemoteObservation;
 use crate::episode::record::{Author, TraceStep};
 
 /// The most states that are remembered in an episode.
@@ -22,7 +22,7 @@ pub(crate) struct State {
     /// What led here; none at the start.
     pub(crate) taken: Option<Taken>,
     /// What was seen here.
-    pub(crate) observation: Arc<OwnObservation>,
+    pub(crate) observation: Arc<RemoteObservation>,
     /// What the environment can go back to it by.
     pub(crate) snapshot: Option<Snapshot>,
     /// What the policy carried here, and who it was.
@@ -57,7 +57,7 @@ pub(crate) struct Branch {
 }
 
 /// States and branches; one state is in hand.
-pub(crate) struct OwnTree {
+pub(crate) struct RemoteTree {
     states: Vec<State>,
     branches: Vec<Branch>,
     branch: usize,
@@ -65,11 +65,11 @@ pub(crate) struct OwnTree {
     pictures: usize,
 }
 
-impl OwnTree {
+impl RemoteTree {
     /// Nothing was tried yet.
-    pub(crate) fn new(start: State) -> OwnTree {
+    pub(crate) fn new(start: State) -> RemoteTree {
         let branches = vec![Branch { name: "1".into(), why: "the start".into(), tip: 0 }];
-        OwnTree { states: vec![start], branches, branch: 0, here: 0, pictures: 0 }
+        RemoteTree { states: vec![start], branches, branch: 0, here: 0, pictures: 0 }
     }
 
     /// The state in hand.
@@ -153,7 +153,7 @@ impl OwnTree {
     }
 
     /// What was seen in the state in hand is something else than was remembered.
-    pub(crate) fn see_again(&mut self, observation: OwnObservation) {
+    pub(crate) fn see_again(&mut self, observation: RemoteObservation) {
         self.states[self.here].observation = Arc::new(observation);
     }
 
@@ -199,7 +199,7 @@ impl OwnTree {
             }
             if let Some(picture) = &state.observation.picture {
                 self.pictures = self.pictures.saturating_sub(picture.rgb.len());
-                state.observation = Arc::new(OwnObservation { picture: None, ..(*state.observation).clone() });
+                state.observation = Arc::new(RemoteObservation { picture: None, ..(*state.observation).clone() });
             }
         }
     }

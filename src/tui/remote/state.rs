@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use ratatui::layout::{Rect, Size};
 
 use super::layout;
-use super::worker::{OwnEvent, Told};
-use crate::explore::elsewhere::command::OwnCommand;
-use crate::explore::elsewhere::view::{OwnChoice, OwnPicture};
+use super::worker::{RemoteEvent, Told};
+use crate::explore::remote::command::RemoteCommand;
+use crate::explore::remote::view::{RemoteChoice, RemotePicture};
 use crate::house::view::Frame;
 use crate::language::count::counted;
 use crate::tui::app::{Graphics, Traffic};
@@ -21,7 +21,7 @@ use crate::tui::theme::{Ability, Scheme};
 
 /// What the keyboard is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum OwnMode {
+pub(super) enum RemoteMode {
     /// Keys command.
     Watch,
     /// A choice is made among what can be done.
@@ -49,13 +49,13 @@ pub(super) enum Typed {
 const PATIENT: Duration = Duration::from_millis(400);
 
 /// The state of the screen.
-pub(crate) struct OwnApp {
+pub(crate) struct RemoteApp {
     pub(super) size: Size,
     pub(super) graphics: Graphics,
     pub(super) ability: Ability,
     pub(super) scheme: Scheme,
-    commands: Sender<OwnCommand>,
-    pub(super) shown: Option<Box<OwnPicture>>,
+    commands: Sender<RemoteCommand>,
+    pub(super) shown: Option<Box<RemotePicture>>,
     /// The picture, encoded for the terminal; nothing where there is none.
     pub(super) picture: Option<Picture>,
     /// What is to be seen has changed since it was encoded.
@@ -66,11 +66,11 @@ pub(crate) struct OwnApp {
     pub(super) said: Option<(bool, String)>,
     /// Why what was typed or pressed last is not done; it stays whatever comes of what was asked before.
     pub(super) refused: Option<String>,
-    pub(super) compared: Option<Vec<(String, Vec<OwnChoice>)>>,
-    pub(super) mode: OwnMode,
+    pub(super) compared: Option<Vec<(String, Vec<RemoteChoice>)>>,
+    pub(super) mode: RemoteMode,
     pub(super) editor: Editor,
     /// What would lose steps, and was asked for once.
-    pub(super) asked: Option<OwnCommand>,
+    pub(super) asked: Option<RemoteCommand>,
     /// Which choice is marked.
     pub(super) marked: usize,
     /// Since when the environment is waited for, and for how many commands.
@@ -78,15 +78,15 @@ pub(crate) struct OwnApp {
     runs: bool,
 }
 
-impl OwnApp {
+impl RemoteApp {
     pub(super) fn new(
         size: Size,
         graphics: Graphics,
         ability: Ability,
         scheme: Scheme,
-        commands: Sender<OwnCommand>,
-    ) -> OwnApp {
-        OwnApp {
+        commands: Sender<RemoteCommand>,
+    ) -> RemoteApp {
+        RemoteApp {
             size,
             graphics,
             ability,
@@ -100,7 +100,7 @@ impl OwnApp {
             said: None,
             refused: None,
             compared: None,
-            mode: OwnMode::Watch,
+            mode: RemoteMode::Watch,
             editor: Editor::default(),
             asked: None,
             marked: 0,
@@ -125,7 +125,7 @@ impl OwnApp {
     }
 
     /// Asks for something.
-    pub(super) fn ask(&mut self, command: OwnCommand) {
+    pub(super) fn ask(&mut self, command: RemoteCommand) {
         // A worker that is gone has said why.
         let _ = self.commands.send(command);
         let (since, many) = self.waiting.unwrap_or_else(|| (Instant::now(), 0));
@@ -134,22 +134,22 @@ impl OwnApp {
     }
 
     /// Whether something that would lose steps was asked for again: the first time it is said what would be lost.
-    pub(super) fn is_sure(&mut self, command: &OwnCommand) -> bool {
+    pub(super) fn is_sure(&mut self, command: &RemoteCommand) -> bool {
         let unsaved = self.shown.as_ref().map_or(0, |shown| shown.unsaved);
         // While the environment is waited for nothing can be saved, and the screen says that one key leaves.
-        let is_stuck = *command == OwnCommand::Quit && self.waits_long();
+        let is_stuck = *command == RemoteCommand::Quit && self.waits_long();
         if unsaved == 0 || is_stuck || self.asked.as_ref() == Some(command) {
             return true;
         }
         self.asked = Some(command.clone());
-        let what = if *command == OwnCommand::Quit { "leaves" } else { "forgets them" };
+        let what = if *command == RemoteCommand::Quit { "leaves" } else { "forgets them" };
         let steps = counted(unsaved, "step");
         self.refused = Some(format!("Not saved: {steps}. S saves, the same again {what}"));
         false
     }
 
     /// Takes in what the worker tells.
-    pub(super) fn on_event(&mut self, event: OwnEvent) -> anyhow::Result<()> {
+    pub(super) fn on_event(&mut self, event: RemoteEvent) -> anyhow::Result<()> {
         self.waiting = match self.waiting {
             Some((_, many)) if many > 1 => Some((Instant::now(), many - 1)),
             _ => None,
@@ -168,7 +168,7 @@ impl OwnApp {
                 self.shown = Some(shown);
                 self.is_picture_stale = true;
                 if std::mem::take(&mut self.runs) {
-                    self.ask(OwnCommand::Run);
+                    self.ask(RemoteCommand::Run);
                 }
             }
         }

@@ -11,4 +11,4 @@ mod time;
 pub(crate) mod tree;
 pub(crate) mod view;
 
-pub(crate) use exploration::{OpenOwn, OwnExploration};
+pub(crate) use exploration::{OpenRemote, RemoteExploration};

@@ -8,7 +8,7 @@ use crate::episode::wish::{self, ServedReader, Wish};
 use crate::language::instruction;
 
 /// Gives the tasks that only say an instruction the subtasks as which it is read; what was read, by the tasks' places.
-pub(super) fn read_untold(
+pub(super) fn read_all(
     tasks: &mut [Task],
     scenes: &Scenes,
     reader: Option<&ServedReader>,

@@ -5,7 +5,7 @@ use crate::domain::{Heading, Point};
 
 /// Where a piece stands: its back corner on the floor plan and where its front looks. Lengths in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Site {
+pub(crate) struct PieceFrame {
     /// (x, z) of u = 0, v = 0.
     pub(crate) origin: [i32; 2],
     /// The direction of v.
@@ -14,7 +14,7 @@ pub(crate) struct Site {
     pub(crate) floor: i32,
 }
 
-impl Site {
+impl PieceFrame {
     /// (x, z) of a point of the frame.
     pub(crate) fn at(&self, u: i32, v: i32) -> [i32; 2] {
         let (vx, vz) = self.facing.step();
@@ -40,8 +40,8 @@ impl Site {
     }
 
     /// The frame moved within itself.
-    pub(crate) fn moved(&self, u: i32, v: i32) -> Site {
-        Site { origin: self.at(u, v), ..*self }
+    pub(crate) fn moved(&self, u: i32, v: i32) -> PieceFrame {
+        PieceFrame { origin: self.at(u, v), ..*self }
     }
 }
 
@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn a_box_lies_in_front_of_its_wall_for_every_heading() {
         for facing in Heading::ALL {
-            let site = Site { origin: [1000, 2000], facing, floor: 1 };
+            let site = PieceFrame { origin: [1000, 2000], facing, floor: 1 };
             let centre = site.cuboid([-100, 100], [0, 500], [0, 400]).centre();
             let (dx, dz) = facing.step();
             assert_eq!((centre.x, centre.z), (1000 + 200 * i32::from(dx), 2000 + 200 * i32::from(dz)));

@@ -2,14 +2,14 @@
 
 use anyhow::Context;
 
-use super::exploration::OwnExploration;
+use super::exploration::RemoteExploration;
 use crate::agent::Decision;
 use crate::env::Environment;
 use crate::env::remote::RemoteEnvironment;
 use crate::episode::record::TraceStep;
 use crate::episode::rollout::Rollout;
 
-impl OwnExploration {
+impl RemoteExploration {
     /// Takes a step of the branch in hand in hand, or its end.
     pub(crate) fn seek(&mut self, step: u32) {
         self.tree.seek(step);
