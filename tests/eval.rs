@@ -109,7 +109,7 @@ fn every_kind_of_run_is_verified_opened_by_its_number_and_exported() {
         assert_eq!(exported.code, Some(0), "{options}: {}", exported.stderr);
     }
     if let Some(home) = encoder_home() {
-        let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+        let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/agents/clone");
         for line in [
             format!("eval --tasks typed.json --checkpoint {shipped} --sample --limit 1 --out drawn"),
             format!("verify drawn --checkpoint {shipped}"),

@@ -39,7 +39,7 @@ fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
     session.see("running");
     session.press(" M");
     session.see("no critic");
-    session.press(":checkpoint sprint\r");
+    session.press(":checkpoint alfred\r");
     session.see("by probability");
     session.miss("this checkpoint");
     session.leave();

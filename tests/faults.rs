@@ -185,7 +185,7 @@ fn sigterm_ends_with_130_and_a_valid_partial_result_that_is_continued() {
 #[test]
 fn a_checkpoint_that_is_replaced_during_a_run_is_noticed() {
     let sprint = Sprint::new();
-    let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first");
+    let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/agents/clone");
     let Some(home) = encoder_home() else { return };
     sprint.sample("tasks.json", 1, 4);
     std::fs::create_dir(sprint.path("agent")).unwrap();

@@ -15,7 +15,7 @@ pub(crate) enum Need {
     Shared,
     /// The sentence encoder that `make setup` fetches.
     Encoder,
-    /// The agents under `checkpoints`.
+    /// The agents under `checkpoints` and `tests/agents`.
     Agents,
     /// A Slurm to start on this machine.
     Slurm,
@@ -40,7 +40,7 @@ impl Need {
                 "put the reference data into `shared` beside the checkout, or name its folder in SPRINT_SHARED"
             }
             Need::Encoder => "run `make setup`",
-            Need::Agents => "check out `checkpoints` whole",
+            Need::Agents => "check out `checkpoints` and `tests/agents` whole",
             Need::Python => "run `make python-packages`",
             Need::Slurm => "install slurmctld, slurmd, slurm-client and munge, and run the tests as root",
         }
@@ -87,9 +87,9 @@ pub(crate) fn sentence_encoder(folder: &Path) -> Option<PathBuf> {
     existing(Need::Encoder, folder.join("model.safetensors")).map(|_| folder.to_owned())
 }
 
-/// A shipped agent.
-pub(crate) fn shipped_agent(name: &str) -> Option<PathBuf> {
-    existing(Need::Agents, Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints").join(name))
+/// An agent of the repository, by its folder there.
+pub(crate) fn agent(folder: &str) -> Option<PathBuf> {
+    existing(Need::Agents, Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
 }
 
 /// ALFRED as published: unpacked in the reference data, or from its archive once into the target folder.

@@ -189,7 +189,7 @@ fn an_agents_own_steps_in_given_tasks_are_corrected_and_learned_from() {
     );
     let refused = sprint.run("average agent --advantage-scale=-1 --out none").stderr;
     assert!(refused.contains("--advantage-scale -1 for agent: advantage_scale is -1, which is no weight"), "{refused}");
-    let first = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+    let first = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/agents/clone");
     let refused = sprint.run(&format!("average {first} --logit-adjustment 0.2 --out none")).stderr;
     assert!(refused.contains("how often each action was shown was not noted"), "{refused}");
     let refused = sprint.run(&format!("average {first} --advantage-scale 2 --out none")).stderr;
@@ -228,7 +228,7 @@ fn a_training_begins_with_the_networks_it_was_given() {
         let given = &begun[&name.replace("target.", "critic.")];
         assert!((&ended[name] - given).abs().max().double_value(&[]) < 1e-6, "{name} is another");
     }
-    let clone = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/first");
+    let clone = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/agents/clone");
     let refused = sprint.run(&format!("pretrain D --preset tiny.toml --critic-from {clone} --out none"));
     assert!(refused.stderr.contains("there is no critic"), "{}", refused.stderr);
 }

@@ -63,11 +63,11 @@ fn another_checkpoint_forks_too() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
+    let clone = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/agents/clone");
     let second = folder.path().join("second");
     std::fs::create_dir(&second).unwrap();
     for file in ["config.json", "model.safetensors"] {
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first").join(file);
-        std::fs::copy(shipped, second.join(file)).unwrap();
+        std::fs::copy(clone.join(file), second.join(file)).unwrap();
     }
     let path = second.display().to_string();
     let mut session = Session::start(&["--checkpoint", &path, "--graphics", "ascii", "--seed", "3", "--paused"]);
@@ -77,12 +77,14 @@ fn another_checkpoint_forks_too() {
         session.press("n");
         session.see(step);
     }
-    session.press("h:checkpoint first\r");
-    session.see("first acts");
+    session.press("h:checkpoint alfred\r");
+    session.see("alfred acts");
     session.press("n");
     session.see("b1 2/2");
     session.press("t");
-    session.see("first acts");
+    session.see("alfred acts");
+    session.press(":checkpoint second\r");
+    session.see("second acts");
     session.press("M");
     session.see("this checkpoint has no critic");
     session.see("tokens");

@@ -195,8 +195,8 @@ mod tests {
     #[test]
     fn the_shipped_agents_load() {
         let _chance = crate::nets::testing::chance();
-        for (name, has_critic) in [("alfred", true), ("first", false), ("sprint", true)] {
-            let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
+        for (name, has_critic) in [("checkpoints/alfred", true), ("tests/agents/clone", false)] {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
             let config = CheckpointConfig::read(&folder).unwrap();
             assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), has_critic);
         }
@@ -205,8 +205,8 @@ mod tests {
     #[test]
     fn a_checkpoint_whose_policy_critic_or_visual_encoder_holds_no_numbers_is_refused_by_name() {
         let _chance = crate::nets::testing::chance();
-        for (name, bad) in [("alfred", f64::NAN), ("sprint", f64::INFINITY)] {
-            let shipped = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints")).join(name);
+        for (name, bad) in [("checkpoints/alfred", f64::NAN), ("tests/agents/clone", f64::INFINITY)] {
+            let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
             let config = CheckpointConfig::read(&shipped).unwrap();
             let whole = weights::read(&shipped.join("model.safetensors")).unwrap();
             let folder = tempfile::tempdir().unwrap();

@@ -76,8 +76,8 @@ impl ExternalPolicy {
         ExternalPolicy::KINDS.into_iter().find(|known| *known == kind)
     }
 
-    /// The same, found from any folder.
-    fn from_anywhere(&self) -> ExternalPolicy {
+    /// The same, with a file by its absolute path: found from any folder.
+    fn absolute(&self) -> ExternalPolicy {
         match self {
             ExternalPolicy::Server(address) => ExternalPolicy::Server(address.clone()),
             ExternalPolicy::File(format, path) => {
@@ -102,7 +102,7 @@ impl ExternalPolicy {
                 ServedPolicy::source(address, Duration::from_secs(options.policy_timeout))
             }
         };
-        Ok(source?.at(self.from_anywhere().to_string()))
+        Ok(source?.at(self.absolute().to_string()))
     }
 
     /// The same for an explorer, which opens it when it is to act.

@@ -31,7 +31,7 @@ pub(crate) struct Pretrain {
     /// file, which may extend one of these
     #[arg(long)]
     preset: String,
-    /// A size other than the preset's own, which suits two CPU cores: paper, narrow (that of checkpoints/first and sprint), or a
+    /// A size other than the preset's own, which suits two CPU cores: paper, narrow (about half as wide), or a
     /// file of such values, which may extend one of these
     #[arg(long)]
     size: Option<String>,

@@ -81,7 +81,7 @@ fn bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
 }
 
 fn shipped(file: &str) -> Vec<u8> {
-    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/first").join(file)).unwrap()
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/agents/clone").join(file)).unwrap()
 }
 
 fn sampled() -> TaskSet {

@@ -60,10 +60,14 @@ pub(crate) fn undecided() -> Option<LearnedPolicy> {
     Some(agent)
 }
 
-fn shipped(name: &str) -> Option<LearnedPolicy> {
+/// An agent without a critic, and one with.
+const CLONE: &str = "tests/agents/clone";
+const ALFRED: &str = "checkpoints/alfred";
+
+fn shipped(folder: &str) -> Option<LearnedPolicy> {
     device::set_threads(1);
     let sentences = Embedder::open(&needed::sentence_encoder(&default_folder())?, Device::Cpu).unwrap();
-    let folder = needed::shipped_agent(name)?;
+    let folder = needed::agent(folder)?;
     Some(LearnedPolicy::load(&folder, Some(Arc::new(Mutex::new(sentences))), Device::Cpu).unwrap())
 }
 
@@ -175,7 +179,7 @@ fn thoughts(agent: &mut LearnedPolicy, slot: usize, others: &[usize]) -> Vec<Act
 #[test]
 fn a_decision_depends_on_its_own_slot_alone_bit_for_bit() {
     // The second weighs its policy by its critic.
-    for name in ["first", "sprint"] {
+    for name in [CLONE, ALFRED] {
         let Some(mut agent) = shipped(name) else { return };
         agent.config.advantage_scale = agent.networks.critic.is_some().then_some(10.0);
         for slot in [0, 5] {
@@ -199,7 +203,7 @@ fn frequent_actions_lose_as_much_as_the_adjustment_says() {
     let mut ahead = Vec::new();
     let shares: Vec<f32> = (0..ActionType::COUNT).map(|action| if action == 0 { 0.45 } else { 0.05 }).collect();
     for adjustment in [None, Some(LogitAdjustment { strength: 0.5, action_frequencies: shares })] {
-        let Some(thought) = first_thought("first", |config| config.logit_adjustment = adjustment.clone()) else {
+        let Some(thought) = first_thought(CLONE, |config| config.logit_adjustment = adjustment.clone()) else {
             return;
         };
         let odds = |action: usize| thought.actions[action].unwrap();
@@ -211,7 +215,7 @@ fn frequent_actions_lose_as_much_as_the_adjustment_says() {
 
 #[test]
 fn an_agent_that_weighs_by_its_critic_thinks_otherwise_than_by_its_policy_alone() {
-    let [alone, weighed] = [None, Some(10.0)].map(|scale| first_thought("sprint", |it| it.advantage_scale = scale));
+    let [alone, weighed] = [None, Some(10.0)].map(|scale| first_thought(ALFRED, |it| it.advantage_scale = scale));
     let (Some(alone), Some(weighed)) = (alone, weighed) else { return };
     let apart = |(a, b): (&Option<f32>, &Option<f32>)| (a.unwrap_or(0.0) - b.unwrap_or(0.0)).abs() > 1e-3;
     assert!(alone.actions.iter().zip(&weighed.actions).any(apart), "{alone:?} {weighed:?}");

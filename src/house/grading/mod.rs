@@ -231,7 +231,7 @@ mod tests {
             (area.min[0], area.max[0]) = (area.min[0] - 3000, area.max[0] - 3000);
         });
         scene.fixtures.push(second);
-        world.fixtures.push(world.fixtures[usize::from(table)].clone());
+        world.fixtures.push(world.fixtures[usize::from(table)]);
         let roles = [role("Mug"), role("SideTable"), role("Tomato"), role("SideTable")];
         let apart = [put_subtask(0, 1), put_subtask(2, 3)];
         let together = [put_subtask(0, 1), put_subtask(2, 1)];

@@ -288,7 +288,7 @@ mod tests {
     fn a_learner_acts_greedily_in_some_episodes_and_draws_in_others() {
         let _chance = crate::nets::testing::chance();
         let Some(encoder) = needed::sentence_encoder(&default_folder()) else { return };
-        let Some(first) = needed::shipped_agent("first") else { return };
+        let Some(clone) = needed::agent("tests/agents/clone") else { return };
         let sentences = Embedder::open(&encoder, Device::Cpu).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let task = tasks(folder.path()).remove(1);
@@ -301,7 +301,7 @@ mod tests {
             },
             seed: 1,
             settings: UNDISTURBED,
-            learner: Some((first, Some(Arc::new(std::sync::Mutex::new(sentences))))),
+            learner: Some((clone, Some(Arc::new(std::sync::Mutex::new(sentences))))),
         };
         collection.run(&mut Silent, &AtomicBool::new(false)).unwrap();
         let dataset = Dataset::open(&collection.out).unwrap();

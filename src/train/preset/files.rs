@@ -197,15 +197,11 @@ mod tests {
     }
 
     #[test]
-    fn the_older_agents_are_trained_on_in_the_narrow_size() {
-        for (name, preset) in [("first", "l-bc"), ("sprint", "sprint")] {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints").join(name);
-            let config = CheckpointConfig::read(&folder).unwrap();
-            let sized = Preset::sized(preset, Some("narrow")).unwrap();
-            assert!(config.policy.fits(&sized.policy), "{name}");
-            let critics = config.critic.zip(sized.critic);
-            assert!(critics.is_none_or(|(critic, sized)| critic.fits(&sized)), "{name}");
-        }
+    fn an_older_agent_is_trained_on_in_the_narrow_size() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/agents/clone");
+        let config = CheckpointConfig::read(&folder).unwrap();
+        let sized = Preset::sized("l-bc", Some("narrow")).unwrap();
+        assert!(config.policy.fits(&sized.policy));
     }
 
     #[test]
