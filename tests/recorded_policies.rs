@@ -9,6 +9,7 @@ use models::{always, onnx};
 
 use crate::policy_server::Server;
 use crate::program::{Ended, Sprint};
+use crate::terminal::Session;
 
 /// Writes a policy that turns left whatever it sees.
 fn export(path: &Path) {
@@ -56,7 +57,7 @@ fn an_exported_policy_is_found_by_its_file_and_digest() {
     std::fs::rename(sprint.path("left.json"), sprint.path("moved.json")).unwrap();
     let gone = sprint.run("verify run");
     assert_eq!(gone.code, Some(0), "what the actions came to is compared");
-    let sentence = "left.onnx: the run's policy onnx:left is gone: name its file with --policy onnx:FILE";
+    let sentence = "left.onnx: the run's policy is gone: name it with --policy onnx:FILE";
     assert!(gone.stderr.contains(sentence), "{}", gone.stderr);
     assert!(gone.stdout.contains("\"onnx:left\" is not at hand"), "{}", gone.stdout);
     assert!(opened(&sprint, "run#1", "step\nquit\n").contains(sentence));
@@ -121,4 +122,30 @@ fn a_policy_server_is_found_where_it_was_or_where_it_is_named() {
     let unknown = sprint.run("verify run");
     let sentence = "the run does not say where its policy ws:walker was: name it with --policy ws:HOST:PORT";
     assert!(unknown.stderr.contains(sentence), "{}", unknown.stderr);
+}
+
+#[test]
+fn a_session_that_is_taken_up_goes_on_with_its_exported_policy() {
+    let state = tempfile::tempdir().unwrap();
+    let file = state.path().join("left.onnx");
+    export(&file);
+    let policy = format!("onnx:{}", file.display());
+    let arguments = ["--policy", &policy, "--graphics", "ascii", "--seed", "3", "--paused"];
+    let mut session = Session::open(state.path(), (120, 36), "explore", &arguments);
+    session.see("step 0");
+    session.see("Mind");
+    session.press("n");
+    session.see("main 1/1");
+    session.signal("-KILL");
+    session.end();
+
+    let mut session = Session::open(state.path(), (120, 36), "explore", &["--graphics", "ascii", "--paused"]);
+    session.see("broken off");
+    session.press("\r");
+    session.see("main 1/1");
+    session.press("nnn");
+    session.see("main 4/4");
+    session.press("L");
+    session.see("4 RotateLeft");
+    session.leave();
 }

@@ -54,12 +54,13 @@ impl Explore {
         // What is wrong with it is said before there is a screen.
         self.from.expect()?;
         let Explore { display, mut from, policy, remote, .. } = self;
+        from.options = remote;
         from.checkpoint = from.checkpoint.as_deref().map(checkpoint::folder).transpose()?;
         if let Some(PolicyName::External(named)) = &policy {
             if from.checkpoint.is_some() {
                 bail!("--checkpoint names a trained agent, but --policy asks for another: leave one of them out");
             }
-            from.other_policy = Some((named.clone(), remote));
+            from.other_policy = Some(named.clone());
         }
         if let Some(open) = from.remote(kind)? {
             if matches!(policy, Some(PolicyName::Agent)) {

@@ -107,8 +107,8 @@ impl ExternalPolicy {
 
     /// The same for an explorer, which opens it when it is to act.
     pub(crate) fn agent(&self, options: ExternalPolicyOptions) -> NamedAgent {
-        let (name, own) = (self.to_string(), self.clone());
-        policy_source::agent_of(name, move || own.open(options, false))
+        let own = self.absolute();
+        policy_source::agent_of(own.to_string(), move || own.open(options, false))
     }
 }
 
@@ -138,7 +138,7 @@ impl FromStr for ExternalPolicy {
             }
         }
         Err(format!(
-            "{text:?} is no policy from external: it is ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy"
+            "{text:?} is no external policy: it is ws:HOST:PORT for a policy server, or onnx:FILE for an exported policy"
         ))
     }
 }

@@ -17,7 +17,7 @@ use crate::run_dir::policy_places::place_of;
 use crate::run_dir::reader::RecordedRun;
 
 /// Where the policy of a run is now.
-#[derive(Args, Clone, Default)]
+#[derive(Args)]
 pub(crate) struct RecordedPolicy {
     /// The checkpoint of the run's agent: its folder or its name [default: the one of the run's hash among checkpoints/]
     #[arg(long, value_name = "DIR|NAME")]
@@ -27,6 +27,13 @@ pub(crate) struct RecordedPolicy {
     policy: Option<ExternalPolicy>,
     #[command(flatten)]
     options: ExternalPolicyOptions,
+}
+
+impl From<ExternalPolicyOptions> for RecordedPolicy {
+    /// Where it was.
+    fn from(options: ExternalPolicyOptions) -> RecordedPolicy {
+        RecordedPolicy { checkpoint: None, policy: None, options }
+    }
 }
 
 /// A policy that is none of the program's own, and where it is looked for.
@@ -116,7 +123,7 @@ impl SoughtPolicy {
         };
         if let (ExternalPolicy::File(_, path), Some(wanted)) = (at, checkpoint) {
             let file = path.display();
-            ensure!(path.exists(), "{file}: the run's policy {policy} is gone: name its file with {name_it}");
+            ensure!(path.exists(), "{file}: the run's policy is gone: name it with {name_it}");
             // Before anything of it runs.
             let found = exported::hash(path)?;
             ensure!(

@@ -171,6 +171,11 @@ fn number(path: &Path) -> Option<u32> {
     path.file_name()?.to_str()?.strip_prefix("session-")?.strip_suffix(".json")?.parse().ok()
 }
 
+/// Whether a session in that file was broken off.
+pub(crate) fn is_broken_off(path: &Path) -> bool {
+    number(path).is_some()
+}
+
 /// Where the session before the last is kept.
 pub(crate) fn before(last: &Path) -> PathBuf {
     last.with_file_name("session-before.json")

@@ -56,6 +56,7 @@ impl Start {
     /// Its kind, in a word or two.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
+            Start::Session(path) if session_file::is_broken_off(path) => "broken off",
             Start::Session(_) => "last session",
             Start::House { .. } => "house",
             Start::FloorPlan(_) => "floor plan",
@@ -101,10 +102,8 @@ impl StartEntry {
 /// files, checkpoints, runs. What cannot be read is left out.
 pub(crate) fn list(folders: &StartFolders) -> Vec<StartEntry> {
     let runs = runs(&folders.here.join("runs"));
-    let broken_off = session_file::broken_off(&folders.session).into_iter().filter_map(|(when, path)| {
-        let entry = session(&path)?;
-        Some((when, StartEntry { note: format!("broken off, {}", entry.note), ..entry }))
-    });
+    let broken_off =
+        session_file::broken_off(&folders.session).into_iter().filter_map(|(when, path)| Some((when, session(&path)?)));
     let mut sessions: Vec<(SystemTime, StartEntry)> = broken_off.chain(last_session(&folders.session, &runs)).collect();
     sessions.sort_by_key(|(when, _)| std::cmp::Reverse(*when));
     let mut found: Vec<StartEntry> = sessions.into_iter().map(|(_, entry)| entry).collect();
@@ -305,7 +304,7 @@ mod tests {
         drop(other);
         let all = list(&wanted);
         assert_eq!((all.len(), &all[1].start), (found.len() + 1, &Start::Session(wanted.session.clone())));
-        assert!(all[0].note.starts_with("broken off, step 0"), "{:?}", all[0]);
+        assert_eq!(all[0].start.kind(), "broken off");
         std::fs::remove_file(wanted.session.with_file_name("session-1.json")).unwrap();
         std::fs::write(&wanted.session, b"{ broken").unwrap();
         assert_eq!(lines(&list(&wanted))[..4], houses, "a broken session costs no more than itself");

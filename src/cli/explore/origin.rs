@@ -12,7 +12,6 @@ use crate::cli::environment::EnvironmentChoice;
 use crate::cli::policies::Deciding;
 use crate::cli::policy_name::{ExternalPolicy, ExternalPolicyOptions};
 use crate::cli::recorded::recorded;
-use crate::cli::recorded_policy::RecordedPolicy;
 use crate::cli::wish_reader::WishReaderArgs;
 use crate::cli::{logging, value_names};
 use crate::data::{dataset::Dataset, taskset};
@@ -63,7 +62,10 @@ pub(crate) struct Origin {
     seed: Option<u64>,
     /// An external policy, which acts as the agent.
     #[arg(skip)]
-    pub(super) other_policy: Option<(ExternalPolicy, ExternalPolicyOptions)>,
+    pub(super) other_policy: Option<ExternalPolicy>,
+    /// How such policies are dealt with.
+    #[arg(skip)]
+    pub(super) options: ExternalPolicyOptions,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -98,6 +100,7 @@ impl Default for Origin {
             reader: WishReaderArgs::default(),
             seed: None,
             other_policy: None,
+            options: ExternalPolicyOptions::default(),
         }
     }
 }
@@ -108,8 +111,8 @@ impl Origin {
         if let Some(checkpoint) = &self.checkpoint {
             return PolicySource::checkpoint(policy_source::folder_of(checkpoint), false, self.deciding.asked());
         }
-        if let Some((named, options)) = &self.other_policy {
-            return named.open(*options, false);
+        if let Some(named) = &self.other_policy {
+            return named.open(self.options, false);
         }
         match kind {
             PolicyKind::Expert => Ok(PolicySource::expert()),
@@ -163,7 +166,8 @@ impl Origin {
 
     /// The same without what was named: where to look, and what is made of what is typed.
     pub(super) fn unnamed(self) -> Origin {
-        Origin { data: self.data, expect: self.expect, reader: self.reader, ..Origin::default() }
+        let Origin { data, expect, reader, options, .. } = self;
+        Origin { data, expect, reader, options, ..Origin::default() }
     }
 
     /// Everything that there is to start with, and how it is opened.
@@ -186,12 +190,15 @@ impl Origin {
                 // From here on nobody else takes it up.
                 let taken = SessionFile::take(path, &kept_session())?;
                 let kept = KeptSession::read(path)?;
-                let policies = Policies::new(policy_source::agents(None, kept.author.deciding));
+                let agents = policy_source::agents(None, kept.author.deciding);
+                let meant = kept.checkpoint.as_deref().and_then(|name| name.parse::<ExternalPolicy>().ok());
+                let external = meant.iter().map(|named| named.agent(self.options));
+                let policies = Policies::new(external.chain(agents).collect());
                 let taken_up = Exploration::take_up(&kept, policies).context("the session cannot be taken up")?;
                 return Ok(taken_up.taken_from(taken).reading_as(self.expect()?));
             }
             Start::Run { folder, number } => {
-                let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, &RecordedPolicy::default())?;
+                let (_, open) = recorded(&format!("{}#{number}", folder.display()), None, &self.options.into())?;
                 return open();
             }
             Start::House { room, seed } => (from.room, from.seed) = (Some(*room), Some(*seed)),
@@ -206,7 +213,7 @@ impl Origin {
         let (start, scenes) = self.start()?;
         let source = EpisodeSource::new(start, self.seed.unwrap_or(0), scenes);
         let asked = self.deciding.asked();
-        let remote = self.other_policy.iter().map(|(named, options)| named.agent(*options));
+        let remote = self.other_policy.iter().map(|named| named.agent(self.options));
         let agents = policy_source::agents(self.checkpoint.as_deref(), asked);
         let policies = Policies::new(remote.chain(agents).collect());
         let exploration = Exploration::new(source, policies, kind, None)?.deciding(asked);
