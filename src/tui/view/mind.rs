@@ -50,7 +50,10 @@ impl Widget for MindPanel<'_> {
                 for (row, line) in (0..).zip(lines) {
                     put(buf, inner, row, line, THEME.bad);
                 }
-                put(buf, inner, below, "e: the expert acts   x: chance acts   m: you act", THEME.quiet);
+                let whole = "e: the expert acts   x: chance acts   m: you act";
+                let is_narrow = usize::from(inner.width) < whole.len();
+                let keys = if is_narrow { "e: expert   x: chance   m: you act" } else { whole };
+                put(buf, inner, below, keys, THEME.quiet);
             }
             _ => {}
         }
