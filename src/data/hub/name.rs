@@ -14,9 +14,10 @@ pub(crate) struct HubName {
 const MAIN: &str = "main";
 
 impl HubName {
-    /// Reads a name; nothing where it is none, or there is such a folder here.
+    /// Reads a name; nothing where it is none, or begins with a folder that is here: a slip in a path is not looked for on the Hub.
     pub(crate) fn of_path(named: &Path) -> Option<HubName> {
-        named.to_str().filter(|_| !named.exists()).and_then(HubName::read)
+        let is_here = named.components().next().is_some_and(|first| Path::new(&first).exists());
+        named.to_str().filter(|_| !is_here).and_then(HubName::read)
     }
 
     fn read(text: &str) -> Option<HubName> {
@@ -66,5 +67,10 @@ mod tests {
             assert_eq!(HubName::read(path), None, "{path}");
         }
         assert_eq!(HubName::of_path(Path::new("src/data")), None, "there is such a folder");
+        assert_eq!(
+            HubName::of_path(Path::new("checkpoints/no-such-agent")),
+            None,
+            "a folder among those here is meant"
+        );
     }
 }
