@@ -107,7 +107,7 @@ class MinigridEnvironment(GymEnvironment):
 
 
 def _draw(grid: Grid, visible: numpy.ndarray, tile: int) -> numpy.ndarray:
-    """The agent's view as Minigrid draws it. Its `Grid.render` compares arrays in each cell to find the agent, a fifth of a step."""
+    """The agent's view as Minigrid draws it. Its `Grid.render` compares arrays in each cell to find the agent."""
     picture = numpy.empty((grid.height, tile, grid.width, tile, 3), numpy.uint8)
     agent = (grid.width // 2, grid.height - 1)
     for y in range(grid.height):
