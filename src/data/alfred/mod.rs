@@ -20,6 +20,7 @@ pub(crate) mod presence;
 pub(crate) mod recording;
 pub mod scenes;
 pub(crate) mod sightlines;
+pub(crate) mod span_task;
 pub(crate) mod support;
 pub mod tasks;
 pub(crate) mod trajectories;

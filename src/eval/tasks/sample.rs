@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::data::Dataset;
-use crate::data::alfred::tasks::span_task;
+use crate::data::alfred::span_task::span_task;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Task, TaskSet, Trajectory};
 use crate::house::{generate, validate};

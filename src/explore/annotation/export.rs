@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use super::agreement::{Answers, by_span};
 use super::session::answers;
 use super::spans::AnnotationSpan;
-use crate::data::alfred::tasks::span_task;
+use crate::data::alfred::span_task::span_task;
 use crate::data::annotations::{self, SpanKey};
 use crate::data::summaries::{Ledger, SpanSummary};
 use crate::data::{Dataset, taskset};
