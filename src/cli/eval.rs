@@ -25,7 +25,7 @@ use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::{Evaluation, EvaluationProgress};
 use crate::eval::options::Options;
 use crate::eval::progress_event::ProgressEvent;
-use crate::eval::tasks::{remote, sample};
+use crate::eval::tasks::{remote, scene_folder};
 use crate::house::grading::Grading;
 use crate::language::count::counted;
 use crate::report::summary::RunSummary;
@@ -131,7 +131,7 @@ impl Eval {
         let path = self.folder(&set.value.name, &chosen.name);
         let mut run = RunWriter::open(&path, evaluation.manifest())?;
         policy_places::write(&path, chosen.place().as_slice())?;
-        run.write_tasks(&sample::as_seen_from(&set.value, evaluation.tasks(), &file, &path)?)?;
+        run.write_tasks(&scene_folder::as_seen_from(&set.value, evaluation.tasks(), &file, &path)?)?;
         let stop = stop::on_signals()?;
         let run_control = ControlledRun::listen(Kind::Eval, &path, &stop, evaluation.clock());
         let mut meter = Meter::new(self.json, run_control.control.clone());

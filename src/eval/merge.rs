@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 
 use super::evaluation::finish;
-use super::tasks::sample;
+use super::tasks::scene_folder;
 use crate::episode::record::EpisodeKey;
 use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::episode_specs;
@@ -83,7 +83,7 @@ pub(crate) fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummar
     ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
     let mut folder = RunWriter::open(into, &manifest)?;
     policy_places::write(into, &first.places)?;
-    folder.write_tasks(&sample::as_seen_from(&set, &set.tasks, &file, into)?)?;
+    folder.write_tasks(&scene_folder::as_seen_from(&set, &set.tasks, &file, into)?)?;
     let there: std::collections::BTreeSet<EpisodeKey> =
         folder.earlier.iter().map(crate::episode::record::Episode::key).collect();
     for run in runs.values() {

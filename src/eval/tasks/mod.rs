@@ -3,3 +3,4 @@
 pub mod check;
 pub mod remote;
 pub mod sample;
+pub(crate) mod scene_folder;

@@ -10,6 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::scene_folder::relative;
 use crate::data::Dataset;
 use crate::data::alfred::span_task::span_task;
 use crate::domain::task::SceneRef;
@@ -253,35 +254,12 @@ fn writers(spec: &SampleSpec, trajectory: &Trajectory, span: Range<usize>) -> Ve
     wrote
 }
 
-/// The set with these of its tasks, as it is written in another folder: the scenes are where they were.
-///
-/// # Errors
-/// When the scenes' folder cannot be found.
-pub(crate) fn as_seen_from(set: &TaskSet, tasks: &[Task], file: &Path, folder: &Path) -> anyhow::Result<TaskSet> {
-    let scenes = set.scenes.as_ref().map(|scenes| {
-        let beside = file.parent().unwrap_or(Path::new("")).join(scenes);
-        // A set of generated houses may name a folder that is not there.
-        if beside.is_dir() { relative(&beside, folder) } else { Ok(scenes.clone()) }
-    });
-    Ok(TaskSet { scenes: scenes.transpose()?, tasks: tasks.to_vec(), ..set.clone() })
-}
-
 /// The annotators who wrote a sentence for each skill of a trajectory, and none of the span's empty.
 pub(crate) fn annotators(trajectory: &Trajectory, span: Range<usize>) -> Vec<usize> {
     let said = |steps: &[String]| {
         steps.len() == trajectory.skills.len() && steps[span.clone()].iter().all(|s| !s.trim().is_empty())
     };
     (0..).zip(&trajectory.annotations).filter(|(_, annotation)| said(&annotation.steps)).map(|(i, _)| i).collect()
-}
-
-/// How `folder` is written in a file that lies in `from`: relative, so that both can be moved together.
-pub(crate) fn relative(folder: &Path, from: &Path) -> anyhow::Result<String> {
-    let real = |path: &Path| path.canonicalize().with_context(|| format!("cannot read {}", path.display()));
-    let (to, from) = (real(folder)?, real(from)?);
-    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
-    let up = from.components().skip(shared).map(|_| std::path::Component::ParentDir);
-    let path: std::path::PathBuf = up.chain(to.components().skip(shared)).collect();
-    path.into_os_string().into_string().ok().with_context(|| format!("{} is not a Unicode path", folder.display()))
 }
 
 #[cfg(test)]
@@ -444,15 +422,5 @@ mod tests {
         assert!(balanced(&spec(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtasks"));
         let long = balanced(&spec(1, 2, 0), &[1, 2, 7], &sample).unwrap();
         assert_eq!(long.tasks.len(), 2);
-    }
-
-    #[test]
-    fn a_folder_is_named_relative_to_the_task_file() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir_all(folder.path().join("data/scenes")).unwrap();
-        std::fs::create_dir_all(folder.path().join("sets/mine")).unwrap();
-        let name = |from: &str| relative(&folder.path().join("data/scenes"), &folder.path().join(from)).unwrap();
-        assert_eq!(name("sets/mine"), "../../data/scenes");
-        assert_eq!(name("data"), "scenes");
     }
 }

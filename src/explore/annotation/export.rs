@@ -16,7 +16,7 @@ use crate::data::{Dataset, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
-use crate::eval::tasks::sample::relative;
+use crate::eval::tasks::scene_folder::relative;
 
 /// Whose labels these are, in `labels.jsonl`.
 pub(crate) const SOURCE: &str = "people";
