@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::Context;
 use sha2::{Digest, Sha256};
@@ -106,18 +106,22 @@ impl PolicySource {
         };
         // A training may be about to keep a newer one.
         let mut tries = 0;
-        let (checkpoint_hash, load, name) = loop {
+        let (checkpoint_hash, load, agent) = loop {
             let checkpoint_hash = hash(&folder)?;
             let load = loading(checkpoint_hash.clone());
             tries += 1;
             match load() {
-                Ok(agent) => break (checkpoint_hash, load, agent.name().to_owned()),
+                Ok(agent) => break (checkpoint_hash, load, agent),
                 Err(error) if tries == TRIES || hash(&folder)? == checkpoint_hash => return Err(error),
                 Err(_) => {}
             }
         };
-        let (make, folder) = (Arc::new(load), Some(folder));
-        Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make, folder, place: None })
+        let name = agent.name().to_owned();
+        // Whoever needs only one has what was read, whatever a training puts there afterwards.
+        let read = Mutex::new(Some(agent));
+        let take_read = move || read.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let make = Arc::new(move || take_read().map_or_else(&load, Ok));
+        Ok(PolicySource { name, checkpoint_hash: Some(checkpoint_hash), make, folder: Some(folder), place: None })
     }
 
     /// Notices when the checkpoint is no longer the one that was chosen.
@@ -269,4 +273,27 @@ pub(crate) fn checkpoints() -> Vec<PathBuf> {
         found
     };
     folders.iter().flat_map(in_folder).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::needed;
+
+    #[test]
+    fn an_agent_acts_though_a_training_replaced_its_checkpoint_and_no_second_one_is_made() {
+        let Some(clone) = needed::agent("tests/agents/clone") else { return };
+        let folder = tempfile::tempdir().unwrap();
+        for file in clone.read_dir().unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
+            std::fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
+        }
+        let asked = DecisionOverride::default();
+        let source = PolicySource::checkpoint(folder.path().to_owned(), false, asked).unwrap();
+        let config = folder.path().join("config.json");
+        let newer = std::fs::read_to_string(&config).unwrap() + "\n";
+        std::fs::write(&config, newer).unwrap();
+        assert!((source.make)().is_ok(), "what was read is at hand");
+        let refused = (source.make)().err().unwrap().to_string();
+        assert!(refused.contains("the checkpoint was replaced while the run was under way"), "{refused}");
+    }
 }
