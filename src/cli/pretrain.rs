@@ -44,7 +44,8 @@ pub(crate) struct Pretrain {
     /// Use this checkpoint's visual encoder instead of training one
     #[arg(long, value_name = "DIR")]
     visual_from: Option<PathBuf>,
-    /// Start from this checkpoint's policy instead of a fresh one
+    /// Start from this checkpoint's policy instead of a fresh one; of an agent with a memory it is taken as it is, with the
+    /// detector, and the critic alone is trained
     #[arg(long, value_name = "DIR")]
     policy_from: Option<PathBuf>,
     /// Start from this checkpoint's critic instead of a fresh one
@@ -137,7 +138,6 @@ impl Pretrain {
     fn run_memory(self, preset: MemoryPreset) -> anyhow::Result<ExitStatus> {
         let unused = [
             ("--size", self.size.is_some()),
-            ("--policy-from", self.policy_from.is_some()),
             ("--critic-from", self.critic_from.is_some()),
             ("--trials", self.trials.is_some()),
             ("--encoder", self.encoder.is_some()),
@@ -155,6 +155,7 @@ impl Pretrain {
             out: self.out,
             resume: self.resume,
             detector_from: self.visual_from,
+            chooser_from: self.policy_from,
             device,
         };
         let stop = stop::on_signals()?;

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::bounds;
 use crate::domain::Class;
 
-/// The size of a chooser.
+/// The size of a chooser, or of a critic of what it chooses among.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ChooserSpec {
@@ -23,14 +23,15 @@ pub(crate) struct ChooserSpec {
 }
 
 impl ChooserSpec {
-    /// Whether such a chooser can be built.
+    /// Whether such a network can be built. `name` is the section that holds these numbers.
     ///
     /// # Errors
     /// Names the field that is out of its bounds.
-    pub(crate) fn check(&self) -> anyhow::Result<()> {
-        anyhow::ensure!((1..=4).contains(&self.hidden.len()), "chooser.hidden has {} entries", self.hidden.len());
-        bounds::sizes("chooser.hidden", &self.hidden, 8192)?;
-        bounds::sizes("chooser.situation, action or embedding", &[self.situation, self.action, self.embedding], 8192)
+    pub(crate) fn check(&self, name: &str) -> anyhow::Result<()> {
+        anyhow::ensure!((1..=4).contains(&self.hidden.len()), "{name}.hidden has {} entries", self.hidden.len());
+        bounds::sizes(&format!("{name}.hidden"), &self.hidden, 8192)?;
+        let numbers = [self.situation, self.action, self.embedding];
+        bounds::sizes(&format!("{name}.situation, action or embedding"), &numbers, 8192)
     }
 }
 
@@ -115,7 +116,7 @@ mod tests {
         tch::manual_seed(3);
         let store = nn::VarStore::new(Device::Cpu);
         let spec = ChooserSpec { situation: 5, action: 4, embedding: 3, hidden: vec![8, 8] };
-        spec.check().unwrap();
+        spec.check("chooser").unwrap();
         let chooser = Chooser::new(&store.root(), &spec);
         let (situation, goal) =
             (Tensor::rand([1, 5], (Kind::Float, Device::Cpu)), Tensor::from_slice(&[7i64, 0]).view([1, 2]));

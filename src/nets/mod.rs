@@ -11,6 +11,7 @@ pub(crate) mod film;
 pub(crate) mod frozen;
 pub(crate) mod home;
 pub(crate) mod language_model;
+pub(crate) mod macro_critic;
 pub(crate) mod perception_heads;
 pub(crate) mod policy;
 pub(crate) mod precision;

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::validation::ValidationReport;
 use crate::agent::DecisionRule;
 use crate::agent::config::{CheckpointConfig, Provenance, SourceCheckpoint};
-use crate::agent::memory_agent::config::{MemoryConfig, MemoryProvenance};
+use crate::agent::memory_agent::config::{CriticProvenance, MemoryConfig, MemoryProvenance};
 use crate::agent::memory_agent::eyes::Sight;
 use crate::nets::precision::Precision;
 
@@ -139,8 +139,20 @@ pub(crate) fn card(name: &str, config: &CheckpointConfig, report: &ValidationRep
 
 /// The card of an agent with a memory.
 pub(crate) fn memory_card(name: &str, config: &MemoryConfig, report: &ValidationReport) -> String {
-    let MemoryProvenance { preset, detector_dataset, detector_steps, dataset, trajectories, chooser_steps, seed } =
-        &config.provenance;
+    let MemoryProvenance {
+        preset,
+        detector_dataset,
+        detector_steps,
+        dataset,
+        trajectories,
+        chooser_steps,
+        critic,
+        seed,
+    } = &config.provenance;
+    let critic = critic.as_ref().map_or_else(String::new, |critic| {
+        let CriticProvenance { dataset, trajectories, steps } = critic;
+        format!(" Its critic, {steps} steps on {trajectories} trajectories (datasets `{dataset}`), says what each choice is worth.")
+    });
     let sight = match config.sight {
         Sight::Detector => format!(
             "It finds things with a detector ({detector_steps} steps on datasets `{detector_dataset}`) in a frame with depth"
@@ -153,7 +165,7 @@ pub(crate) fn memory_card(name: &str, config: &MemoryConfig, report: &Validation
          keeps them with the floor on a map of its own, and chooses what to set out to: an interaction with something that it \
          remembers, the edge of what it has seen, a turn or a look. It says when it is done.\n\n\
          Trained with the preset `{preset}` on {trajectories} demonstrations (datasets `{dataset}`): {chooser_steps} steps of \
-         the chooser, seed {seed}.\n\n"
+         the chooser, seed {seed}.{critic}\n\n"
     );
     text + &measured("pretrain", report)
 }

@@ -13,6 +13,7 @@ use crate::agent::config::{CheckpointConfig, Ontology};
 use crate::data::{json, text_file};
 use crate::nets::chooser::{Chooser, ChooserSpec};
 use crate::nets::detector::{Detector, DetectorSpec};
+use crate::nets::macro_critic::MacroCritic;
 use crate::nets::size_differences::size_differences;
 use crate::nets::weights::{self, TensorSpec};
 
@@ -40,8 +41,23 @@ pub(crate) struct MemoryProvenance {
     pub(crate) trajectories: u64,
     /// Steps of the chooser's training.
     pub(crate) chooser_steps: u64,
+    /// The digest of the trajectories that the critic learned from, and the steps of its training.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) critic: Option<CriticProvenance>,
     /// The seed of initialisation and data order.
     pub(crate) seed: u64,
+}
+
+/// What a critic was trained on, and how long.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CriticProvenance {
+    /// The digest of the trajectories.
+    pub(crate) dataset: String,
+    /// How many those are.
+    pub(crate) trajectories: u64,
+    /// Steps of the training.
+    pub(crate) steps: u64,
 }
 
 /// A checkpoint's `config.json`.
@@ -60,6 +76,12 @@ pub(crate) struct MemoryConfig {
     pub(crate) loop_guard: bool,
     pub(crate) detector: DetectorSpec,
     pub(crate) chooser: ChooserSpec,
+    /// The size of the critic, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) critic: Option<ChooserSpec>,
+    /// How many times the advantage enters the exponent by which the agent weighs its chooser when it decides.
+    #[serde(default)]
+    pub(crate) advantage_scale: f32,
     /// How it was trained, and from what.
     pub(crate) provenance: MemoryProvenance,
 }
@@ -91,13 +113,22 @@ impl MemoryConfig {
         let (found, own) = (&self.ontology, Ontology::current());
         ensure!(*found == own, "ontology is not this program's: {}", size_differences(found, &own));
         self.detector.check()?;
-        self.chooser.check()?;
-        for (field, found, own) in [
-            ("chooser.situation", self.chooser.situation, features::SITUATION),
-            ("chooser.action", self.chooser.action, features::ACTION),
-        ] {
-            ensure!(found == own as i64, "{field} is {found}, and this program counts {own}: train the agent anew");
+        for (name, spec) in
+            std::iter::once(("chooser", &self.chooser)).chain(self.critic.iter().map(|it| ("critic", it)))
+        {
+            spec.check(name)?;
+            for (field, found, own) in
+                [("situation", spec.situation, features::SITUATION), ("action", spec.action, features::ACTION)]
+            {
+                ensure!(
+                    found == own as i64,
+                    "{name}.{field} is {found}, and this program counts {own}: train the agent anew"
+                );
+            }
         }
+        let scale = self.advantage_scale;
+        ensure!(scale.is_finite() && scale >= 0.0, "advantage_scale is {scale}, which is no weight");
+        ensure!(scale == 0.0 || self.critic.is_some(), "advantage_scale is {scale}, and there is no critic");
         Ok(())
     }
 }
@@ -109,22 +140,32 @@ pub(crate) struct MemoryNetworks {
     pub(crate) detector_store: nn::VarStore,
     pub(crate) chooser: Chooser,
     pub(crate) chooser_store: nn::VarStore,
+    pub(crate) critic: Option<MacroCritic>,
+    pub(crate) critic_store: nn::VarStore,
 }
 
 impl MemoryNetworks {
     /// Networks with fresh weights.
-    pub(crate) fn new(detector: &DetectorSpec, chooser: &ChooserSpec, device: Device) -> MemoryNetworks {
-        let (detector_store, chooser_store) = (nn::VarStore::new(device), nn::VarStore::new(device));
+    pub(crate) fn new(
+        detector: &DetectorSpec,
+        chooser: &ChooserSpec,
+        critic: Option<&ChooserSpec>,
+        device: Device,
+    ) -> MemoryNetworks {
+        let [detector_store, chooser_store, critic_store] = [(); 3].map(|()| nn::VarStore::new(device));
         MemoryNetworks {
             detector: Detector::new(&detector_store.root(), detector),
             chooser: Chooser::new(&chooser_store.root(), chooser),
+            critic: critic.map(|spec| MacroCritic::new(&critic_store.root(), spec)),
             detector_store,
             chooser_store,
+            critic_store,
         }
     }
 
     fn tensors(&self) -> BTreeMap<String, Tensor> {
-        let stores = [("detector", &self.detector_store), ("chooser", &self.chooser_store)];
+        let stores =
+            [("detector", &self.detector_store), ("chooser", &self.chooser_store), ("critic", &self.critic_store)];
         let named = |(prefix, store): (&'static str, &nn::VarStore)| {
             store.variables().into_iter().map(move |(name, tensor)| (format!("{prefix}.{name}"), tensor.detach()))
         };
@@ -138,21 +179,26 @@ impl MemoryNetworks {
     pub(crate) fn load(folder: &Path, config: &MemoryConfig, device: Device) -> anyhow::Result<MemoryNetworks> {
         let path = folder.join("model.safetensors");
         let tensors = weights::read(&path)?;
-        let networks = MemoryNetworks::new(&config.detector, &config.chooser, device);
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, config.critic.as_ref(), device);
         let variables = networks.tensors();
         let forms = variables.iter().map(|(name, tensor)| (name.clone(), TensorSpec::of(tensor))).collect();
         weights::check(&path, &tensors, &forms)?;
         weights::copy(&tensors, "detector.", &networks.detector_store)?;
         weights::copy(&tensors, "chooser.", &networks.chooser_store)?;
+        weights::copy(&tensors, "critic.", &networks.critic_store)?;
         Ok(networks)
     }
 
-    /// Writes a checkpoint: the weights first, the configuration last.
+    /// Writes a checkpoint: the weights first, the configuration last. A critic that the configuration does not name is left out.
     ///
     /// # Errors
     /// When the folder cannot be written to.
     pub(crate) fn save(&self, folder: &Path, config: &MemoryConfig) -> anyhow::Result<()> {
-        weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
+        let mut tensors = self.tensors();
+        if config.critic.is_none() {
+            tensors.retain(|name, _| !name.starts_with("critic."));
+        }
+        weights::write(&folder.join("model.safetensors"), &tensors, &BTreeMap::new())?;
         json::write_pretty(&folder.join("config.json"), config)
     }
 }
@@ -176,6 +222,8 @@ pub(super) mod tests {
                 embedding: 2,
                 hidden: vec![8],
             },
+            critic: None,
+            advantage_scale: 0.0,
             provenance: MemoryProvenance {
                 preset: "test".into(),
                 detector_dataset: String::new(),
@@ -183,6 +231,7 @@ pub(super) mod tests {
                 dataset: "none".into(),
                 trajectories: 0,
                 chooser_steps: 0,
+                critic: None,
                 seed: 1,
             },
         }
@@ -194,7 +243,7 @@ pub(super) mod tests {
         let folder = tempfile::tempdir().unwrap();
         assert!(!MemoryConfig::is_there(folder.path()));
         let config = small();
-        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
         assert!(MemoryConfig::is_there(folder.path()));
         let read = MemoryConfig::read(folder.path()).unwrap();
@@ -218,7 +267,7 @@ pub(super) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut config = small();
         config.chooser.action += 1;
-        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
         let error = format!("{:#}", MemoryConfig::read(folder.path()).unwrap_err());
         assert!(error.contains("config.json: chooser.action is") && error.contains("train the agent anew"), "{error}");

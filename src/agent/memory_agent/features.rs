@@ -1,11 +1,14 @@
 //! What the chooser knows of the situation and of each macro action, as numbers.
 
+use tch::{Device, Tensor};
+
 use super::goal::Goal;
 use super::macro_action::{MacroAction, Purpose};
 use super::progress::Progress;
 use crate::agent::memory::Memory;
 use crate::agent::memory::semantic_map::Thing;
 use crate::domain::{ActionType, Cell, Class};
+use crate::nets::chooser::Choices;
 
 /// Numbers of a situation.
 pub(crate) const SITUATION: usize = 56;
@@ -78,6 +81,30 @@ impl Choice {
     /// How many macro actions there are.
     pub(crate) fn len(&self) -> usize {
         self.classes.len()
+    }
+}
+
+/// Choices side by side, the shorter ones filled up.
+pub(crate) fn side_by_side(choices: &[&Choice], device: Device) -> Choices {
+    let (n, most) = (choices.len(), choices.iter().map(|choice| choice.len()).max().unwrap_or(0));
+    let mut actions = vec![0f32; n * most * ACTION];
+    let (mut classes, mut present) = (vec![0i64; n * most], vec![0f32; n * most]);
+    for (row, choice) in choices.iter().enumerate() {
+        actions[row * most * ACTION..][..choice.actions.len()].copy_from_slice(&choice.actions);
+        for (column, &class) in choice.classes.iter().enumerate() {
+            classes[row * most + column] = class.into();
+            present[row * most + column] = 1.0;
+        }
+    }
+    let situation: Vec<f32> = choices.iter().flat_map(|choice| choice.situation.iter().copied()).collect();
+    let goal: Vec<i64> = choices.iter().flat_map(|choice| choice.goal.map(i64::from)).collect();
+    let (n, most) = (n as i64, most as i64);
+    Choices {
+        situation: Tensor::from_slice(&situation).view([n, SITUATION as i64]).to_device(device),
+        goal: Tensor::from_slice(&goal).view([n, 2]).to_device(device),
+        actions: Tensor::from_slice(&actions).view([n, most, ACTION as i64]).to_device(device),
+        classes: Tensor::from_slice(&classes).view([n, most]).to_device(device),
+        present: Tensor::from_slice(&present).view([n, most]).to_device(device),
     }
 }
 

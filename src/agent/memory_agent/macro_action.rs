@@ -64,6 +64,15 @@ impl MacroAction {
         self.first.kind.is_interaction() || matches!(self.purpose, Purpose::Look(_))
     }
 
+    /// Its first action, with the class that it acts on if that is an interaction.
+    pub(crate) fn beginning(&self) -> (ActionType, Option<Class>) {
+        let class = match self.purpose {
+            Purpose::Interact(_, class) if self.first.kind.is_interaction() => Some(class),
+            _ => None,
+        };
+        (self.first.kind, class)
+    }
+
     fn along(purpose: Purpose, thing: Option<usize>, at: Cell, route: Route) -> Option<MacroAction> {
         let first = Action::navigate(route.first?);
         let novelty = Default::default();

@@ -10,6 +10,7 @@ pub(crate) mod mind;
 mod policy;
 pub(crate) mod progress;
 mod recollection;
+mod weighed;
 
 pub(crate) use policy::MemoryPolicy;
 pub(crate) use recollection::Recollection;

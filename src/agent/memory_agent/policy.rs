@@ -9,20 +9,25 @@ use super::config::{MemoryConfig, MemoryNetworks};
 use super::eyes::{Eyes, Sight};
 use super::macro_action::{MacroAction, Purpose};
 use super::recollection::Recollection;
+use super::weighed::Weighed;
 use crate::agent::decision::{ActionDistribution, Decision};
 use crate::agent::decision_rule::DecisionOverride;
 use crate::agent::policy::{Decisions, Observation, Policy, PolicyState, each_alone};
+use crate::agent::value_estimates::{AdvantageScale, Values};
 use crate::domain::{Action, ActionType, Class};
 use crate::house::view::Candidate;
 use crate::nets::chooser::Chooser;
+use crate::nets::macro_critic::MacroCritic;
 
 /// A policy from a checkpoint.
 pub(crate) struct MemoryPolicy {
     name: String,
     eyes: Eyes,
     chooser: Chooser,
-    /// Owns the chooser's weights.
-    _networks: tch::nn::VarStore,
+    critic: Option<MacroCritic>,
+    /// Own the chooser's and the critic's weights.
+    _networks: [tch::nn::VarStore; 2],
+    advantage_scale: f32,
     loop_guard: bool,
     /// As its checkpoint says: what is asked for may be taken back.
     own_loop_guard: bool,
@@ -54,7 +59,9 @@ impl MemoryPolicy {
             name,
             eyes,
             chooser: networks.chooser,
-            _networks: networks.chooser_store,
+            critic: networks.critic,
+            _networks: [networks.chooser_store, networks.critic_store],
+            advantage_scale: config.advantage_scale,
             loop_guard: config.loop_guard,
             own_loop_guard: config.loop_guard,
             samples: false,
@@ -63,27 +70,45 @@ impl MemoryPolicy {
     }
 
     fn decide(&mut self, slot: usize, here: &mut Observation<'_>) -> anyhow::Result<Decision> {
-        let slots = self.slots.len();
-        let known = self.slots.get_mut(slot).with_context(|| format!("there are {slots} slots, not {slot}"))?;
-        known.read(here.instruction)?;
-        if known.seen_at != Some(here.step) {
-            known.look(&self.eyes, here.environment, here.step, here.last)?;
-        }
+        let known = meet(&mut self.slots, &self.eyes, slot, here)?;
         if let Some(decision) = known.greedy.clone().filter(|_| !self.samples) {
             return Ok(decision);
         }
         let legal = here.environment.legal_actions()?;
-        let (actions, done, probabilities) = known.weigh(&self.chooser, &legal)?;
+        let mut weighed = known.weigh(&self.chooser, &legal)?;
+        let critic = self.critic.as_ref().filter(|_| self.advantage_scale > 0.0);
+        let values = critic.map(|critic| weighed.values(critic)).transpose()?;
+        if let Some(values) = &values {
+            weighed.scale(&AdvantageScale { values, weight: self.advantage_scale });
+        }
+        known.values.clone_from(&values);
+        let Weighed { actions, probabilities, done, .. } = weighed;
         let tried = if self.loop_guard { known.begun_here() } else { Vec::new() };
         let greedy = known.choose(&actions, &probabilities, &tried, false);
         let distribution = distribution(&actions, &probabilities, &legal, greedy.first);
         let chosen = if self.samples { known.choose(&actions, &probabilities, &tried, true) } else { greedy };
         let action = chosen.first;
         known.begin(chosen, here.environment);
-        let decision = Decision { distribution: Some(distribution), done: Some(done), ..Decision::of(action) };
+        let decision = Decision { distribution: Some(distribution), values, done: Some(done), ..Decision::of(action) };
         known.greedy = (!self.samples).then(|| decision.clone());
         Ok(decision)
     }
+}
+
+/// What a slot knows here: it reads and looks, where that is not done yet.
+fn meet<'a>(
+    slots: &'a mut [Recollection],
+    eyes: &Eyes,
+    slot: usize,
+    here: &mut Observation<'_>,
+) -> anyhow::Result<&'a mut Recollection> {
+    let count = slots.len();
+    let known = slots.get_mut(slot).with_context(|| format!("there are {count} slots, not {slot}"))?;
+    known.read(here.instruction)?;
+    if known.seen_at != Some(here.step) {
+        known.look(eyes, here.environment, here.step, here.last)?;
+    }
+    Ok(known)
 }
 
 /// The probabilities of macro actions as those of what they begin with.
@@ -151,6 +176,16 @@ impl Policy for MemoryPolicy {
     fn set_deciding(&mut self, asked: DecisionOverride) {
         self.loop_guard = asked.loop_guard.unwrap_or(self.own_loop_guard);
     }
+
+    fn values(&mut self, slot: usize, observation: &mut Observation<'_>) -> anyhow::Result<Option<Values>> {
+        let Some(critic) = &self.critic else { return Ok(None) };
+        let known = meet(&mut self.slots, &self.eyes, slot, observation)?;
+        if known.values.is_none() {
+            let weighed = known.weigh(&self.chooser, &observation.environment.legal_actions()?)?;
+            known.values = Some(weighed.values(critic)?);
+        }
+        Ok(known.values.clone())
+    }
 }
 
 #[cfg(test)]
@@ -169,7 +204,7 @@ mod tests {
     fn policy() -> MemoryPolicy {
         tch::manual_seed(4);
         let config = small();
-        let networks = MemoryNetworks::new(&config.detector, &config.chooser, Device::Cpu);
+        let networks = MemoryNetworks::new(&config.detector, &config.chooser, config.critic.as_ref(), Device::Cpu);
         MemoryPolicy::with("small".into(), &config, networks)
     }
 
@@ -302,5 +337,42 @@ mod tests {
         assert_eq!((goal.skill, goal.receptacle), (SkillKind::Put, Class::named("Sink")));
         assert_eq!(mind.memory.step, 3, "frames since the start of the episode");
         assert!(mind.memory.map.things(0.3).len() > 3);
+    }
+
+    #[test]
+    fn a_critic_values_what_could_be_done_and_changes_no_decision_unless_it_weighs() {
+        let _chance = crate::nets::testing::chance();
+        let with = |advantage_scale: f32| {
+            tch::manual_seed(4);
+            let mut config = small();
+            config.critic = Some(config.chooser.clone());
+            config.advantage_scale = advantage_scale;
+            let (chooser, critic) = (&config.chooser, config.critic.as_ref());
+            MemoryPolicy::with(
+                "small".into(),
+                &config,
+                MemoryNetworks::new(&config.detector, chooser, critic, Device::Cpu),
+            )
+        };
+        let mut policy = with(0.0);
+        (0..2).for_each(|slot| policy.reset(slot, 7));
+        let (mut asked, mut unasked) = (episode(), episode());
+        for step in 0..6 {
+            let values = policy.values(0, &mut asked.observation()).unwrap().unwrap();
+            let decision = play(&mut policy, &mut asked, 0, 1).remove(0);
+            assert_eq!(play(&mut policy, &mut unasked, 1, 1), [decision.clone()], "step {step}");
+            assert_eq!(decision.values, None);
+            assert!(values.state.is_finite());
+            assert!(values.choices.iter().any(|choice| choice.kind == decision.action.kind && choice.q.is_finite()));
+        }
+        let mut weighed = with(5.0);
+        weighed.reset(0, 7);
+        let mut rollout = episode();
+        let decision = rollout.decide(&mut weighed).unwrap();
+        assert_eq!(decision.values, weighed.values(0, &mut rollout.observation()).unwrap());
+        policy.reset(0, 7);
+        let plain = episode().decide(&mut policy).unwrap();
+        let probabilities = |decision: Decision| decision.distribution.unwrap().actions;
+        assert_ne!(probabilities(plain), probabilities(decision));
     }
 }

@@ -5,21 +5,23 @@ use std::collections::BTreeSet;
 use anyhow::Context;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tch::{Device, Kind, Tensor};
+use tch::Device;
 
 use super::eyes::Eyes;
-use super::features::Choice;
+use super::features::side_by_side;
 use super::goal::Goal;
 use super::macro_action::{MacroAction, Purpose};
 use super::mind::{Mind, Moment};
 use super::progress::Progress;
+use super::weighed::Weighed;
 use crate::agent::decision::Decision;
+use crate::agent::value_estimates::Values;
 use crate::domain::{Action, ActionType, Cell, Class, Pose};
 use crate::env::Environment;
 use crate::house::view::Candidate;
 use crate::language::instruction::normalise;
 use crate::language::reader::ReadSubtask;
-use crate::nets::chooser::{Choices, Chooser};
+use crate::nets::chooser::Chooser;
 
 /// From this probability on a goal counts as reached.
 const REACHED: f32 = 0.5;
@@ -46,6 +48,8 @@ pub struct Recollection {
     decided: Option<(Action, Tried, Aim)>,
     /// The likeliest decision in the state that was seen last.
     pub(super) greedy: Option<Decision>,
+    /// What the critic makes of that state, once it was asked.
+    pub(super) values: Option<Values>,
     rng: ChaCha8Rng,
 }
 
@@ -65,6 +69,7 @@ impl Default for Recollection {
             aim: None,
             decided: None,
             greedy: None,
+            values: None,
             rng: ChaCha8Rng::seed_from_u64(0),
         }
     }
@@ -84,7 +89,7 @@ impl Recollection {
             let (goals, subtasks) = Goal::read(&instruction, &before)?;
             self.mind.set_goals(goals);
             self.tried.clear();
-            (self.aim, self.decided, self.greedy) = (None, None, None);
+            (self.aim, self.decided, self.greedy, self.values) = (None, None, None, None);
             self.read = Some((instruction, subtasks));
         }
         Ok(())
@@ -114,20 +119,16 @@ impl Recollection {
         let seen = eyes.look(environment)?;
         let legal = environment.legal_actions()?;
         self.mind.observe(&Moment { pose, frame: environment.frame()?, seen: &seen, legal: &legal });
-        (self.seen_at, self.greedy) = (Some(step), None);
+        (self.seen_at, self.greedy, self.values) = (Some(step), None, None);
         Ok(())
     }
 
-    /// What could be done, how probably the instruction is fulfilled, and how probable each macro action is. Goals that are
-    /// reached are passed.
-    pub(super) fn weigh(
-        &mut self,
-        chooser: &Chooser,
-        legal: &[Candidate],
-    ) -> anyhow::Result<(Vec<MacroAction>, f32, Vec<f32>)> {
+    /// What could be done, and what is made of it. Goals that are reached are passed.
+    pub(super) fn weigh(&mut self, chooser: &Chooser, legal: &[Candidate]) -> anyhow::Result<Weighed> {
         loop {
             let (actions, choice) = self.mind.choice(legal);
-            let (log_probabilities, done) = tch::no_grad(|| chooser.forward(&alone(&choice, chooser.device())));
+            let choices = side_by_side(&[&choice], chooser.device());
+            let (log_probabilities, done) = tch::no_grad(|| chooser.forward(&choices));
             let progress = &mut self.mind.progress;
             let done = if progress.can_be_reached() { done.sigmoid().double_value(&[0]) as f32 } else { 0.0 };
             if done >= REACHED && !progress.is_last() {
@@ -135,7 +136,7 @@ impl Recollection {
                 continue;
             }
             let probabilities = Vec::<f32>::try_from(log_probabilities.exp().squeeze_dim(0).to_device(Device::Cpu))?;
-            return Ok((actions, done, probabilities));
+            return Ok(Weighed { actions, choices, done, probabilities });
         }
     }
 
@@ -159,7 +160,7 @@ impl Recollection {
         tried: &[(ActionType, Option<Class>)],
         by_chance: bool,
     ) -> MacroAction {
-        let is_new = |action: &&MacroAction| !tried.contains(&beginning(action));
+        let is_new = |action: &&MacroAction| !tried.contains(&action.beginning());
         let any_new = actions.iter().any(|action| is_new(&action));
         let open: Vec<(usize, &MacroAction)> =
             actions.iter().enumerate().filter(|(_, action)| !any_new || is_new(action)).collect();
@@ -195,7 +196,7 @@ impl Recollection {
     /// Remembers what is about to be done.
     pub(super) fn begin(&mut self, chosen: MacroAction, environment: &dyn Environment) {
         let (pose, at, done) = self.situation();
-        let (kind, class) = beginning(&chosen);
+        let (kind, class) = chosen.beginning();
         self.decided = Some((chosen.first, (pose, at, done, kind, class), (chosen.purpose, chosen.at)));
         let class = chosen.first.target.and_then(|target| environment.class_of(target));
         let cell = chosen.at.unwrap_or_else(|| self.mind.ahead());
@@ -215,15 +216,6 @@ fn fulfils(action: &MacroAction, progress: &Progress) -> bool {
     action.first.kind == kind && progress.is_fulfilled_by(kind, class)
 }
 
-/// How a macro action begins, as the loop guard tells beginnings apart.
-fn beginning(action: &MacroAction) -> (ActionType, Option<Class>) {
-    let class = match action.purpose {
-        Purpose::Interact(_, class) if action.first.kind.is_interaction() => Some(class),
-        _ => None,
-    };
-    (action.first.kind, class)
-}
-
 fn turn_right() -> MacroAction {
     let first = Action::navigate(ActionType::RotateRight);
     MacroAction {
@@ -234,18 +226,5 @@ fn turn_right() -> MacroAction {
         first,
         at: None,
         novelty: Default::default(),
-    }
-}
-
-/// A batch of one choice.
-fn alone(choice: &Choice, device: Device) -> Choices {
-    let count = choice.len() as i64;
-    let classes: Vec<i64> = choice.classes.iter().map(|&class| class.into()).collect();
-    Choices {
-        situation: Tensor::from_slice(&choice.situation).unsqueeze(0).to_device(device),
-        goal: Tensor::from_slice(&choice.goal.map(i64::from)).unsqueeze(0).to_device(device),
-        actions: Tensor::from_slice(&choice.actions).view([1, count, -1]).to_device(device),
-        classes: Tensor::from_slice(&classes).unsqueeze(0).to_device(device),
-        present: Tensor::ones([1, count], (Kind::Float, device)),
     }
 }

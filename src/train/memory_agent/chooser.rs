@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Reduction, Tensor, nn};
 
-use super::examples::Example;
-use crate::agent::memory_agent::features::{ACTION, SITUATION};
+use super::examples::{Example, ExampleSets, marks};
+use crate::agent::memory_agent::features::{Choice, side_by_side};
 use crate::algo::learner::{Learner, Optimisation};
 use crate::nets::chooser::{Choices, Chooser};
 use crate::train::detection::Rhythm;
@@ -38,12 +38,6 @@ impl ChooserTraining {
         ensure!(weight.is_finite() && weight >= 0.0, "{name}.aim_weight is {weight}, which is no weight");
         self.optimisation.check(&format!("{name}.optimisation"))
     }
-}
-
-/// Examples to learn from, and held-out ones to measure on.
-pub(crate) struct ExampleSets {
-    pub(crate) training: Vec<Example>,
-    pub(crate) held_out: Vec<Example>,
 }
 
 /// Trains a chooser up to the last step, from where `state` left off if it is there; `save` keeps a checkpoint. Returns false when
@@ -115,39 +109,13 @@ struct Losses {
 
 impl Batch {
     fn of(examples: &[&Example], device: Device) -> Batch {
-        let (n, most) = (examples.len(), examples.iter().map(|example| example.choice.len()).max().unwrap_or(0));
-        let mut situation = Vec::with_capacity(n * SITUATION);
-        let mut goal = Vec::with_capacity(2 * n);
-        let mut actions = vec![0f32; n * most * ACTION];
-        let (mut classes, mut present) = (vec![0i64; n * most], vec![0f32; n * most]);
-        let (mut right, mut aim) = (vec![0f32; n * most], vec![0f32; n * most]);
-        for (row, example) in examples.iter().enumerate() {
-            let choice = &example.choice;
-            situation.extend_from_slice(&choice.situation);
-            goal.extend(choice.goal.map(i64::from));
-            actions[row * most * ACTION..][..choice.actions.len()].copy_from_slice(&choice.actions);
-            for (column, &class) in choice.classes.iter().enumerate() {
-                classes[row * most + column] = class.into();
-                present[row * most + column] = 1.0;
-                right[row * most + column] = f32::from(u8::from(example.right.get(column) == Some(&true)));
-                aim[row * most + column] = f32::from(u8::from(example.aim == Some(column)));
-            }
-        }
+        let choices: Vec<&Choice> = examples.iter().map(|example| &example.choice).collect();
         let reached: Vec<f32> = examples.iter().map(|example| f32::from(u8::from(example.reached))).collect();
-        let (n, most) = (n as i64, most as i64);
-        let tensor = |numbers: &[f32], shape: &[i64]| Tensor::from_slice(numbers).view(shape).to_device(device);
-        let indices = |numbers: &[i64], shape: &[i64]| Tensor::from_slice(numbers).view(shape).to_device(device);
         Batch {
-            choices: Choices {
-                situation: tensor(&situation, &[n, SITUATION as i64]),
-                goal: indices(&goal, &[n, 2]),
-                actions: tensor(&actions, &[n, most, ACTION as i64]),
-                classes: indices(&classes, &[n, most]),
-                present: tensor(&present, &[n, most]),
-            },
-            right: tensor(&right, &[n, most]),
-            aim: tensor(&aim, &[n, most]),
-            reached: tensor(&reached, &[n]),
+            choices: side_by_side(&choices, device),
+            right: marks(examples, device, |example, column| example.right.get(column) == Some(&true)),
+            aim: marks(examples, device, |example, column| example.aim == Some(column)),
+            reached: Tensor::from_slice(&reached).to_device(device),
         }
     }
 

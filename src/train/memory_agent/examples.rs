@@ -4,6 +4,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use tch::{Device, Tensor};
 
 use crate::agent::memory_agent::eyes::Eyes;
 use crate::agent::memory_agent::features::Choice;
@@ -32,8 +33,27 @@ pub(crate) struct Example {
     pub(crate) right: Vec<bool>,
     /// The macro action that the demonstrator had set out to, where that can be told.
     pub(crate) aim: Option<usize>,
+    /// For each macro action, whether it begins with what was done, be it right or not; empty where nothing was done for this
+    /// goal, or it is not known what came of it. What came of it is the next example.
+    pub(crate) taken: Vec<bool>,
     /// Whether the goal is reached.
     pub(crate) reached: bool,
+}
+
+/// Examples to learn from, and held-out ones to measure on; those of a trajectory one after the other.
+pub(crate) struct ExampleSets {
+    pub(crate) training: Vec<Example>,
+    pub(crate) held_out: Vec<Example>,
+}
+
+/// What is marked of each macro action [n, actions], of the examples side by side: 1 or 0.
+pub(super) fn marks(examples: &[&Example], device: Device, mark: impl Fn(&Example, usize) -> bool) -> Tensor {
+    let (n, most) = (examples.len(), examples.iter().map(|example| example.choice.len()).max().unwrap_or(0));
+    let row = |example: &&Example| -> Vec<f32> {
+        (0..most).map(|column| f32::from(u8::from(column < example.choice.len() && mark(example, column)))).collect()
+    };
+    let marks: Vec<f32> = examples.iter().flat_map(row).collect();
+    Tensor::from_slice(&marks).view([n as i64, most as i64]).to_device(device)
 }
 
 /// The examples of some trajectories, in their order; the same for any number of threads. `seed` drives in whose words each is told.
@@ -153,7 +173,7 @@ fn replay(
         mind.observe(&Moment { pose: world.agent.relative_to(origin), frame, seen: &seen, legal: &legal });
         while told.ends.get(mind.progress.at).is_some_and(|end| *end <= step) {
             let (_, choice) = mind.choice(&legal);
-            found.push(Example { choice, right: Vec::new(), aim: None, reached: true });
+            found.push(Example { choice, right: Vec::new(), aim: None, taken: Vec::new(), reached: true });
             if mind.progress.is_last() {
                 return Ok(found);
             }
@@ -166,12 +186,16 @@ fn replay(
         let next = labels[step..until.clamp(step, labels.len())].iter().find(|next| next.target.is_some());
         let aim = aim(scene, &world, origin, &actions, next.copied(), label).filter(|&aim| right[aim]);
         let right = if right.contains(&true) { right } else { Vec::new() };
-        found.push(Example { choice, right, aim, reached: false });
+        let taken = actions.iter().map(|it| begins_so(scene, &world, it, action)).collect();
+        found.push(Example { choice, right, aim, taken, reached: false });
 
         let class = action.target.and_then(|target| world.class_of(scene, target));
         let at = actions.iter().find(|it| it.first == action).and_then(|it| it.at).unwrap_or_else(|| mind.ahead());
         mind.attempt(action, class.map(|class| (class, at)));
         recorded.step();
+    }
+    if let Some(last) = found.last_mut() {
+        last.taken.clear();
     }
     Ok(found)
 }

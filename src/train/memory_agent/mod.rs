@@ -1,18 +1,21 @@
 //! Trains an agent with a memory: the detector first, then the choice among what it remembers.
 
 mod chooser;
+mod critic;
 mod examples;
 pub(crate) mod preset;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use tch::Device;
+use serde::Serialize;
+use tch::{Device, nn};
 
-use self::chooser::ExampleSets;
+use self::critic::CriticPair;
+use self::examples::ExampleSets;
 use self::preset::MemoryPreset;
 use super::detection::{self, Rhythm};
 use super::frame_store::FrameStore;
@@ -22,9 +25,10 @@ use super::pretrain::out_folder::TrainingFolder;
 use super::tensorboard::TensorBoard;
 use super::training_state::TrainingState;
 use crate::agent::config::{CheckpointConfig, Ontology};
-use crate::agent::memory_agent::config::{AgentKind, MemoryConfig, MemoryNetworks, MemoryProvenance};
+use crate::agent::memory_agent::config::{AgentKind, CriticProvenance, MemoryConfig, MemoryNetworks, MemoryProvenance};
 use crate::agent::memory_agent::eyes::{Eyes, Sight};
 use crate::data::dataset::Dataset;
+use crate::nets::macro_critic::MacroCritic;
 use crate::nets::size_differences::size_differences;
 use crate::nets::weights;
 
@@ -40,6 +44,8 @@ pub(crate) struct MemoryTraining {
     pub(crate) resume: bool,
     /// A checkpoint whose detector is used instead of training one.
     pub(crate) detector_from: Option<PathBuf>,
+    /// A checkpoint whose detector and chooser are used, so that the critic alone is trained.
+    pub(crate) chooser_from: Option<PathBuf>,
     /// Where to compute.
     pub(crate) device: Device,
 }
@@ -61,7 +67,9 @@ impl MemoryTraining {
         let mut logger = TensorBoard::open(&training, &mut logger)?;
 
         tch::manual_seed(self.preset.seed as i64);
-        let networks = MemoryNetworks::new(&self.preset.detector, &self.preset.chooser.spec(), self.device);
+        let preset = &self.preset;
+        let (chooser, critic) = (preset.chooser.spec(), preset.critic_spec());
+        let networks = MemoryNetworks::new(&preset.detector, &chooser, critic.as_ref(), self.device);
         let data = digests.join("-");
         if !self.detector(&networks, (&frame_store, &data), &mut logger, stop)? {
             return Ok(Trained::Stopped);
@@ -69,18 +77,76 @@ impl MemoryTraining {
         let Some(sets) = self.examples(&networks, &frame_store, &mut logger, stop)? else {
             return Ok(Trained::Stopped);
         };
-        let config = self.config(&data, &frame_store)?;
-        let identity = self.identity(&[("dataset", &data), ("detector", &self.detector_digest(&networks)?)]);
-        let path = training.join(STATES[1]);
-        let state = TrainingState { path: &path, identity: &identity };
-        let save = |steps: u64| {
-            let provenance = MemoryProvenance { chooser_steps: steps, ..config.provenance.clone() };
-            networks.save(&self.out, &MemoryConfig { provenance, ..config.clone() })
-        };
-        let how = (&self.preset.chooser_training, self.rhythm());
-        let learns = (&networks.chooser_store, &networks.chooser);
-        let finished = chooser::train(learns, &sets, how, state, &mut logger, stop, &save)?;
+        let learned = Learned { networks: &networks, data: &data, sets: &sets };
+        let trained = self.choice(&learned, &frame_store, &mut logger, stop)?;
+        let Some(config) = trained else { return Ok(Trained::Stopped) };
+        let finished = self.critic(&learned, config, &frame_store, &mut logger, stop)?;
         Ok(if finished { Trained::Finished } else { Trained::Stopped })
+    }
+
+    /// The chooser: another checkpoint's, or one that is trained now. What the checkpoint says of it; nothing when that was stopped.
+    fn choice(
+        &self,
+        learned: &Learned<'_>,
+        frame_store: &FrameStore,
+        logger: &mut dyn ProgressLogger,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<Option<MemoryConfig>> {
+        let config = self.config(learned.data, frame_store)?;
+        if let Some(folder) = &self.chooser_from {
+            let given = MemoryConfig::read(folder)?;
+            same_size(folder, "chooser", &given.chooser, &config.chooser)?;
+            let networks = MemoryNetworks::load(folder, &given, self.device)?;
+            let weights: weights::Tensors = networks.chooser_store.variables().into_iter().collect();
+            weights::copy(&weights, "", &learned.networks.chooser_store)?;
+            let provenance = MemoryProvenance { critic: None, ..given.provenance };
+            return Ok(Some(MemoryConfig { provenance, ..config }));
+        }
+        let identity = self.identity(&[("dataset", learned.data), ("detector", &learned.digest(Stage::Detector)?)]);
+        let path = self.folder().training().join(STATES[1]);
+        let state = TrainingState { path: &path, identity: &identity };
+        let after = |steps: u64| {
+            let provenance = MemoryProvenance { chooser_steps: steps, ..config.provenance.clone() };
+            MemoryConfig { provenance, ..config.clone() }
+        };
+        let save = |steps: u64| learned.networks.save(&self.out, &after(steps));
+        let how = (&self.preset.chooser_training, self.rhythm());
+        let learns = (&learned.networks.chooser_store, &learned.networks.chooser);
+        let finished = chooser::train(learns, learned.sets, how, state, logger, stop, &save)?;
+        Ok(finished.then(|| after(self.preset.chooser_training.optimisation.steps)))
+    }
+
+    /// The critic, where the preset has one; false when its training was stopped.
+    fn critic(
+        &self,
+        learned: &Learned<'_>,
+        config: MemoryConfig,
+        frame_store: &FrameStore,
+        logger: &mut dyn ProgressLogger,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<bool> {
+        let (Some(critic), Some(spec)) = (&learned.networks.critic, self.preset.critic_spec()) else {
+            learned.networks.save(&self.out, &config)?;
+            return Ok(true);
+        };
+        let target_store = nn::VarStore::new(self.device);
+        let target = MacroCritic::new(&target_store.root(), &spec);
+        let critics = CriticPair { online: (&learned.networks.critic_store, critic), target: (&target_store, &target) };
+        let digests = [Stage::Detector, Stage::Chooser].map(|stage| learned.digest(stage));
+        let [detector, chooser] = digests;
+        let identity = self.identity(&[("dataset", learned.data), ("detector", &detector?), ("chooser", &chooser?)]);
+        let path = self.folder().training().join(STATES[2]);
+        let state = TrainingState { path: &path, identity: &identity };
+        let trajectories = self.learned_from(frame_store);
+        let save = |steps: u64| {
+            let critic = CriticProvenance { dataset: learned.data.to_string(), trajectories, steps };
+            let provenance = MemoryProvenance { critic: Some(critic), ..config.provenance.clone() };
+            let advantage_scale = self.preset.advantage_scale;
+            let config = MemoryConfig { provenance, critic: Some(spec.clone()), advantage_scale, ..config.clone() };
+            learned.networks.save(&self.out, &config)
+        };
+        let how = (&self.preset.critic_training, self.rhythm());
+        critic::train(&critics, learned.sets, how, state, logger, stop, &save)
     }
 
     /// The detector: another checkpoint's, or one that is trained now; false when that was stopped.
@@ -94,16 +160,9 @@ impl MemoryTraining {
         if self.preset.sight == Sight::Simulator {
             return Ok(true);
         }
-        if let Some(folder) = &self.detector_from {
+        if let Some(folder) = self.detector_folder() {
             let config = MemoryConfig::read(folder)?;
-            let (found, own) = (&config.detector, &self.preset.detector);
-            let file = folder.join("config.json");
-            anyhow::ensure!(
-                found == own,
-                "{}: detector is of another size than the preset's: {}",
-                file.display(),
-                size_differences(found, own)
-            );
+            same_size(folder, "detector", &config.detector, &self.preset.detector)?;
             let given = MemoryNetworks::load(folder, &config, self.device)?;
             weights::copy(&given.detector_store.variables().into_iter().collect(), "", &networks.detector_store)?;
             return Ok(true);
@@ -157,7 +216,7 @@ impl MemoryTraining {
 
     fn config(&self, data: &str, frame_store: &FrameStore) -> anyhow::Result<MemoryConfig> {
         let preset = &self.preset;
-        let (detector_dataset, detector_steps) = match (&self.detector_from, preset.sight) {
+        let (detector_dataset, detector_steps) = match (self.detector_folder(), preset.sight) {
             (_, Sight::Simulator) => (String::new(), 0),
             (Some(folder), _) => {
                 let from = MemoryConfig::read(folder)?.provenance;
@@ -165,8 +224,6 @@ impl MemoryTraining {
             }
             (None, _) => (data.to_string(), preset.detector_training.optimisation.steps),
         };
-        let apart = frame_store.kept_apart(preset.hold_out);
-        let learned_from = self.drawn(frame_store).into_iter().filter(|&trajectory| !apart[trajectory]).count();
         Ok(MemoryConfig {
             format_version: CheckpointConfig::FORMAT,
             agent: AgentKind::Memory,
@@ -175,20 +232,29 @@ impl MemoryTraining {
             loop_guard: preset.loop_guard,
             detector: preset.detector.clone(),
             chooser: preset.chooser.spec(),
+            critic: None,
+            advantage_scale: 0.0,
             provenance: MemoryProvenance {
                 preset: preset.name.clone(),
                 detector_dataset,
                 detector_steps,
                 dataset: data.to_string(),
-                trajectories: learned_from as u64,
+                trajectories: self.learned_from(frame_store),
                 chooser_steps: 0,
+                critic: None,
                 seed: preset.seed,
             },
         })
     }
 
-    fn detector_digest(&self, networks: &MemoryNetworks) -> anyhow::Result<String> {
-        weights::digest(networks.detector_store.variables())
+    /// How many trajectories are learned from.
+    fn learned_from(&self, frame_store: &FrameStore) -> u64 {
+        let apart = frame_store.kept_apart(self.preset.hold_out);
+        self.drawn(frame_store).into_iter().filter(|&trajectory| !apart[trajectory]).count() as u64
+    }
+
+    fn detector_folder(&self) -> Option<&Path> {
+        self.chooser_from.as_deref().or(self.detector_from.as_deref())
     }
 
     fn identity(&self, parts: &[(&str, &str)]) -> BTreeMap<String, String> {
@@ -207,7 +273,42 @@ impl MemoryTraining {
     }
 }
 
+/// What the stages after the detector share.
+struct Learned<'a> {
+    networks: &'a MemoryNetworks,
+    /// The digest of the datasets.
+    data: &'a str,
+    sets: &'a ExampleSets,
+}
+
+#[derive(Clone, Copy)]
+enum Stage {
+    Detector,
+    Chooser,
+}
+
+impl Learned<'_> {
+    /// The digest of a stage's weights, which the later ones build on.
+    fn digest(&self, stage: Stage) -> anyhow::Result<String> {
+        let store = match stage {
+            Stage::Detector => &self.networks.detector_store,
+            Stage::Chooser => &self.networks.chooser_store,
+        };
+        weights::digest(store.variables())
+    }
+}
+
+fn same_size<T: PartialEq + Serialize>(folder: &Path, field: &str, found: &T, own: &T) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        found == own,
+        "{}: {field} is of another size than the preset's: {}",
+        folder.join("config.json").display(),
+        size_differences(found, own)
+    );
+    Ok(())
+}
+
 /// Trajectories that are replayed between two looks at whether to stop.
 const CHUNK: usize = 200;
 /// The states of the stages, in the folder of the training.
-const STATES: [&str; 2] = ["detector.safetensors", "chooser.safetensors"];
+const STATES: [&str; 3] = ["detector.safetensors", "chooser.safetensors", "critic.safetensors"];

@@ -6,6 +6,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::chooser::ChooserTraining;
+use super::critic::CriticTraining;
 use crate::agent::memory_agent::config::AgentKind;
 use crate::agent::memory_agent::eyes::Sight;
 use crate::agent::memory_agent::features::{ACTION, SITUATION};
@@ -47,11 +48,17 @@ pub(crate) struct MemoryPreset {
     pub(crate) chooser: ChooserSize,
     /// How the chooser is trained.
     pub(crate) chooser_training: ChooserTraining,
+    /// The size of the critic.
+    pub(crate) critic: ChooserSize,
+    /// How the critic is trained; with 0 steps there is none.
+    pub(crate) critic_training: CriticTraining,
+    /// How many times the advantage enters the exponent by which the agent weighs its chooser when it decides.
+    pub(crate) advantage_scale: f32,
     /// How the trained agent is measured.
     pub(crate) validation: ValidationSpec,
 }
 
-/// The part of a chooser's size that is free.
+/// The part of a chooser's or critic's size that is free.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ChooserSize {
@@ -95,6 +102,11 @@ impl MemoryPreset {
         MemoryPreset::of(table).map(Some).with_context(|| format!("the preset {name}"))
     }
 
+    /// The size of the critic, where there is one.
+    pub(crate) fn critic_spec(&self) -> Option<ChooserSpec> {
+        (self.critic_training.optimisation.steps > 0).then(|| self.critic.spec())
+    }
+
     fn of(table: toml::Table) -> anyhow::Result<MemoryPreset> {
         let preset: MemoryPreset =
             table.try_into().map_err(|error: toml::de::Error| anyhow::anyhow!("{}", error.to_string().trim_end()))?;
@@ -105,8 +117,10 @@ impl MemoryPreset {
         }
         preset.detector.check()?;
         preset.detector_training.check("detector_training")?;
-        preset.chooser.spec().check()?;
+        preset.chooser.spec().check("chooser")?;
         preset.chooser_training.check("chooser_training")?;
+        preset.critic.spec().check("critic")?;
+        preset.critic_training.check("critic_training")?;
         Ok(preset)
     }
 }
