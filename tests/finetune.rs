@@ -183,7 +183,7 @@ fn what_cannot_be_finetuned_is_refused_before_anything_is_written() {
         assert!(!sprint.path("none").exists(), "{line} left something behind");
     };
     let memory = concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/sprint-memory");
-    refused(&format!("--checkpoint {memory} --tasks tasks.json"), "is an agent with a memory, which has no critic");
+    refused(&format!("--checkpoint {memory} --tasks tasks.json"), "is an agent with a memory: finetuning needs");
     refused("--checkpoint D --tasks tasks.json", "holds no checkpoint");
     refused("--checkpoint agent --tasks tasks.json#3", "there is no task \"3\"");
     refused("--checkpoint agent --tasks nowhere.json", "nowhere.json");

@@ -10,7 +10,7 @@ use tch::Device;
 use super::decision_rule::{self, DecisionRule};
 use super::logit_adjustment::LogitAdjustment;
 use super::value_estimates::{AdvantageScale, Values};
-use crate::data::json;
+use crate::data::{json, text_file};
 use crate::domain::{ActionType, Class};
 use crate::language::vocabulary::Vocabulary;
 use crate::nets::critic::CriticSpec;
@@ -40,6 +40,26 @@ impl Ontology {
             classes: digest[..16].to_string(),
             actions: ActionType::ALL.iter().map(|kind| kind.name().to_string()).collect(),
         }
+    }
+}
+
+/// What tells the checkpoints of agents with a memory from those of the paper's, which do not say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum AgentKind {
+    /// One with a memory.
+    Memory,
+}
+
+impl AgentKind {
+    /// What the checkpoint in a folder says.
+    pub(crate) fn of(folder: &Path) -> Option<AgentKind> {
+        #[derive(Deserialize)]
+        struct Peek {
+            agent: Option<AgentKind>,
+        }
+        let text = text_file::read(&folder.join("config.json")).unwrap_or_default();
+        serde_json::from_str::<Peek>(&text).ok()?.agent
     }
 }
 
@@ -170,6 +190,11 @@ impl CheckpointConfig {
     pub fn read(folder: &Path) -> anyhow::Result<CheckpointConfig> {
         CheckpointConfig::check_there(folder)?;
         let path = folder.join("config.json");
+        anyhow::ensure!(
+            AgentKind::of(folder).is_none(),
+            "{}: an agent with a memory, where one of the paper's is needed",
+            folder.display()
+        );
         let config: CheckpointConfig = json::read(&path, CheckpointConfig::FORMAT)?.value;
         let own = Ontology::current();
         anyhow::ensure!(

@@ -123,7 +123,8 @@ pub trait Policy: Send {
         None
     }
 
-    /// What its critics make of a slot's observation; `None` without critics. It changes nothing about what is decided next.
+    /// What its critics make of a slot's observation; `None` without critics. It changes nothing about what is decided next under
+    /// the same instruction; whoever asks under another one restores the slot's state.
     ///
     /// # Errors
     /// When a forward pass fails.

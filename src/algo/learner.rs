@@ -73,6 +73,11 @@ impl<'a> Learner<'a> {
         self.optimiser.steps()
     }
 
+    /// Steps of the whole training.
+    pub(crate) fn steps(&self) -> u64 {
+        self.optimisation.steps
+    }
+
     /// The share of all steps that is taken.
     pub(crate) fn share(&self) -> f64 {
         self.step() as f64 / self.optimisation.steps.max(1) as f64

@@ -21,6 +21,7 @@ pub mod preset;
 pub(crate) mod pretrain;
 pub(crate) mod ranked_chains;
 pub(crate) mod relabel;
+pub(crate) mod stage;
 pub(crate) mod tensorboard;
 pub mod trainer;
 pub mod training_data;

@@ -9,21 +9,13 @@ use tch::{Device, Tensor, nn};
 
 use super::eyes::Sight;
 use super::features;
-use crate::agent::config::{CheckpointConfig, Ontology};
-use crate::data::{json, text_file};
+use crate::agent::config::{AgentKind, CheckpointConfig, Ontology};
+use crate::data::json;
 use crate::nets::chooser::{Chooser, ChooserSpec};
 use crate::nets::detector::{Detector, DetectorSpec};
 use crate::nets::macro_critic::MacroCritic;
 use crate::nets::size_differences::size_differences;
 use crate::nets::weights::{self, TensorSpec};
-
-/// What tells the checkpoints of these agents from those of the paper's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum AgentKind {
-    /// One with a memory.
-    Memory,
-}
 
 /// How a checkpoint was trained, and from what.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -89,12 +81,7 @@ pub(crate) struct MemoryConfig {
 impl MemoryConfig {
     /// Whether a folder holds a checkpoint of an agent with a memory.
     pub(crate) fn is_there(folder: &Path) -> bool {
-        #[derive(Deserialize)]
-        struct Peek {
-            agent: Option<AgentKind>,
-        }
-        let text = text_file::read(&folder.join("config.json")).unwrap_or_default();
-        serde_json::from_str::<Peek>(&text).is_ok_and(|peek| peek.agent.is_some())
+        AgentKind::of(folder).is_some()
     }
 
     /// Reads a checkpoint's configuration.
@@ -104,6 +91,11 @@ impl MemoryConfig {
     pub(crate) fn read(folder: &Path) -> anyhow::Result<MemoryConfig> {
         CheckpointConfig::check_there(folder)?;
         let path = folder.join("config.json");
+        ensure!(
+            MemoryConfig::is_there(folder),
+            "{}: not an agent with a memory, which is needed here",
+            folder.display()
+        );
         let config: MemoryConfig = json::read(&path, CheckpointConfig::FORMAT)?.value;
         config.check().with_context(|| path.display().to_string())?;
         Ok(config)
@@ -269,6 +261,11 @@ pub(super) mod tests {
         config.chooser.action += 1;
         let networks = MemoryNetworks::new(&config.detector, &config.chooser, config.critic.as_ref(), Device::Cpu);
         networks.save(folder.path(), &config).unwrap();
+        let refused = CheckpointConfig::read(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("an agent with a memory, where one of the paper's is needed"), "{refused}");
+        let alfred = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/checkpoints/alfred"));
+        let refused = MemoryConfig::read(alfred).unwrap_err().to_string();
+        assert!(refused.contains("alfred: not an agent with a memory"), "{refused}");
         let error = format!("{:#}", MemoryConfig::read(folder.path()).unwrap_err());
         assert!(error.contains("config.json: chooser.action is") && error.contains("train the agent anew"), "{error}");
     }

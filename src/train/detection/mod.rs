@@ -3,7 +3,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod labels;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
 
 use anyhow::ensure;
 use rand::{Rng, SeedableRng};
@@ -15,8 +15,8 @@ use tch::{Device, Kind, Tensor, nn};
 use self::accuracy::Accuracy;
 use self::labels::{PLACES, PlaceLabels};
 use super::frame_store::FrameStore;
-use super::metrics::{ProgressLogger, Scalars};
-use super::training_state::TrainingState;
+use super::metrics::Scalars;
+use super::stage::{Learning, Rhythm};
 use crate::algo::learner::{Learner, Optimisation};
 use crate::domain::place::Heading;
 use crate::domain::{Pose, Scene, World};
@@ -24,6 +24,7 @@ use crate::house::House;
 use crate::house::render::Renderer;
 use crate::nets::detector::{Detector, DetectorSpec, LABELS};
 use crate::nets::precision::Precision;
+use crate::nets::weights::Tensors;
 
 /// Frames on which the detector is measured while it trains.
 const MEASURED: usize = 256;
@@ -53,67 +54,71 @@ impl DetectorTraining {
     }
 }
 
-/// What the stages of a training have in common.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rhythm {
-    /// Drives the choice of frames.
-    pub(crate) seed: u64,
-    /// One trajectory in that many is held out.
-    pub(crate) hold_out: usize,
-    /// Steps between two saved states.
-    pub(crate) save_every: u64,
-    /// Steps between two lines of progress.
-    pub(crate) report_every: u64,
+/// A detector under training.
+pub(crate) struct DetectorLearning<'a> {
+    learner: Learner<'a>,
+    detector: &'a Detector,
+    training: &'a DetectorTraining,
+    seed: u64,
+    frame_store: &'a FrameStore,
+    /// For each trajectory, whether it is held out.
+    apart: Vec<bool>,
+    held_out: Vec<Glimpse>,
 }
 
-/// Trains a detector up to the last step, from where `state` left off if it is there. Returns false when it was stopped; its
-/// state is saved then.
-///
-/// # Errors
-/// When a state cannot be read or written, or a frame not be drawn.
-pub(crate) fn train(
-    store: &nn::VarStore,
-    detector: &Detector,
-    frame_store: &FrameStore,
-    (training, rhythm): (&DetectorTraining, Rhythm),
-    state: TrainingState<'_>,
-    logger: &mut dyn ProgressLogger,
-    stop: &AtomicBool,
-) -> anyhow::Result<bool> {
-    let mut learner = Learner::new(store, training.optimisation.clone(), rhythm.seed);
-    if let Some((step, tensors)) = state.read()? {
-        learner.restore_checked(state.path, step, &tensors)?;
+impl<'a> DetectorLearning<'a> {
+    /// A detector at step 0.
+    ///
+    /// # Errors
+    /// When every trajectory is held out, or a scene is missing.
+    pub(crate) fn new(
+        (store, detector): (&'a nn::VarStore, &'a Detector),
+        frame_store: &'a FrameStore,
+        training: &'a DetectorTraining,
+        Rhythm { seed, hold_out, .. }: Rhythm,
+    ) -> anyhow::Result<DetectorLearning<'a>> {
+        let learner = Learner::new(store, training.optimisation.clone(), seed);
+        let apart = frame_store.kept_apart(hold_out);
+        ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
+        let any_held_out = apart.contains(&true);
+        let mut learning =
+            DetectorLearning { learner, detector, training, seed, frame_store, apart, held_out: Vec::new() };
+        if any_held_out {
+            learning.held_out = learning.glimpses(0, MEASURED, true)?;
+        }
+        Ok(learning)
     }
-    let apart = frame_store.kept_apart(rhythm.hold_out);
-    ensure!(apart.contains(&false), "there is nothing to learn from: every trajectory is held out");
-    let glimpses = |step, count, held_out| {
-        let drawn = Draw { seed: rhythm.seed, step, count, held_out, anywhere: training.anywhere };
-        drawn.glimpses(frame_store, &apart)
-    };
-    let held_out = if apart.contains(&true) { glimpses(0, MEASURED, true)? } else { Vec::new() };
-    while !learner.is_done() {
-        if stop.load(Ordering::Relaxed) {
-            state.write(learner.step(), &learner.state())?;
-            return Ok(false);
-        }
-        let drawn = glimpses(learner.step() + 1, training.optimisation.batch_size, false)?;
-        learner.begin_step();
-        let logits = detector.forward(training.precision, &images(&drawn), true);
-        let loss = loss(&logits, &holding(&drawn, detector.device()));
-        learner.minimise(&loss);
-        let mut scalars = Scalars::new("detector", learner.step(), training.optimisation.steps);
-        if learner.step().is_multiple_of(rhythm.report_every) || learner.is_done() {
-            scalars.add("detector_loss", &loss);
-        }
-        if (learner.step().is_multiple_of(rhythm.report_every * 10) || learner.is_done()) && !held_out.is_empty() {
-            accuracy(detector, &held_out)?.report(&mut scalars);
-        }
-        logger.log(&scalars)?;
-        if learner.step().is_multiple_of(rhythm.save_every) || learner.is_done() {
-            state.write(learner.step(), &learner.state())?;
-        }
+
+    fn glimpses(&self, step: u64, count: usize, held_out: bool) -> anyhow::Result<Vec<Glimpse>> {
+        let drawn = Draw { seed: self.seed, step, count, held_out, anywhere: self.training.anywhere };
+        drawn.glimpses(self.frame_store, &self.apart)
     }
-    Ok(true)
+}
+
+impl<'a> Learning<'a> for DetectorLearning<'a> {
+    fn learner(&self) -> &Learner<'a> {
+        &self.learner
+    }
+
+    fn step(&mut self) -> anyhow::Result<Vec<(&'static str, Tensor)>> {
+        let drawn = self.glimpses(self.learner.step() + 1, self.training.optimisation.batch_size, false)?;
+        self.learner.begin_step();
+        let logits = self.detector.forward(self.training.precision, &images(&drawn), true);
+        let loss = loss(&logits, &holding(&drawn, self.detector.device()));
+        self.learner.minimise(&loss);
+        Ok(vec![("detector_loss", loss)])
+    }
+
+    fn measure(&self, scalars: &mut Scalars) -> anyhow::Result<()> {
+        if !self.held_out.is_empty() {
+            accuracy(self.detector, &self.held_out)?.report(scalars);
+        }
+        Ok(())
+    }
+
+    fn restore(&mut self, path: &Path, step: u64, tensors: Tensors) -> anyhow::Result<()> {
+        self.learner.restore_checked(path, step, &tensors)
+    }
 }
 
 /// Binary cross-entropy added up over the labels of a place, a mean over places. A label that holds counts by its weight (see

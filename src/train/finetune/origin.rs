@@ -42,7 +42,7 @@ impl<'a> Origin<'a> {
         let name = spec.checkpoint.display();
         ensure!(
             !MemoryConfig::is_there(&spec.checkpoint),
-            "{name} is an agent with a memory, which has no critic: finetuning needs an agent of sprint, l-bc or am"
+            "{name} is an agent with a memory: finetuning needs an agent of sprint, l-bc or am"
         );
         let given = CheckpointConfig::read(&spec.checkpoint)?;
         ensure!(

@@ -1,6 +1,6 @@
 //! Trains the chooser on examples: cloning of the demonstrator's first actions, and when goals are reached.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
 
 use anyhow::ensure;
 use rand::{Rng, SeedableRng};
@@ -12,9 +12,9 @@ use super::examples::{Example, ExampleSets, marks};
 use crate::agent::memory_agent::features::{Choice, side_by_side};
 use crate::algo::learner::{Learner, Optimisation};
 use crate::nets::chooser::{Choices, Chooser};
-use crate::train::detection::Rhythm;
-use crate::train::metrics::{ProgressLogger, Scalars};
-use crate::train::training_state::TrainingState;
+use crate::nets::weights::Tensors;
+use crate::train::metrics::Scalars;
+use crate::train::stage::Learning;
 
 /// How a chooser is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,54 +40,57 @@ impl ChooserTraining {
     }
 }
 
-/// Trains a chooser up to the last step, from where `state` left off if it is there; `save` keeps a checkpoint. Returns false when
-/// it was stopped; its state is saved then.
-///
-/// # Errors
-/// When a state or a checkpoint cannot be read or written.
-pub(crate) fn train(
-    (store, chooser): (&nn::VarStore, &Chooser),
-    sets: &ExampleSets,
-    (training, rhythm): (&ChooserTraining, Rhythm),
-    state: TrainingState<'_>,
-    logger: &mut dyn ProgressLogger,
-    stop: &AtomicBool,
-    save: &dyn Fn(u64) -> anyhow::Result<()>,
-) -> anyhow::Result<bool> {
-    let mut learner = Learner::new(store, training.optimisation.clone(), rhythm.seed);
-    if let Some((step, tensors)) = state.read()? {
-        learner.restore_checked(state.path, step, &tensors)?;
+/// A chooser under training.
+pub(super) struct ChooserLearning<'a> {
+    learner: Learner<'a>,
+    chooser: &'a Chooser,
+    training: &'a ChooserTraining,
+    seed: u64,
+    sets: &'a ExampleSets,
+}
+
+impl<'a> ChooserLearning<'a> {
+    /// A chooser at step 0.
+    ///
+    /// # Errors
+    /// When there are no examples.
+    pub(super) fn new(
+        (store, chooser): (&'a nn::VarStore, &'a Chooser),
+        sets: &'a ExampleSets,
+        training: &'a ChooserTraining,
+        seed: u64,
+    ) -> anyhow::Result<ChooserLearning<'a>> {
+        ensure!(!sets.training.is_empty(), "there is nothing to learn from: every trajectory is held out");
+        let learner = Learner::new(store, training.optimisation.clone(), seed);
+        Ok(ChooserLearning { learner, chooser, training, seed, sets })
     }
-    ensure!(!sets.training.is_empty(), "there is nothing to learn from: every trajectory is held out");
-    while !learner.is_done() {
-        if stop.load(Ordering::Relaxed) {
-            state.write(learner.step(), &learner.state())?;
-            return Ok(false);
-        }
-        let mut rng = ChaCha8Rng::seed_from_u64(rhythm.seed ^ 0xc0ce);
-        rng.set_stream(learner.step() + 1);
-        let count = sets.training.len();
-        let drawn = (0..training.optimisation.batch_size).map(|_| &sets.training[rng.random_range(0..count)]);
-        let batch = Batch::of(&drawn.collect::<Vec<_>>(), chooser.device());
-        learner.begin_step();
-        let losses = batch.losses(chooser);
-        learner.minimise(&(&losses.right + &losses.aim * training.aim_weight + &losses.reached));
-        let mut scalars = Scalars::new("chooser", learner.step(), training.optimisation.steps);
-        if learner.step().is_multiple_of(rhythm.report_every) || learner.is_done() {
-            scalars.add("right_loss", &losses.right);
-            scalars.add("aim_loss", &losses.aim);
-            scalars.add("reached_loss", &losses.reached);
-        }
-        if learner.step().is_multiple_of(rhythm.report_every * 10) || learner.is_done() {
-            measure(chooser, &sets.held_out, &mut scalars);
-        }
-        logger.log(&scalars)?;
-        if learner.step().is_multiple_of(rhythm.save_every) || learner.is_done() {
-            state.write(learner.step(), &learner.state())?;
-            save(learner.step())?;
-        }
+}
+
+impl<'a> Learning<'a> for ChooserLearning<'a> {
+    fn learner(&self) -> &Learner<'a> {
+        &self.learner
     }
-    Ok(true)
+
+    fn step(&mut self) -> anyhow::Result<Vec<(&'static str, Tensor)>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0xc0ce);
+        rng.set_stream(self.learner.step() + 1);
+        let (examples, count) = (&self.sets.training, self.training.optimisation.batch_size);
+        let drawn: Vec<&Example> = (0..count).map(|_| &examples[rng.random_range(0..examples.len())]).collect();
+        let batch = Batch::of(&drawn, self.chooser.device());
+        self.learner.begin_step();
+        let losses = batch.losses(self.chooser);
+        self.learner.minimise(&(&losses.right + &losses.aim * self.training.aim_weight + &losses.reached));
+        Ok(vec![("right_loss", losses.right), ("aim_loss", losses.aim), ("reached_loss", losses.reached)])
+    }
+
+    fn measure(&self, scalars: &mut Scalars) -> anyhow::Result<()> {
+        measure(self.chooser, &self.sets.held_out, scalars);
+        Ok(())
+    }
+
+    fn restore(&mut self, path: &Path, step: u64, tensors: Tensors) -> anyhow::Result<()> {
+        self.learner.restore_checked(path, step, &tensors)
+    }
 }
 
 /// Examples side by side.
@@ -165,13 +168,11 @@ fn measure(chooser: &Chooser, held_out: &[Example], scalars: &mut Scalars) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::super::examples::{examples, tests::demonstrations};
     use super::super::preset::MemoryPreset;
     use super::*;
     use crate::agent::memory_agent::eyes::Eyes;
-    use crate::train::visual::testing::RecordedScalars;
+    use crate::train::stage::testing::whole_and_in_parts;
 
     #[test]
     fn it_learns_a_few_demonstrations_and_a_resumed_training_is_the_same_training() {
@@ -186,8 +187,6 @@ mod tests {
         let learning = &mut preset.chooser_training.optimisation;
         (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (150, 24, 5);
         learning.schedule.learning_rate = 1e-2;
-        let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 50, report_every: 1 };
-        let folder = tempfile::tempdir().unwrap();
         let fresh = || {
             let store = nn::VarStore::new(Device::Cpu);
             let chooser = Chooser::new(&store.root(), &preset.chooser.spec());
@@ -195,27 +194,14 @@ mod tests {
         };
         // Other tests open agents, whose networks begin by chance: a seed would not make two beginnings alike.
         let (beginning, _) = fresh();
-        let run = |name: &str, stop_at: Option<u64>| {
+        let logged = whole_and_in_parts(&|stage, logger| {
             let (mut store, chooser) = fresh();
             store.copy(&beginning).unwrap();
-            let path = folder.path().join(name);
-            let state = TrainingState { path: &path, identity: &BTreeMap::new() };
-            let mut recorded = RecordedScalars(Vec::new());
-            let stop = AtomicBool::new(false);
-            let save = |step: u64| {
-                stop.store(Some(step) == stop_at, Ordering::Relaxed);
-                Ok(())
-            };
-            let how = (&preset.chooser_training, rhythm);
-            train((&store, &chooser), &sets, how, state, &mut recorded, &stop, &save).unwrap();
-            let losses: Vec<f64> = recorded.0.iter().map(|scalars| scalars.values["right_loss"]).collect();
-            let weights = store.variables().into_iter().collect::<BTreeMap<_, _>>();
-            (losses, weights)
-        };
-        let (losses, whole) = run("whole", None);
-        assert!(losses[149] < 0.6 * losses[0], "{} then {}", losses[0], losses[149]);
-        assert_eq!(run("parts", Some(50)).0.len(), 50);
-        let (_, resumed) = run("parts", None);
-        assert!(whole.iter().all(|(name, tensor)| *tensor == resumed[name]));
+            let learning = ChooserLearning::new((&store, &chooser), &sets, &preset.chooser_training, stage.rhythm.seed);
+            stage.run(&mut learning.unwrap(), logger).unwrap();
+            store.variables().into_iter().collect()
+        });
+        let [first, last] = [0, 149].map(|step| logged[step]["right_loss"]);
+        assert!(last < 0.6 * first, "{first} then {last}");
     }
 }

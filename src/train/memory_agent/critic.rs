@@ -1,7 +1,7 @@
 //! Trains the critic on examples by implicit Q-learning: the reward is 1 where the goal is reached, and what was done may be
 //! anybody's, good or bad.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
 
 use anyhow::ensure;
 use rand::{Rng, SeedableRng};
@@ -16,9 +16,8 @@ use crate::algo::learner::{Learner, Optimisation};
 use crate::nets::chooser::Choices;
 use crate::nets::macro_critic::MacroCritic;
 use crate::nets::weights::{self, Tensors};
-use crate::train::detection::Rhythm;
-use crate::train::metrics::{ProgressLogger, Scalars};
-use crate::train::training_state::TrainingState;
+use crate::train::metrics::Scalars;
+use crate::train::stage::Learning;
 
 /// How a critic is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,72 +48,72 @@ impl CriticTraining {
     }
 }
 
-/// A critic, the target that follows it, and their weights.
-pub(super) struct CriticPair<'a> {
-    pub(super) online: (&'a nn::VarStore, &'a MacroCritic),
-    pub(super) target: (&'a nn::VarStore, &'a MacroCritic),
+/// A critic under training, with the target that follows it.
+pub(super) struct CriticLearning<'a> {
+    learner: Learner<'a>,
+    critic: &'a MacroCritic,
+    target_store: &'a nn::VarStore,
+    target: &'a MacroCritic,
+    polyak: PolyakTarget,
+    training: &'a CriticTraining,
+    seed: u64,
+    sets: &'a ExampleSets,
+    known: Known,
 }
 
-impl CriticPair<'_> {
-    fn state(&self, learner: &Learner<'_>) -> Tensors {
-        let mut tensors = learner.state();
-        tensors.extend(weights::prefixed(TARGET, self.target.0.variables().into_iter().collect()));
+impl<'a> CriticLearning<'a> {
+    /// A critic at step 0; the target begins as its copy.
+    ///
+    /// # Errors
+    /// When it is known of no step what came of it.
+    pub(super) fn new(
+        (store, critic): (&'a nn::VarStore, &'a MacroCritic),
+        (target_store, target): (&'a nn::VarStore, &'a MacroCritic),
+        sets: &'a ExampleSets,
+        training: &'a CriticTraining,
+        seed: u64,
+    ) -> anyhow::Result<CriticLearning<'a>> {
+        let learner = Learner::new(store, training.optimisation.clone(), seed);
+        let mut polyak = PolyakTarget::new(store, target_store);
+        polyak.update(1.0);
+        let known = Known::of(&sets.training);
+        ensure!(!known.transitions.is_empty(), "there is nothing to learn values from: no step is followed by another");
+        Ok(CriticLearning { learner, critic, target_store, target, polyak, training, seed, sets, known })
+    }
+}
+
+impl<'a> Learning<'a> for CriticLearning<'a> {
+    fn learner(&self) -> &Learner<'a> {
+        &self.learner
+    }
+
+    fn step(&mut self) -> anyhow::Result<Vec<(&'static str, Tensor)>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0xc417);
+        rng.set_stream(self.learner.step() + 1);
+        let count = self.training.optimisation.batch_size;
+        let batch = self.known.draw(&self.sets.training, count, &mut rng, self.target_store.device());
+        self.learner.begin_step();
+        let [of_value, of_q] = batch.losses(self.critic, self.target, self.training);
+        self.learner.minimise(&(&of_value + &of_q));
+        self.polyak.update(self.training.target_update_rate);
+        Ok(vec![("value_loss", of_value), ("q_loss", of_q)])
+    }
+
+    fn measure(&self, scalars: &mut Scalars) -> anyhow::Result<()> {
+        measure(self.critic, self.target_store.device(), &self.sets.held_out, self.training.discount, scalars)
+    }
+
+    fn state(&self) -> Tensors {
+        let mut tensors = self.learner.state();
+        tensors.extend(weights::prefixed(TARGET, self.target_store.variables().into_iter().collect()));
         tensors
     }
-}
 
-/// Trains a critic up to the last step, from where `state` left off if it is there; `save` keeps a checkpoint. Returns false when it
-/// was stopped; its state is saved then.
-///
-/// # Errors
-/// When a state or a checkpoint cannot be read or written.
-pub(super) fn train(
-    critics: &CriticPair<'_>,
-    sets: &ExampleSets,
-    (training, rhythm): (&CriticTraining, Rhythm),
-    state: TrainingState<'_>,
-    logger: &mut dyn ProgressLogger,
-    stop: &AtomicBool,
-    save: &dyn Fn(u64) -> anyhow::Result<()>,
-) -> anyhow::Result<bool> {
-    let ((store, critic), (target_store, target)) = (critics.online, critics.target);
-    let mut learner = Learner::new(store, training.optimisation.clone(), rhythm.seed);
-    let mut polyak = PolyakTarget::new(store, target_store);
-    polyak.update(1.0);
-    if let Some((step, tensors)) = state.read()? {
+    fn restore(&mut self, path: &Path, step: u64, tensors: Tensors) -> anyhow::Result<()> {
         let (of_target, own): (Tensors, Tensors) = tensors.into_iter().partition(|(name, _)| name.starts_with(TARGET));
-        learner.restore_checked(state.path, step, &own)?;
-        weights::copy(&of_target, TARGET, target_store)?;
+        self.learner.restore_checked(path, step, &own)?;
+        weights::copy(&of_target, TARGET, self.target_store)
     }
-    let known = Known::of(&sets.training);
-    ensure!(!known.transitions.is_empty(), "there is nothing to learn values from: no step is followed by another");
-    while !learner.is_done() {
-        if stop.load(Ordering::Relaxed) {
-            state.write(learner.step(), &critics.state(&learner))?;
-            return Ok(false);
-        }
-        let mut rng = ChaCha8Rng::seed_from_u64(rhythm.seed ^ 0xc417);
-        rng.set_stream(learner.step() + 1);
-        let batch = known.draw(&sets.training, training.optimisation.batch_size, &mut rng, target_store.device());
-        learner.begin_step();
-        let [of_value, of_q] = batch.losses(critic, target, training);
-        learner.minimise(&(&of_value + &of_q));
-        polyak.update(training.target_update_rate);
-        let mut scalars = Scalars::new("critic", learner.step(), training.optimisation.steps);
-        if learner.step().is_multiple_of(rhythm.report_every) || learner.is_done() {
-            scalars.add("value_loss", &of_value);
-            scalars.add("q_loss", &of_q);
-        }
-        if learner.step().is_multiple_of(rhythm.report_every * 10) || learner.is_done() {
-            measure(critics, &sets.held_out, training.discount, &mut scalars)?;
-        }
-        logger.log(&scalars)?;
-        if learner.step().is_multiple_of(rhythm.save_every) || learner.is_done() {
-            state.write(learner.step(), &critics.state(&learner))?;
-            save(learner.step())?;
-        }
-    }
-    Ok(true)
 }
 
 /// The prefix of the target's tensors in a state.
@@ -198,8 +197,14 @@ impl Batch {
 }
 
 /// How far V is from what was won in held-out episodes, discounted by the steps until then, and how it goes with that.
-fn measure(critics: &CriticPair<'_>, held_out: &[Example], discount: f64, scalars: &mut Scalars) -> anyhow::Result<()> {
-    let ((store, critic), mut won) = (critics.online, vec![None; held_out.len()]);
+fn measure(
+    critic: &MacroCritic,
+    device: Device,
+    held_out: &[Example],
+    discount: f64,
+    scalars: &mut Scalars,
+) -> anyhow::Result<()> {
+    let mut won = vec![None; held_out.len()];
     for at in (0..held_out.len().saturating_sub(1)).rev().filter(|&at| held_out[at].taken.contains(&true)) {
         won[at] = if held_out[at + 1].reached { Some(1.0) } else { won[at + 1].map(|next: f64| next * discount) };
     }
@@ -208,7 +213,7 @@ fn measure(critics: &CriticPair<'_>, held_out: &[Example], discount: f64, scalar
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     for known in known.chunks(256) {
         let choices: Vec<&Choice> = known.iter().map(|(choice, _)| *choice).collect();
-        let value = tch::no_grad(|| critic.value(&side_by_side(&choices, store.device())));
+        let value = tch::no_grad(|| critic.value(&side_by_side(&choices, device)));
         let value = Vec::<f32>::try_from(value.to_device(Device::Cpu))?;
         pairs.extend(value.iter().zip(known).map(|(&value, (_, won))| [f64::from(value), *won]));
     }
@@ -224,13 +229,11 @@ fn measure(critics: &CriticPair<'_>, held_out: &[Example], discount: f64, scalar
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::super::examples::{examples, tests::demonstrations};
     use super::super::preset::MemoryPreset;
     use super::*;
     use crate::agent::memory_agent::eyes::Eyes;
-    use crate::train::visual::testing::RecordedScalars;
+    use crate::train::stage::testing::whole_and_in_parts;
 
     #[test]
     fn values_grow_towards_the_goal_and_a_resumed_training_is_the_same_training() {
@@ -245,36 +248,23 @@ mod tests {
         let learning = &mut preset.critic_training.optimisation;
         (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (200, 24, 5);
         learning.schedule.learning_rate = 1e-2;
-        let rhythm = Rhythm { seed: 1, hold_out: 0, save_every: 50, report_every: 1 };
-        let folder = tempfile::tempdir().unwrap();
         let fresh = || {
             let store = nn::VarStore::new(Device::Cpu);
             let critic = MacroCritic::new(&store.root(), &preset.critic.spec());
             (store, critic)
         };
         let (beginning, _) = fresh();
-        let run = |name: &str, stop_at: Option<u64>| {
+        let logged = whole_and_in_parts(&|stage, logger| {
             let ((mut store, critic), (target_store, target)) = (fresh(), fresh());
             store.copy(&beginning).unwrap();
-            let path = folder.path().join(name);
-            let state = TrainingState { path: &path, identity: &BTreeMap::new() };
-            let mut recorded = RecordedScalars(Vec::new());
-            let stop = AtomicBool::new(false);
-            let save = |step: u64| {
-                stop.store(Some(step) == stop_at, Ordering::Relaxed);
-                Ok(())
-            };
-            let critics = CriticPair { online: (&store, &critic), target: (&target_store, &target) };
-            train(&critics, &sets, (&preset.critic_training, rhythm), state, &mut recorded, &stop, &save).unwrap();
-            (recorded.0, store.variables().into_iter().collect::<BTreeMap<_, _>>())
-        };
-        let (scalars, whole) = run("whole", None);
-        let last = &scalars.last().unwrap().values;
+            let (online, target) = ((&store, &critic), (&target_store, &target));
+            let learning = CriticLearning::new(online, target, &sets, &preset.critic_training, stage.rhythm.seed);
+            stage.run(&mut learning.unwrap(), logger).unwrap();
+            store.variables().into_iter().collect()
+        });
+        let last = logged.last().unwrap();
         assert!(last["held_out_value_correlation"] > 0.5, "{last:?}");
         assert!(last["held_out_value_error"] < 0.15, "{last:?}");
-        assert_eq!(run("parts", Some(50)).0.len(), 50);
-        let (_, resumed) = run("parts", None);
-        assert!(whole.iter().all(|(name, tensor)| *tensor == resumed[name]));
     }
 
     #[test]

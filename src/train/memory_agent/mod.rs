@@ -14,18 +14,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 use tch::{Device, nn};
 
-use self::critic::CriticPair;
+use self::chooser::ChooserLearning;
+use self::critic::CriticLearning;
 use self::examples::ExampleSets;
 use self::preset::MemoryPreset;
-use super::detection::{self, Rhythm};
+use super::detection::DetectorLearning;
 use super::frame_store::FrameStore;
 use super::metrics::{JsonLinesLogger, ProgressLogger, Scalars};
 use super::pretrain::Trained;
 use super::pretrain::out_folder::TrainingFolder;
+use super::stage::{Rhythm, Stage};
 use super::tensorboard::TensorBoard;
 use super::training_state::TrainingState;
-use crate::agent::config::{CheckpointConfig, Ontology};
-use crate::agent::memory_agent::config::{AgentKind, CriticProvenance, MemoryConfig, MemoryNetworks, MemoryProvenance};
+use crate::agent::config::{AgentKind, CheckpointConfig, Ontology};
+use crate::agent::memory_agent::config::{CriticProvenance, MemoryConfig, MemoryNetworks, MemoryProvenance};
 use crate::agent::memory_agent::eyes::{Eyes, Sight};
 use crate::data::dataset::Dataset;
 use crate::nets::macro_critic::MacroCritic;
@@ -102,7 +104,8 @@ impl MemoryTraining {
             let provenance = MemoryProvenance { critic: None, ..given.provenance };
             return Ok(Some(MemoryConfig { provenance, ..config }));
         }
-        let identity = self.identity(&[("dataset", learned.data), ("detector", &learned.digest(Stage::Detector)?)]);
+        let identity =
+            self.identity(&[("dataset", learned.data), ("detector", &digest(&learned.networks.detector_store)?)]);
         let path = self.folder().training().join(STATES[1]);
         let state = TrainingState { path: &path, identity: &identity };
         let after = |steps: u64| {
@@ -110,9 +113,11 @@ impl MemoryTraining {
             MemoryConfig { provenance, ..config.clone() }
         };
         let save = |steps: u64| learned.networks.save(&self.out, &after(steps));
-        let how = (&self.preset.chooser_training, self.rhythm());
+        let stage = Stage { name: "chooser", rhythm: self.rhythm(), state, stop, save: &save };
         let learns = (&learned.networks.chooser_store, &learned.networks.chooser);
-        let finished = chooser::train(learns, learned.sets, how, state, logger, stop, &save)?;
+        let training = &self.preset.chooser_training;
+        let finished =
+            stage.run(&mut ChooserLearning::new(learns, learned.sets, training, self.preset.seed)?, logger)?;
         Ok(finished.then(|| after(self.preset.chooser_training.optimisation.steps)))
     }
 
@@ -131,9 +136,7 @@ impl MemoryTraining {
         };
         let target_store = nn::VarStore::new(self.device);
         let target = MacroCritic::new(&target_store.root(), &spec);
-        let critics = CriticPair { online: (&learned.networks.critic_store, critic), target: (&target_store, &target) };
-        let digests = [Stage::Detector, Stage::Chooser].map(|stage| learned.digest(stage));
-        let [detector, chooser] = digests;
+        let [detector, chooser] = [&learned.networks.detector_store, &learned.networks.chooser_store].map(digest);
         let identity = self.identity(&[("dataset", learned.data), ("detector", &detector?), ("chooser", &chooser?)]);
         let path = self.folder().training().join(STATES[2]);
         let state = TrainingState { path: &path, identity: &identity };
@@ -145,8 +148,10 @@ impl MemoryTraining {
             let config = MemoryConfig { provenance, critic: Some(spec.clone()), advantage_scale, ..config.clone() };
             learned.networks.save(&self.out, &config)
         };
-        let how = (&self.preset.critic_training, self.rhythm());
-        critic::train(&critics, learned.sets, how, state, logger, stop, &save)
+        let stage = Stage { name: "critic", rhythm: self.rhythm(), state, stop, save: &save };
+        let (online, target) = ((&learned.networks.critic_store, critic), (&target_store, &target));
+        let training = &self.preset.critic_training;
+        stage.run(&mut CriticLearning::new(online, target, learned.sets, training, self.preset.seed)?, logger)
     }
 
     /// The detector: another checkpoint's, or one that is trained now; false when that was stopped.
@@ -170,8 +175,10 @@ impl MemoryTraining {
         let path = self.folder().training().join(STATES[0]);
         let identity = self.identity(&[("dataset", data)]);
         let state = TrainingState { path: &path, identity: &identity };
-        let how = (&self.preset.detector_training, self.rhythm());
-        detection::train(&networks.detector_store, &networks.detector, frame_store, how, state, logger, stop)
+        let stage = Stage { name: "detector", rhythm: self.rhythm(), state, stop, save: &|_| Ok(()) };
+        let learns = (&networks.detector_store, &networks.detector);
+        let training = &self.preset.detector_training;
+        stage.run(&mut DetectorLearning::new(learns, frame_store, training, stage.rhythm)?, logger)
     }
 
     /// What the chooser learns from; nothing when that was stopped.
@@ -281,21 +288,9 @@ struct Learned<'a> {
     sets: &'a ExampleSets,
 }
 
-#[derive(Clone, Copy)]
-enum Stage {
-    Detector,
-    Chooser,
-}
-
-impl Learned<'_> {
-    /// The digest of a stage's weights, which the later ones build on.
-    fn digest(&self, stage: Stage) -> anyhow::Result<String> {
-        let store = match stage {
-            Stage::Detector => &self.networks.detector_store,
-            Stage::Chooser => &self.networks.chooser_store,
-        };
-        weights::digest(store.variables())
-    }
+/// The digest of a network's weights, which later stages build on.
+fn digest(store: &nn::VarStore) -> anyhow::Result<String> {
+    weights::digest(store.variables())
 }
 
 fn same_size<T: PartialEq + Serialize>(folder: &Path, field: &str, found: &T, own: &T) -> anyhow::Result<()> {

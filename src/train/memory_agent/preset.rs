@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chooser::ChooserTraining;
 use super::critic::CriticTraining;
-use crate::agent::memory_agent::config::AgentKind;
+use crate::agent::config::AgentKind;
 use crate::agent::memory_agent::eyes::Sight;
 use crate::agent::memory_agent::features::{ACTION, SITUATION};
 use crate::data::text_file;
