@@ -11,7 +11,8 @@ use crate::eval::schemas;
 /// Prints a JSON Schema.
 #[derive(Args)]
 pub(crate) struct Schema {
-    /// Whose: tasks, manifest, episode, summary, comparison, progress, or policy (the description beside an exported one)
+    /// Whose: tasks, manifest, episode, summary, comparison, progress, policies (where a run's were), or policy (the
+    /// description beside an exported one)
     #[arg(value_name = "NAME", value_parser = schemas::NAMES)]
     name: String,
 }

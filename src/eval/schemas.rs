@@ -10,9 +10,11 @@ use crate::episode::record::Episode;
 use crate::report::compare::Comparison;
 use crate::report::summary::RunSummary;
 use crate::run_dir::manifest::RunManifest;
+use crate::run_dir::policy_places::PolicyPlaces;
 
 /// The files and lines that have a schema, as `sprint schema` names them.
-pub(crate) const NAMES: [&str; 7] = ["tasks", "manifest", "episode", "summary", "comparison", "progress", "policy"];
+pub(crate) const NAMES: [&str; 8] =
+    ["tasks", "manifest", "episode", "summary", "comparison", "progress", "policies", "policy"];
 
 /// The schema of that name.
 pub fn schema(name: &str) -> Option<Schema> {
@@ -23,6 +25,7 @@ pub fn schema(name: &str) -> Option<Schema> {
         "summary" => written::<RunSummary>(),
         "comparison" => written::<Comparison>(),
         "progress" => written::<ProgressEvent>(),
+        "policies" => written::<PolicyPlaces>(),
         "policy" => schemars::schema_for!(PolicySpec),
         _ => return None,
     })
@@ -36,6 +39,7 @@ fn written<T: JsonSchema>() -> Schema {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::agent::policy_place::PolicyPlace;
     use crate::data::schema;
     use crate::data::taskset::tests::sample_set;
     use crate::domain::{ActionType, Class, Instance};
@@ -47,6 +51,7 @@ mod tests {
     use crate::report::summary::tests::sample;
     use crate::run_dir::episodes::tests::episode;
     use crate::run_dir::manifest::tests::manifest;
+    use crate::run_dir::policy_places;
 
     fn faults(name: &str, document: &impl serde::Serialize) -> Vec<schema::Fault> {
         schema::faults(&super::schema(name).unwrap().to_value(), &serde_json::to_value(document).unwrap()).unwrap()
@@ -74,6 +79,12 @@ mod tests {
         assert_eq!(faults("episode", &explored), []);
         assert_eq!(faults("summary", &RunSummary::of(&all, &tasks, &episodes, false)), []);
         assert_eq!(faults("comparison", &comparison), []);
+        let folder = tempfile::tempdir().unwrap();
+        let place = PolicyPlace { policy: "a".into(), checkpoint: None, place: "ws:localhost:8000".into() };
+        policy_places::write(folder.path(), &[place]).unwrap();
+        let written = std::fs::read(folder.path().join("policies.json")).unwrap();
+        let written: serde_json::Value = serde_json::from_slice(&written).unwrap();
+        assert_eq!(faults("policies", &written), []);
         assert_eq!(faults("progress", &ProgressEvent::Progress { progress, seconds: 0.5 }), []);
     }
 

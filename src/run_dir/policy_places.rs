@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::layout::POLICIES;
@@ -10,10 +11,14 @@ use crate::agent::policy_place::PolicyPlace;
 use crate::data::json;
 use crate::episode::record::Author;
 
-#[derive(Serialize, Deserialize)]
+/// Where the policies of a run were that are none of the program's own.
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct PolicyPlaces {
+pub(crate) struct PolicyPlaces {
+    /// Version of the file's format.
+    #[schemars(extend("const" = FORMAT))]
     format_version: u32,
+    /// A policy each.
     policies: Vec<PolicyPlace>,
 }
 
