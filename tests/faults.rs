@@ -117,6 +117,66 @@ fn no_result_depends_on_the_clock() {
 }
 
 #[test]
+fn every_file_is_opened_for_reading_in_the_one_place_that_does_not_wait_for_a_pipe() {
+    let mut strays = Vec::new();
+    let mut open = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        // A file of tests, and the tests below the code.
+        let code = if path.ends_with("tests.rs") { "" } else { text.split(" tests {").next().unwrap() };
+        let opens = ["fs::read(", "fs::read_to_string(", "File::open(", "OpenOptions::new()"];
+        if opens.iter().any(|call| code.contains(call)) {
+            strays.push(path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string());
+        }
+    }
+    strays.sort();
+    // A folder, a log of the program's own, and what the system says of itself; else tests.
+    let known = ["src/cli/logging.rs", "src/data/folder_lock.rs", "src/data/plain_file.rs", "src/nets/device.rs"];
+    assert_eq!(strays, known);
+}
+
+#[test]
+fn a_pipe_or_a_folder_in_place_of_a_file_is_named_and_not_waited_for() {
+    let sprint = Sprint::new();
+    sprint.sample("tasks.json", 1, 1);
+    assert_eq!(sprint.run("eval --tasks tasks.json --policy random --out run").code, Some(0));
+    assert_eq!(sprint.run("collect data --episodes 2").code, Some(0));
+    let cases = [
+        ("tasks.json", "tasks check tasks.json"),
+        ("run/episodes.jsonl", "eval --tasks run/tasks.json --policy random --out run"),
+        ("run/manifest.json", "compare run run"),
+        ("run/tasks.json", "verify run"),
+        ("data/trajectories.jsonl.zst", "replay data"),
+        ("data/dataset.json", "replay data"),
+        ("data/labels.jsonl", "relabel data --with rules"),
+        ("data/annotations/ann.jsonl", "annotate data --agreement"),
+        ("data/annotations/ann.jsonl", "annotate data --plain --as ann --length 2"),
+    ];
+    for (file, line) in cases {
+        let (path, kept) = (sprint.path(file), sprint.path("kept"));
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let was_there = std::fs::rename(&path, &kept).is_ok();
+        for (make, told) in [("mkfifo", "it is a pipe"), ("mkdir", "it is a folder")] {
+            assert!(std::process::Command::new(make).arg(&path).status().unwrap().success());
+            let mut child = sprint.command(line);
+            let child = child.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+            let ended = child.wait_with_output().unwrap();
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
+            assert!(said.contains(told) && said.contains(file), "{line}: {said}");
+            std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir(&path)).unwrap();
+        }
+        if was_there {
+            std::fs::rename(&kept, &path).unwrap();
+        }
+    }
+}
+
+#[test]
 fn a_run_folder_with_a_link_out_of_it_is_refused() {
     let sprint = Sprint::new();
     sprint.sample("tasks.json", 1, 1);

@@ -18,7 +18,7 @@ use super::policy_place::PolicyPlace;
 use super::random::RandomPolicy;
 use super::registry::{Loaded, NamedAgent};
 use super::sentence_encoders;
-use crate::data::json;
+use crate::data::{json, plain_file};
 use crate::nets::device;
 
 /// Makes a policy; whoever acts on a thread of his own has one of his own.
@@ -154,7 +154,7 @@ pub(crate) fn hash(folder: &Path) -> anyhow::Result<String> {
     let mut digest = Sha256::new();
     for file in ["config.json", "model.safetensors"] {
         let path = folder.join(file);
-        digest.update(std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
+        digest.update(plain_file::read(&path).with_context(|| format!("cannot read {}", path.display()))?);
     }
     Ok(json::hex(&digest.finalize()))
 }

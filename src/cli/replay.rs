@@ -10,7 +10,7 @@ use super::exit_status::ExitStatus;
 use super::progress::Counter;
 use super::streams;
 use super::streams::say;
-use crate::data::Dataset;
+use crate::data::{Dataset, folder};
 use crate::eval::replay::{MissCount, ReplayOptions, ReplayReport, replay};
 use crate::language::count::counted;
 
@@ -58,7 +58,7 @@ impl ReplayArgs {
         let options =
             ReplayOptions { split: self.split, boxes: self.boxes, sight: self.sight, pictures: self.pictures };
         if let Some(folder) = &options.pictures {
-            std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+            folder::make(folder).with_context(|| format!("cannot create {}", folder.display()))?;
         }
         let report = replay(&dataset, &options, &|done| counter.add(done));
         counter.end();

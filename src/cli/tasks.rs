@@ -13,7 +13,7 @@ use super::exit_status::ExitStatus;
 use super::progress::Counter;
 use super::{jobs, streams, value_names};
 use crate::agent::policy_source::PolicySource;
-use crate::data::{Dataset, taskset};
+use crate::data::{Dataset, folder, taskset};
 use crate::domain::{Room, Task};
 use crate::env::Environment;
 use crate::env::remote::{RemoteEnvironment, Sessions};
@@ -177,7 +177,7 @@ impl SampleArgs {
         } else {
             let dataset = Dataset::open(scenes)?;
             let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            folder::make(folder).with_context(|| format!("cannot make {}", folder.display()))?;
             let split = self.split.as_deref();
             let set = sample::balanced(&spec, &lengths, &|spec| {
                 sample::sample_dataset(spec, &dataset, split, self.phrasing, folder)

@@ -6,13 +6,26 @@ use std::path::Path;
 use anyhow::Context;
 use tempfile::NamedTempFile;
 
+use super::folder;
+
+/// How the names of files begin that are being written.
+pub(crate) const UNFINISHED: &str = ".sprint-";
+
+/// Removes what a killed process did not get to rename from a folder that nobody else writes; failing to does no harm.
+pub(crate) fn remove_unfinished(folder: &Path) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
+        let _ = std::fs::remove_file(entry.path());
+    }
+}
+
 /// What will be the file at `path`, beside it; dropped, it is gone. Makes the folder when there is none.
 ///
 /// # Errors
 /// When the folder cannot be made or written to.
 pub(crate) fn begin(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder)?;
+    folder::make(folder)?;
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
@@ -20,7 +33,7 @@ pub(crate) fn begin(path: &Path) -> io::Result<NamedTempFile> {
         // A temporary file is private; what it becomes is as readable as the user's umask allows.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.prefix(".sprint-").tempfile_in(folder)
+    builder.prefix(UNFINISHED).tempfile_in(folder)
 }
 
 /// Gives it its name, over an older file of that name.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::folder_lock::FolderLock;
-use super::{atomic_file, json, taskset, text_file};
+use super::{atomic_file, folder, json, plain_file, taskset, text_file};
 use crate::domain::{Scene, TaskSet, Trajectory};
 use crate::house::validate;
 
@@ -151,7 +151,7 @@ impl Dataset {
     /// When the file is absent; each item can also fail, naming the line.
     pub fn trajectories(&self) -> anyhow::Result<impl Iterator<Item = anyhow::Result<Trajectory>> + Send + use<>> {
         let path = self.folder.join(TRAJECTORIES);
-        let file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
+        let file = plain_file::open(&path).with_context(|| path.display().to_string())?;
         let reader = BufReader::new(zstd::Decoder::new(file)?);
         Ok(reader.lines().enumerate().map(move |(number, line)| {
             let place = || format!("{}, line {}", path.display(), number + 1);
@@ -190,7 +190,7 @@ impl Dataset {
     /// When the file cannot be read.
     pub(crate) fn digest(&self) -> anyhow::Result<String> {
         let path = self.folder.join(TRAJECTORIES);
-        let mut file = std::fs::File::open(&path).with_context(|| path.display().to_string())?;
+        let mut file = plain_file::open(&path).with_context(|| path.display().to_string())?;
         let mut hash = Sha256::new();
         std::io::copy(&mut file, &mut hash).with_context(|| path.display().to_string())?;
         Ok(format!("{:x}", hash.finalize())[..16].to_string())
@@ -240,9 +240,11 @@ impl DatasetWriter {
     /// When it cannot be written.
     pub(crate) fn into_folder(taken: FolderLock) -> anyhow::Result<DatasetWriter> {
         let folder = taken.folder();
+        atomic_file::remove_unfinished(folder);
         for part in ["scenes", "tasks"] {
             let part = folder.join(part);
-            std::fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
+            folder::make(&part).with_context(|| part.display().to_string())?;
+            atomic_file::remove_unfinished(&part);
         }
         let old = folder.join("dataset.json");
         if old.exists() {
@@ -338,6 +340,17 @@ mod tests {
             held_out: vec![],
             skipped: vec![],
         }
+    }
+
+    #[test]
+    fn what_a_killed_process_left_half_written_goes_with_the_next_one() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("scenes")).unwrap();
+        let left = [".sprint-a1b2c3", "scenes/.sprint-d4e5f6"].map(|name| folder.path().join(name));
+        left.iter().for_each(|path| std::fs::write(path, "half").unwrap());
+        let writer = DatasetWriter::new(folder.path()).unwrap();
+        writer.scene(&scene()).unwrap();
+        assert!(left.iter().all(|path| !path.exists()));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Feature files: one feature map a frame, 16-bit floats, computed once by whoever owns the encoder, read from the disk as needed.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
+
+use super::{folder, plain_file};
 
 /// What a feature file holds; its first line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,7 +71,7 @@ impl Features {
     /// When the file is there but cannot be read.
     pub fn read(folder: &Path, wanted: &FeatureHeader) -> anyhow::Result<Option<Features>> {
         let path = folder.join(wanted.file_name());
-        let Ok(file) = File::open(&path) else { return Ok(None) };
+        let Ok(file) = plain_file::open(&path) else { return Ok(None) };
         let line = wanted.line()?;
         let mut found = Vec::new();
         let context = || format!("{} cannot be read", path.display());
@@ -180,8 +182,8 @@ impl FeatureWriter {
     pub fn open(folder: &Path, header: FeatureHeader) -> anyhow::Result<FeatureWriter> {
         let path = folder.join(header.file_name() + ".part");
         let context = || format!("{} cannot be written", path.display());
-        std::fs::create_dir_all(folder).with_context(context)?;
-        let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+        folder::make(folder).with_context(context)?;
+        let options = plain_file::change(&path);
         let mut file = options.with_context(context)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
@@ -333,7 +335,7 @@ mod tests {
         assert!(Features::read(folder.path(), &header()).unwrap().is_none());
         // Half a map more, as a killed writer leaves it.
         let part = folder.path().join("features-e-d.bin.part");
-        OpenOptions::new().append(true).open(&part).unwrap().write_all(&[7, 7, 7]).unwrap();
+        std::fs::OpenOptions::new().append(true).open(&part).unwrap().write_all(&[7, 7, 7]).unwrap();
         let mut writer = FeatureWriter::open(folder.path(), header()).unwrap();
         assert_eq!(writer.maps(), 1);
         writer.add(&[7, 8, 9, 10, 11, 12]).unwrap();

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
+use super::folder;
+
 /// A folder that no other process may write, for as long as this lives. Nothing is left in it; a killed process leaves no lock.
 #[must_use]
 pub(crate) struct FolderLock {
@@ -19,7 +21,7 @@ impl FolderLock {
     /// When another process has it, or it cannot be made.
     pub(crate) fn take(folder: &Path) -> anyhow::Result<FolderLock> {
         let name = folder.display();
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {name}"))?;
+        folder::make(folder).with_context(|| format!("cannot make {name}"))?;
         let held = File::open(folder).with_context(|| format!("cannot read {name}"))?;
         match held.try_lock() {
             Err(TryLockError::WouldBlock) => {

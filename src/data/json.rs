@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
-use super::{atomic_file, text_file};
+use super::{atomic_file, plain_file, text_file};
 
 /// No file of ours comes near this many bytes; a larger one (or an endless device) is refused before it fills the memory.
 const LARGEST: u64 = 1 << 30;
@@ -37,7 +37,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, version: u32) -> anyhow::Re
 /// When it cannot be read, or is larger.
 pub(crate) fn read_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     let name = path.display();
-    let file = std::fs::File::open(path).with_context(|| format!("cannot read {name}"))?;
+    let file = plain_file::open(path).with_context(|| format!("cannot read {name}"))?;
     let too_large = || anyhow::anyhow!("{name}: larger than {} MiB, which no such file is", LARGEST >> 20);
     let length = file.metadata().with_context(|| format!("cannot read {name}"))?.len();
     anyhow::ensure!(length <= LARGEST, too_large());

@@ -1,6 +1,6 @@
 //! Files of JSON lines that are only ever added to: a line is there whole, or, after a kill, not at all.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use anyhow::{Context, bail, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::text_file;
+use super::{folder, plain_file, text_file};
 
 /// The file's first line.
 #[derive(Serialize, Deserialize)]
@@ -23,7 +23,7 @@ struct Header {
 /// # Errors
 /// When it cannot be read, is of another version, or a line is malformed; names the line.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path, format: u32) -> anyhow::Result<(Vec<T>, usize)> {
-    let bytes = match std::fs::read(path) {
+    let bytes = match plain_file::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok((Vec::new(), 0)),
         Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
@@ -47,7 +47,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, format: u32) -> anyhow::Res
 }
 
 /// Such a file, opened to be added to. One process at a time.
-pub(crate) struct LineLog {
+pub struct LineLog {
     path: PathBuf,
     file: File,
     /// The length of its whole lines.
@@ -62,9 +62,9 @@ impl LineLog {
     pub(crate) fn open<T: DeserializeOwned>(path: &Path, format: u32) -> anyhow::Result<(LineLog, Vec<T>)> {
         let context = || format!("{} cannot be written", path.display());
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).with_context(context)?;
+            folder::make(folder).with_context(context)?;
         }
-        let file = OpenOptions::new().create(true).append(true).open(path).with_context(context)?;
+        let file = plain_file::append(path).with_context(context)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
             Err(TryLockError::Error(error)) => return Err(error).with_context(context),

@@ -3,6 +3,8 @@
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
+use super::plain_file;
+
 /// The byte-order mark of UTF-8.
 const MARK: &[u8] = b"\xEF\xBB\xBF";
 
@@ -27,7 +29,7 @@ pub(crate) fn line(text: &str) -> &str {
 /// # Errors
 /// When it cannot be read, or is no UTF-8.
 pub(crate) fn read(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path)?;
+    let bytes = plain_file::read(path)?;
     let text = content(&bytes)?;
     let text = std::str::from_utf8(text)
         .map_err(|error| Error::new(ErrorKind::InvalidData, format!("not UTF-8 text ({error}): save it as UTF-8")))?;

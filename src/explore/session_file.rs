@@ -11,7 +11,7 @@ use std::time::SystemTime;
 use anyhow::Context;
 
 use super::kept_session::KeptSession;
-use crate::data::atomic_file;
+use crate::data::{atomic_file, plain_file};
 
 /// The file of one explorer; copies are the same one's.
 #[derive(Clone)]
@@ -163,7 +163,7 @@ fn lock_new(file: &File) {
 
 /// Whether an explorer has it under way.
 fn is_live(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    plain_file::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 /// The number of a session's file; the last one and the one before have none.

@@ -1,7 +1,7 @@
 //! Embeddings on disk, by encoder and text: each text is embedded once, whoever asks.
 
 use std::collections::{BTreeSet, HashMap};
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use tch::{Device, Tensor};
 
 use super::home;
 use super::sentence::SentenceEncoder;
+use crate::data::{folder, plain_file};
 
 const FORMAT_VERSION: u32 = 1;
 
@@ -51,9 +52,9 @@ impl EmbeddingCache {
     /// # Errors
     /// When the file cannot be made or read, or was written by another version of the format; it may be deleted.
     pub fn open(folder: &Path, encoder: &str, width: usize) -> anyhow::Result<EmbeddingCache> {
-        std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+        folder::make(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
         let path = folder.join(format!("{}.embeddings", encoder.chars().take(16).collect::<String>()));
-        let file = OpenOptions::new().read(true).append(true).create(true).open(&path);
+        let file = plain_file::append(&path);
         let file = file.with_context(|| format!("{} cannot be opened", path.display()))?;
         let mut cache = EmbeddingCache { path, file, header: 0, width, records: HashMap::new(), end: 0 };
         cache.file.lock()?;
@@ -257,7 +258,7 @@ mod tests {
         open().add([("a", &[1.0f32, 2.0][..]), ("b", &[3.0, 4.0])]).unwrap();
         let path = folder.path().join("e.embeddings");
         let whole = std::fs::metadata(&path).unwrap().len();
-        OpenOptions::new().write(true).open(&path).unwrap().set_len(whole - 5).unwrap();
+        std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(whole - 5).unwrap();
         let mut cache = open();
         assert_eq!((cache.get("a").unwrap(), cache.get("b").unwrap()), (Some(vec![1.0, 2.0]), None));
         cache.add([("b", &[3.0f32, 4.0][..])]).unwrap();

@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::data::text_file;
+use crate::data::{plain_file, text_file};
 
 /// A JSON object of a folder whose settings are taken one by one.
 pub(super) struct Settings {
@@ -35,7 +35,7 @@ impl Settings {
         if !path.exists() {
             return Ok(Settings { path: path.to_owned(), fields: BTreeMap::new() });
         }
-        let bytes = std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let bytes = plain_file::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
         Settings::parse(path, &bytes)
     }
 

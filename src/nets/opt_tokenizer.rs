@@ -9,13 +9,13 @@ use tokenizers::models::bpe::BPE;
 use tokenizers::pre_tokenizers::byte_level::ByteLevel;
 
 use super::opt_config::OptConfig;
-use crate::data::text_file;
+use crate::data::{plain_file, text_file};
 
 /// The tokenizer, from `tokenizer.json` or from the older `vocab.json` and `merges.txt`, for which the start is put by hand.
 pub(super) fn read(folder: &Path, config: &OptConfig, hash: &mut Sha256) -> anyhow::Result<(Tokenizer, Option<u32>)> {
     let path = folder.join("tokenizer.json");
     let (tokenizer, start, path) = if path.is_file() {
-        let bytes = std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let bytes = plain_file::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
         hash.update(&bytes);
         let tokenizer = Tokenizer::from_bytes(text_file::content(&bytes)?);
         let mut tokenizer = tokenizer.map_err(|error| anyhow!("{}: not a tokenizer: {error}", path.display()))?;
@@ -30,7 +30,7 @@ pub(super) fn read(folder: &Path, config: &OptConfig, hash: &mut Sha256) -> anyh
             folder.display()
         );
         for path in [&vocabulary, &merges] {
-            hash.update(std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?);
+            hash.update(plain_file::read(path).with_context(|| format!("{} cannot be read", path.display()))?);
         }
         let [words, pairs] = [&vocabulary, &merges].map(|path| path.display().to_string());
         let model = BPE::from_file(&words, &pairs).build().map_err(|error| anyhow!("{words}: {error}"))?;

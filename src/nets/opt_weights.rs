@@ -10,6 +10,7 @@ use tch::{Device, Kind};
 
 use super::opt_config::OptConfig;
 use super::weights::{self, TensorSpec, Tensors, WeightsError};
+use crate::data::plain_file;
 
 /// `model.safetensors.index.json`: the file of each tensor.
 #[derive(Deserialize)]
@@ -31,7 +32,7 @@ pub(super) fn read(folder: &Path, config: &OptConfig, device: Device, hash: &mut
     let mut tensors = Tensors::new();
     let (listed, files) = files(folder)?;
     for path in files {
-        let bytes = std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let bytes = plain_file::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
         hash.update(&bytes);
         let (read, _) =
             weights::parse(&bytes).map_err(|reason| WeightsError::Malformed { path: path.clone(), reason })?;
@@ -73,7 +74,7 @@ fn files(folder: &Path) -> anyhow::Result<(PathBuf, Vec<PathBuf>)> {
         "{} holds neither model.safetensors nor model.safetensors.index.json: OPT's weights are read from safetensors files alone",
         folder.display()
     );
-    let text = std::fs::read(&index).with_context(|| format!("{} cannot be read", index.display()))?;
+    let text = plain_file::read(&index).with_context(|| format!("{} cannot be read", index.display()))?;
     let shards: ShardIndex = serde_json::from_slice(&text).with_context(|| index.display().to_string())?;
     let names: BTreeSet<String> = shards.weight_map.into_values().collect();
     let stray = names.iter().find(|name| Path::new(name).file_name().is_none_or(|file| file != name.as_str()));

@@ -14,7 +14,7 @@ use super::home;
 use super::pooling::Pooling;
 use super::transformer::Transformer;
 use super::transformer_config::TransformerConfig;
-use crate::data::text_file;
+use crate::data::{plain_file, text_file};
 
 /// The files of the default encoder whose contents set-up vouches for, with their sha256.
 const DEFAULT_FILES: [(&str, &str); 2] = [
@@ -279,7 +279,7 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path, bytes: &[u8]) -> anyhow::R
 }
 
 fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
+    plain_file::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
 #[cfg(test)]

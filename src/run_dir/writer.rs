@@ -1,7 +1,7 @@
 //! Writing a run folder: a manifest, then an episode a line as they come.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::RunManifest;
 use super::shard::Shard;
-use crate::data::json;
+use crate::data::{atomic_file, folder, json, plain_file};
 use crate::domain::TaskSet;
 use crate::episode::record::{Episode, EpisodeKey};
 
@@ -25,16 +25,13 @@ pub struct RunWriter {
 }
 
 impl RunWriter {
-    /// How the names of files begin that are being written.
-    const UNFINISHED: &str = ".sprint-";
-
     /// Opens a folder for this run: a new or empty one, or one that the same run began, which is then continued.
     ///
     /// # Errors
     /// When it holds something else (naming what differs), is being written to by another process, or cannot be written to.
     pub fn open(path: &Path, manifest: &RunManifest) -> anyhow::Result<RunWriter> {
         let name = path.display();
-        std::fs::create_dir_all(path).with_context(|| format!("cannot make the run folder {name}"))?;
+        folder::make(path).with_context(|| format!("cannot make the run folder {name}"))?;
         own_files_only(path)?;
         let manifest_path = path.join(MANIFEST);
         if !manifest_path.exists() {
@@ -42,8 +39,7 @@ impl RunWriter {
         }
         let episodes_path = path.join(EPISODES);
         let context = || format!("cannot write {}", episodes_path.display());
-        let mut options = OpenOptions::new();
-        let episodes = options.create(true).append(true).open(&episodes_path).with_context(context)?;
+        let episodes = plain_file::append(&episodes_path).with_context(context)?;
         match episodes.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => bail!("{name}: another process is writing this run; wait for it to end"),
@@ -65,7 +61,7 @@ impl RunWriter {
         }
         // What follows the last whole line is the rest of a write that was cut off.
         episodes.set_len(whole).with_context(context)?;
-        remove_unfinished(path);
+        atomic_file::remove_unfinished(path);
         Ok(RunWriter { path: path.to_owned(), episodes, earlier })
     }
 
@@ -90,8 +86,8 @@ impl RunWriter {
     /// # Errors
     /// When the folder cannot be written to.
     pub fn write_tasks(&self, set: &TaskSet) -> anyhow::Result<()> {
-        let path = self.path.join(TASKS);
-        if path.exists() { Ok(()) } else { json::write(&path, set) }
+        // The manifest vouches for the set; a file that was changed since would show other tasks.
+        json::write(&self.path.join(TASKS), set)
     }
 
     /// The episodes in the given order, without their traces, and the SHA-256 of their lines in that order: that of the file
@@ -136,20 +132,12 @@ fn only_begun(path: &Path) -> anyhow::Result<()> {
         let file = file.to_string_lossy();
         let empty = || entry.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
         // The shares of a run lie in the folder that they are merged into.
-        let begun = file.starts_with(RunWriter::UNFINISHED) || file == Shard::FOLDER || (file == EPISODES && empty());
+        let begun = file.starts_with(atomic_file::UNFINISHED) || file == Shard::FOLDER || (file == EPISODES && empty());
         if !begun {
             bail!("{name} is not empty and holds no run; choose another folder with --out");
         }
     }
     Ok(())
-}
-
-/// Files that a killed process did not get to rename are of no use to anyone; failing to remove them does no harm.
-fn remove_unfinished(path: &Path) {
-    let entries = std::fs::read_dir(path).into_iter().flatten().filter_map(Result::ok);
-    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(RunWriter::UNFINISHED)) {
-        let _ = std::fs::remove_file(entry.path());
-    }
 }
 
 #[cfg(test)]
@@ -163,7 +151,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         RunWriter::open(&path, &manifest()).unwrap().append(&episode("a")).unwrap();
-        let mut file = OpenOptions::new().append(true).open(path.join("episodes.jsonl")).unwrap();
+        let mut file = std::fs::OpenOptions::new().append(true).open(path.join("episodes.jsonl")).unwrap();
         file.write_all(b"{\"task\":\"b\",\"se").unwrap();
         let mut again = RunWriter::open(&path, &manifest()).unwrap();
         assert_eq!(again.earlier, [episode("a")]);

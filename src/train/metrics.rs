@@ -1,13 +1,15 @@
 //! Progress of long work: scalars of each step, handed to loggers that display or keep them.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::Serialize;
 use tch::{Kind, Tensor};
+
+use crate::data::plain_file;
 
 /// One step of a stage: how far it is, and what was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -51,6 +53,7 @@ pub trait ProgressLogger {
 
 /// Appends every step that has numbers to a file, a JSON object a line, and passes everything on.
 pub(crate) struct JsonLinesLogger<'a> {
+    path: PathBuf,
     file: File,
     next: &'a mut dyn ProgressLogger,
 }
@@ -61,15 +64,16 @@ impl<'a> JsonLinesLogger<'a> {
     /// # Errors
     /// When it cannot be written to.
     pub(crate) fn open(path: &Path, next: &'a mut dyn ProgressLogger) -> anyhow::Result<JsonLinesLogger<'a>> {
-        let file = OpenOptions::new().create(true).append(true).open(path);
-        Ok(JsonLinesLogger { file: file.with_context(|| format!("{} cannot be written to", path.display()))?, next })
+        let file = plain_file::append(path).with_context(|| format!("{} cannot be written to", path.display()))?;
+        Ok(JsonLinesLogger { path: path.to_owned(), file, next })
     }
 }
 
 impl ProgressLogger for JsonLinesLogger<'_> {
     fn log(&mut self, scalars: &Scalars) -> anyhow::Result<()> {
         if !scalars.values.is_empty() {
-            self.file.write_all((serde_json::to_string(scalars)? + "\n").as_bytes())?;
+            let written = self.file.write_all((serde_json::to_string(scalars)? + "\n").as_bytes());
+            written.with_context(|| format!("{} cannot be written to", self.path.display()))?;
         }
         self.next.log(scalars)
     }

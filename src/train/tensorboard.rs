@@ -5,17 +5,19 @@
 //! masked CRC-32C of the data. The data is a protocol buffer, `Event`: wall time (field 1, double), step (2, varint), and either
 //! `file_version` (3, string) or a `Summary` (5) of `Value`s (1), each a tag (1, string) and a `simple_value` (2, float).
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 
 use super::metrics::{ProgressLogger, Scalars};
+use crate::data::plain_file;
 
 /// Appends every step that has numbers to an event file, and passes everything on.
 pub(crate) struct TensorBoard<'a> {
+    path: PathBuf,
     file: File,
     next: &'a mut dyn ProgressLogger,
 }
@@ -29,11 +31,12 @@ impl<'a> TensorBoard<'a> {
         let now = now();
         let path = folder.join(format!("events.out.tfevents.{now:.6}.sprint"));
         let open = || -> std::io::Result<File> {
-            let mut file = OpenOptions::new().create(true).append(true).open(&path)?;
+            let mut file = plain_file::append(&path)?;
             file.write_all(&record(&event(now, 0, &text(3, "brain.Event:2"))))?;
             Ok(file)
         };
-        Ok(TensorBoard { file: open().with_context(|| format!("{} cannot be written to", path.display()))?, next })
+        let file = open().with_context(|| format!("{} cannot be written to", path.display()))?;
+        Ok(TensorBoard { path, file, next })
     }
 }
 
@@ -45,7 +48,8 @@ impl ProgressLogger for TensorBoard<'_> {
                 let tag = text(1, &format!("{}/{name}", scalars.stage));
                 summary.extend(message(1, &[tag, float(2, value as f32)].concat()));
             }
-            self.file.write_all(&record(&event(now(), scalars.step, &message(5, &summary))))?;
+            let written = self.file.write_all(&record(&event(now(), scalars.step, &message(5, &summary))));
+            written.with_context(|| format!("{} cannot be written to", self.path.display()))?;
         }
         self.next.log(scalars)
     }

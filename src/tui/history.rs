@@ -1,10 +1,10 @@
 //! The instructions that a person gave, kept from session to session: a line each in a file of the state folder. A file that
 //! is broken costs what is broken in it, never the session.
 
-use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::Path;
 
+use crate::data::plain_file;
 use crate::language::instruction::LONGEST;
 
 /// The first line of the file.
@@ -23,7 +23,7 @@ pub(crate) struct Remembered {
 
 /// Reads what earlier sessions left; a file that has grown long is cut. Lines that are no instructions are passed over.
 pub(crate) fn read(path: &Path) -> Remembered {
-    let bytes = match std::fs::read(path) {
+    let bytes = match plain_file::read(path) {
         Ok(bytes) => bytes,
         Err(error) => return Remembered { is_first: error.kind() == io::ErrorKind::NotFound, ..Remembered::default() },
     };
@@ -51,7 +51,7 @@ pub(crate) fn add(path: &Path, instruction: Option<&str>) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    let mut file = OpenOptions::new().create(true).append(true).open(path)?;
+    let mut file = plain_file::append(path)?;
     let head = if file.metadata()?.len() == 0 { format!("{HEAD}\n") } else { String::new() };
     let line = instruction.map_or(String::new(), |line| format!("{line}\n"));
     // One write, so that sessions side by side do not mix their lines.

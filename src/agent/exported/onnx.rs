@@ -8,6 +8,7 @@ use rten::{DataType, Dimension, Model as Graph, NodeId, RunOptions, ThreadPool, 
 
 use super::model::{Input, Model, in_one_line};
 use super::spec::{PolicySpec, Port};
+use crate::data::plain_file;
 
 /// A policy in an ONNX file.
 pub(super) struct OnnxModel {
@@ -23,7 +24,7 @@ impl OnnxModel {
     /// # Errors
     /// When it is no ONNX, uses operators that are not known, or does not fit its description.
     pub(super) fn open(path: &Path, spec: &PolicySpec) -> anyhow::Result<OnnxModel> {
-        let bytes = std::fs::read(path).context("it cannot be read")?;
+        let bytes = plain_file::read(path).context("it cannot be read")?;
         let graph = Graph::load(bytes)
             .map_err(|error| anyhow!("it is no ONNX that can be computed here: {}", in_one_line(&error.to_string())))?;
         let inputs = ports(&graph, graph.input_ids(), spec.inputs(), "input")?;

@@ -20,7 +20,7 @@ use crate::agent::policy_source::PolicySource;
 use crate::agent::select::Selection;
 use crate::agent::sentence_encoders;
 use crate::agent::value_estimates::Values;
-use crate::data::json;
+use crate::data::{json, plain_file};
 use crate::nets::device;
 use crate::nets::embedding_cache::Embedder;
 
@@ -127,7 +127,7 @@ fn open_encoder(name: &str, size: usize) -> anyhow::Result<SharedEmbedder> {
 pub(crate) fn hash(path: &Path) -> anyhow::Result<String> {
     let mut digest = Sha256::new();
     for path in [&PolicySpec::path_of(path), path] {
-        digest.update(std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?);
+        digest.update(plain_file::read(path).with_context(|| format!("cannot read {}", path.display()))?);
     }
     Ok(json::hex(&digest.finalize()))
 }

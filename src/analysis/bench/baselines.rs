@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use serde::Serialize;
+
+use crate::data::{atomic_file, text_file};
 
 const MEBIBYTE: usize = 1 << 20;
 
@@ -44,7 +47,7 @@ impl Baselines {
     /// # Errors
     /// When it cannot be read, or is no table of names and numbers.
     pub fn read(path: &Path) -> anyhow::Result<Baselines> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let text = text_file::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
         Baselines::parse(&text).with_context(|| format!("{} is not a table of names and numbers", path.display()))
     }
 
@@ -75,15 +78,15 @@ impl Baselines {
     /// # Errors
     /// When the file cannot be written.
     pub fn store(compared: &[Comparison], path: &Path) -> anyhow::Result<()> {
-        let mut table: BTreeMap<String, f64> = match std::fs::read_to_string(path) {
+        let mut table: BTreeMap<String, f64> = match text_file::read(path) {
             Ok(text) => serde_json::from_str(&text)
                 .with_context(|| format!("{} is not a table of names and numbers", path.display()))?,
-            Err(_) => BTreeMap::new(),
+            Err(error) if error.kind() == ErrorKind::NotFound => BTreeMap::new(),
+            Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
         };
         let rounded = |copies: f64| (copies * 1e3).round() / 1e3;
         table.extend(compared.iter().map(|one| (one.name.clone(), rounded(one.copies))));
-        std::fs::write(path, serde_json::to_string_pretty(&table)? + "\n")
-            .with_context(|| format!("{} cannot be written", path.display()))
+        atomic_file::write(path, (serde_json::to_string_pretty(&table)? + "\n").as_bytes())
     }
 }
 

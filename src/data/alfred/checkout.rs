@@ -10,7 +10,7 @@ use super::files::{SceneOnly, TrajData};
 use super::presence;
 use super::recording::{RecordedStart, Recording};
 use crate::data::dataset::Skipped;
-use crate::data::text_file;
+use crate::data::{plain_file, text_file};
 
 /// A `traj_data.json` of a checkout.
 pub(super) struct SourceFile {
@@ -159,7 +159,7 @@ pub(super) fn read(
 }
 
 fn parse(file: &SourceFile) -> Result<Parsed, String> {
-    let text = std::fs::read(&file.path).map_err(|error| error.to_string())?;
+    let text = plain_file::read(&file.path).map_err(|error| error.to_string())?;
     // The test splits publish no plan: further states of their scenes.
     if file.split.starts_with("tests") {
         let data: SceneOnly = read_fields(&text)?;

@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use super::git_name;
 use super::name::HubName;
 use super::revision::{FILES, HubFile, Revision};
-use crate::data::atomic_file;
+use crate::data::{atomic_file, text_file};
 
 /// The cache.
 pub(crate) struct HubCache {
@@ -56,7 +56,7 @@ impl HubCache {
 
     /// The folder of a checkpoint that is there whole.
     pub(super) fn folder(&self, name: &HubName) -> Option<PathBuf> {
-        let noted = std::fs::read_to_string(self.repository(name).join("refs").join(&name.revision));
+        let noted = text_file::read(&self.repository(name).join("refs").join(&name.revision));
         let commit = noted.map_or_else(|_| name.revision.clone(), |commit| commit.trim().to_owned());
         let folder = self.snapshot(name, &commit);
         FILES.iter().all(|file| folder.join(file).is_file()).then_some(folder)

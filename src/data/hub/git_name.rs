@@ -1,6 +1,5 @@
 //! What the Hub calls a file by its content: large ones by their SHA-256, small ones as git does.
 
-use std::fs::File;
 use std::io;
 use std::path::Path;
 
@@ -8,7 +7,7 @@ use anyhow::Context;
 use sha2::Sha256;
 
 use super::name::is_hex;
-use crate::data::json;
+use crate::data::{json, plain_file};
 
 /// Whether a text is such a name.
 pub(super) fn is_one(text: &str) -> bool {
@@ -21,7 +20,7 @@ pub(super) fn is_one(text: &str) -> bool {
 /// When the file cannot be read.
 pub(super) fn of(path: &Path, like: &str) -> anyhow::Result<String> {
     let named = || -> io::Result<String> {
-        let mut file = File::open(path)?;
+        let mut file = plain_file::open(path)?;
         if is_hex(like, 64) {
             use sha2::Digest;
             let mut digest = Sha256::new();

@@ -12,7 +12,7 @@ use super::spans::AnnotationSpan;
 use crate::data::alfred::span_task::span_task;
 use crate::data::annotations::{self, SpanKey};
 use crate::data::summaries::{Ledger, SpanSummary};
-use crate::data::{Dataset, taskset};
+use crate::data::{Dataset, folder, taskset};
 use crate::domain::task::SceneRef;
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
@@ -143,7 +143,7 @@ pub(crate) fn tasks(folder: &Path, file: &Path) -> anyhow::Result<Exported> {
     }
     ensure!(!tasks.is_empty(), "{}: nobody wrote a sentence that could become a task", folder.display());
     let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+    folder::make(parent).with_context(|| format!("cannot make {}", parent.display()))?;
     let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
     let name = file.file_stem().map_or_else(|| "people".into(), |stem| stem.to_string_lossy().into_owned());
     let scenes = named.then(|| relative(&folder.join("scenes"), parent)).transpose()?;

@@ -27,8 +27,8 @@ use self::summary::{Finished, Heading};
 use self::task_training::{STAGE, TaskTraining};
 use super::metrics::{JsonLinesLogger, ProgressLogger, Scalars};
 use super::tensorboard::TensorBoard;
-use crate::data::json;
 use crate::data::taskset;
+use crate::data::{folder, json};
 use crate::domain::{Task, TaskSet};
 use crate::episode::scenes::Scenes;
 use crate::eval::evaluation::Evaluation;
@@ -186,7 +186,7 @@ impl Finetuning {
                 }
                 let (start, folder) = (self.start(tasks, task)?, self.out.join(within));
                 let training = folder.join("training");
-                std::fs::create_dir_all(&training).with_context(|| training.display().to_string())?;
+                folder::make(&training).with_context(|| training.display().to_string())?;
                 let mut shown = progress.of_task(place);
                 let mut kept = JsonLinesLogger::open(&training.join("progress.jsonl"), &mut shown)?;
                 let mut kept = TensorBoard::open(&training, &mut kept)?;

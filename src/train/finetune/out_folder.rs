@@ -1,12 +1,13 @@
 //! The folder that a finetuning writes: whether it is free or holds one to go on with, and of what.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 
 use crate::data::folder_lock::FolderLock;
-use crate::data::{atomic_file, ensure_free};
+use crate::data::{atomic_file, ensure_free, folder, text_file};
 use crate::domain::Task;
 
 /// The file with all hyper-parameters, and below them what the finetuning belongs to.
@@ -49,8 +50,9 @@ impl OutFolder<'_> {
             .map(|(name, values)| Ok((name.to_string(), toml::Value::try_from(values)?)))
             .collect::<anyhow::Result<_>>()?;
         let text = format!("{config}\n{}", toml::to_string(&begun)?);
-        match std::fs::read_to_string(&path) {
-            Err(_) => atomic_file::write(&path, text.as_bytes())?,
+        match text_file::read(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => atomic_file::write(&path, text.as_bytes())?,
+            Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
             Ok(found) if found == text => {}
             Ok(found) => {
                 let differs = found.lines().zip(text.lines()).find(|(found, own)| found != own);
@@ -61,7 +63,7 @@ impl OutFolder<'_> {
                 );
             }
         }
-        std::fs::create_dir_all(self.out.join("training"))
+        folder::make(&self.out.join("training"))
             .with_context(|| format!("{} cannot be made", self.out.join("training").display()))?;
         Ok(lock)
     }

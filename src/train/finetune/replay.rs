@@ -1,7 +1,7 @@
 //! The replay of a finetuning: every step that was collected, appended to two files. Killed at any time, what was appended
 //! after the last saved state is dropped, and collected again.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor};
 
 use crate::algo::batch::Transitions;
+use crate::data::plain_file;
 use crate::nets::shared_rows::SharedRows;
 use crate::nets::visual::SIDE;
 
@@ -73,7 +74,7 @@ impl Replay {
     pub(super) fn open(folder: &Path, numbers: usize, keep: u64) -> anyhow::Result<Replay> {
         let open = |name: &str| {
             let path = folder.join(name);
-            let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+            let options = plain_file::change(&path);
             options.with_context(|| format!("{} cannot be written", path.display()))
         };
         let (maps, lines) = (open("replay_maps.bin")?, open("replay.jsonl")?);

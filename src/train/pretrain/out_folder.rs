@@ -1,11 +1,12 @@
 //! The folder that a training writes: whether it is free or holds a training to go on with, and of which preset.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
 use crate::data::folder_lock::FolderLock;
-use crate::data::{atomic_file, ensure_free};
+use crate::data::{atomic_file, ensure_free, folder, text_file};
 
 /// A checkpoint's folder with that of its training.
 #[derive(Clone, Copy)]
@@ -47,7 +48,7 @@ impl TrainingFolder<'_> {
         // Another training may have ended there since it was looked for.
         anyhow::ensure!(self.has_state()? == has_state, "{} was just written by another process", self.out.display());
         let training = self.training();
-        std::fs::create_dir_all(&training).with_context(|| format!("{} cannot be made", training.display()))?;
+        folder::make(&training).with_context(|| format!("{} cannot be made", training.display()))?;
         if !has_state {
             let written = ["preset.toml", "progress.jsonl"].map(|file| training.join(file));
             for file in written.iter().filter(|file| file.exists()) {
@@ -61,10 +62,11 @@ impl TrainingFolder<'_> {
 
 /// A training goes on only with the preset it began with.
 fn keep_preset(path: &Path, text: &str, format_version: u32) -> anyhow::Result<()> {
-    let begun = match std::fs::read_to_string(path) {
+    let begun = match text_file::read(path) {
         Ok(begun) if begun == text => return Ok(()),
         Ok(begun) => begun,
-        Err(_) => return atomic_file::write(path, text.as_bytes()),
+        Err(error) if error.kind() == ErrorKind::NotFound => return atomic_file::write(path, text.as_bytes()),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
     };
     let name = path.display();
     if !begun.starts_with(&format!("format_version = {format_version}\n")) {
