@@ -67,11 +67,7 @@ pub fn import(
         bail!("{} is no folder with the authors' lists", folder.display());
     }
     let (files, absent) = find(source)?;
-    let mut entries = Vec::new();
-    for set in OFFICIAL {
-        let listed = options.eval_lists.as_deref().map(|folder| tasks::listed(set, folder)).transpose()?.flatten();
-        entries.push(listed.unwrap_or_else(|| tasks::indexed(set)));
-    }
+    let entries = tasks::entries(options.eval_lists.as_deref())?;
     let mut writer = DatasetWriter::new(out)?;
     let (recordings, settings, mut skipped) =
         read(&files, &|done| progress(ImportProgress::Reading(done, files.len() as u64)));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
 
 use super::presence;
@@ -136,6 +136,11 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Officia
     }
     let text = text_file::read(&path).with_context(|| path.display().to_string())?;
     let mut items: Vec<Listed> = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    ensure!(
+        !items.is_empty(),
+        "{}: lists no task: take the authors' file, or remove it for the index that the program carries",
+        path.display()
+    );
     // The task number on the authors' command line is the position in this order.
     items.sort_by_key(|item| std::cmp::Reverse(item.subgoal_ids.len()));
     let entry = |(number, item): (usize, Listed)| {
@@ -156,6 +161,20 @@ pub fn listed(set: Official, folder: &Path) -> anyhow::Result<Option<Vec<Officia
         })
     };
     items.into_iter().enumerate().map(entry).collect::<anyhow::Result<Vec<_>>>().map(Some)
+}
+
+/// What each official set consists of: by the authors' list where the folder has it, else by the index.
+///
+/// # Errors
+/// When a list is malformed, or the folder holds none.
+pub(crate) fn entries(lists: Option<&Path>) -> anyhow::Result<Vec<Vec<OfficialTask>>> {
+    let listed_in = |set| lists.map(|folder| listed(set, folder)).transpose().map(Option::flatten);
+    let found = OFFICIAL.into_iter().map(listed_in).collect::<anyhow::Result<Vec<_>>>()?;
+    if let (Some(folder), true) = (lists, found.iter().all(Option::is_none)) {
+        let names = OFFICIAL.map(|set| set.list).join(", ");
+        bail!("{} holds none of the authors' lists: {names}", folder.display());
+    }
+    Ok(found.into_iter().zip(OFFICIAL).map(|(found, set)| found.unwrap_or_else(|| indexed(set))).collect())
 }
 
 /// Builds a set. `find` gives a trajectory and its scene by id.
@@ -229,6 +248,24 @@ mod tests {
         std::fs::write(folder.path().join(OFFICIAL[0].list), item).unwrap();
         let error = format!("{:#}", listed(OFFICIAL[0], folder.path()).unwrap_err());
         assert!(error.contains(OFFICIAL[0].list) && error.contains("subgoal_ids"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_without_any_of_the_lists_is_refused_instead_of_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = entries(Some(folder.path())).unwrap_err().to_string();
+        assert!(OFFICIAL.iter().all(|set| error.contains(set.list)), "{error}");
+        assert_eq!(entries(None).unwrap().len(), OFFICIAL.len());
+    }
+
+    #[test]
+    fn a_list_of_nothing_is_refused_and_named() {
+        let folder = tempfile::tempdir().unwrap();
+        for text in ["[]", "{}", "null", ""] {
+            std::fs::write(folder.path().join(OFFICIAL[0].list), text).unwrap();
+            let error = format!("{:#}", listed(OFFICIAL[0], folder.path()).unwrap_err());
+            assert!(error.contains(OFFICIAL[0].list), "{error}");
+        }
     }
 
     /// A list of one item, of two skills, with these sentences.
