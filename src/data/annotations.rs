@@ -6,6 +6,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::line_log::{self, LineLog};
+use crate::language::instruction::{LONGEST, visible};
 
 /// The format version this program reads and writes.
 const FORMAT: u32 = 1;
@@ -17,7 +18,7 @@ const LONGEST_NAME: usize = 40;
 /// A run of adjacent skills of a trajectory, as one of its annotators told them.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct SpanKey {
+pub struct SpanKey {
     /// The trajectory's name.
     pub(crate) trajectory: String,
     /// Which of its annotations was read.
@@ -31,7 +32,7 @@ pub(crate) struct SpanKey {
 /// A line: what a person wrote of a span. The last line counts where there are several of one span.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct SpanAnnotation {
+pub struct SpanAnnotation {
     /// The span.
     pub(crate) span: SpanKey,
     /// The sentence; nothing where the person skipped the span.
@@ -57,16 +58,46 @@ fn path(dataset: &Path, name: &str) -> PathBuf {
 ///
 /// # Errors
 /// When the name is none, or the file is malformed, in use, or cannot be written to.
-pub(crate) fn open(dataset: &Path, name: &str) -> anyhow::Result<(LineLog, Vec<SpanAnnotation>)> {
+pub fn open(dataset: &Path, name: &str) -> anyhow::Result<(LineLog, Vec<SpanAnnotation>)> {
     check_name(name)?;
-    LineLog::open(&path(dataset, name), FORMAT)
+    let path = path(dataset, name);
+    let (log, lines) = LineLog::open(&path, FORMAT)?;
+    check(&path, &lines)?;
+    Ok((log, lines))
+}
+
+/// Whether the lines say what somebody could have typed of a span.
+fn check(path: &Path, lines: &[SpanAnnotation]) -> anyhow::Result<()> {
+    for (number, line) in lines.iter().enumerate() {
+        // The first line is the header.
+        let place = || format!("{}, line {}", path.display(), number + 2);
+        let [first, end] = line.span.skills;
+        ensure!(first < end, "{}: span.skills: [{first}, {end}] is no run of skills", place());
+        if let Some(text) = &line.text {
+            let written = check_sentence(text).with_context(|| format!("{}: text", place()))?;
+            ensure!(written == *text, "{}: text: holds control characters, or spaces around it: remove them", place());
+        }
+    }
+    Ok(())
+}
+
+/// A sentence as it is kept.
+///
+/// # Errors
+/// When it says nothing or too much.
+pub(crate) fn check_sentence(text: &str) -> anyhow::Result<String> {
+    let text = visible(text);
+    ensure!(text.chars().any(char::is_alphanumeric), "type one sentence, or skip this one");
+    let length = text.chars().count();
+    ensure!(length <= LONGEST, "{length} characters, {LONGEST} are the most: shorten it");
+    Ok(text)
 }
 
 /// What everybody wrote, by name, the names sorted.
 ///
 /// # Errors
 /// When a file cannot be read or is malformed.
-pub(crate) fn read_all(dataset: &Path) -> anyhow::Result<Vec<(String, Vec<SpanAnnotation>)>> {
+pub fn read_all(dataset: &Path) -> anyhow::Result<Vec<(String, Vec<SpanAnnotation>)>> {
     let folder = dataset.join(FOLDER);
     let entries = match std::fs::read_dir(&folder) {
         Ok(entries) => entries,
@@ -78,7 +109,9 @@ pub(crate) fn read_all(dataset: &Path) -> anyhow::Result<Vec<(String, Vec<SpanAn
         let path = entry.with_context(|| folder.display().to_string())?.path();
         let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         if path.extension().is_some_and(|extension| extension == "jsonl") && check_name(&name).is_ok() {
-            all.push((name, line_log::read(&path, FORMAT)?.0));
+            let lines = line_log::read(&path, FORMAT)?.0;
+            check(&path, &lines)?;
+            all.push((name, lines));
         }
     }
     all.sort_by(|(a, _), (b, _)| a.cmp(b));
@@ -102,6 +135,20 @@ mod tests {
         let all = read_all(folder.path()).unwrap();
         assert_eq!(all, [("ann".into(), vec![wrote(Some("Set the table."))]), ("bob".into(), vec![wrote(None)])]);
         assert!(open(folder.path(), "ann").is_err(), "one sitting a person");
+    }
+
+    #[test]
+    fn a_line_that_nobody_could_have_typed_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let span = SpanKey { trajectory: "t".into(), annotator: 0, skills: [0, 2], input: "d".into() };
+        for (skills, text) in [([2, 0], "Go."), ([0, 2], ""), ([0, 2], "\u{1b}[2JGo."), ([0, 2], &"a".repeat(2001))] {
+            let _ = std::fs::remove_dir_all(folder.path().join(FOLDER));
+            let line = SpanAnnotation { span: SpanKey { skills, ..span.clone() }, text: Some(text.into()) };
+            open(folder.path(), "ann").unwrap().0.append(&[line]).unwrap();
+            for error in [read_all(folder.path()).unwrap_err(), open(folder.path(), "ann").err().unwrap()] {
+                assert!(format!("{error:#}").contains("ann.jsonl, line 2: "), "{error:#}");
+            }
+        }
     }
 
     #[test]

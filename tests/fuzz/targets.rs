@@ -9,6 +9,7 @@ use sprint_explorer::agent::checkpoint::Networks;
 use sprint_explorer::agent::config::CheckpointConfig;
 use sprint_explorer::agent::policy_source::PolicySource;
 use sprint_explorer::data::alfred::{self, tasks as lists};
+use sprint_explorer::data::annotations;
 use sprint_explorer::data::features::{self, Features};
 use sprint_explorer::data::summaries::{Ledger, SpanSummary, Summaries};
 use sprint_explorer::data::{Dataset, alfred::layout::FloorPlanLayout, dataset, json, taskset};
@@ -61,6 +62,7 @@ pub(crate) const ALL: &[Target] = &[
         read: trajectories,
     },
     Target { name: "labels", file: "labels.jsonl", prepare: labels, read: label },
+    Target { name: "annotations", file: "annotations/ann.jsonl", prepare: annotated, read: annotation },
     Target { name: "features", file: "cache.bin", prepare: maps, read: map },
     Target { name: "embeddings", file: "encoder.embeddings", prepare: embeddings, read: embedding },
     Target { name: "config", file: "config.json", prepare: |_| vec![shipped("config.json")], read: checkpoint },
@@ -252,6 +254,22 @@ fn labels(at: &Path) -> Vec<Vec<u8>> {
 fn label(at: &Path) -> anyhow::Result<()> {
     Summaries::read(&[at], None)?;
     Ledger::open(at).map(drop)
+}
+
+/// What two sittings wrote: the second takes back a sentence of the first.
+fn annotated(_: &Path) -> Vec<Vec<u8>> {
+    let line = |trajectory: &str, text: Option<&str>| {
+        let span = serde_json::json!({"trajectory": trajectory, "annotator": 0, "skills": [0, 2], "input": "00ff"});
+        serde_json::json!({"span": span, "text": text}).to_string() + "\n"
+    };
+    let header = "{\"format_version\":1}\n".to_owned();
+    let first = header.clone() + &line("a", Some("Set the table.")) + &line("b", Some("Café crème."));
+    vec![(first + &line("a", None)).into_bytes(), header.into_bytes()]
+}
+
+fn annotation(at: &Path) -> anyhow::Result<()> {
+    annotations::read_all(at)?;
+    annotations::open(at, "ann").map(drop)
 }
 
 fn header() -> features::FeatureHeader {

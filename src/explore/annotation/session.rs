@@ -6,7 +6,6 @@ use std::path::Path;
 use super::spans::AnnotationSpan;
 use crate::data::annotations::{self, SpanAnnotation, SpanKey};
 use crate::data::line_log::LineLog;
-use crate::language::instruction::{LONGEST, visible};
 
 /// What a person made of a span.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,11 +67,7 @@ impl AnnotationSession {
     /// # Errors
     /// When it is none, or cannot be written; the span is asked about still.
     pub(crate) fn write(&mut self, text: &str) -> anyhow::Result<()> {
-        let text = visible(text);
-        anyhow::ensure!(text.chars().any(char::is_alphanumeric), "type one sentence, or skip this one");
-        let length = text.chars().count();
-        anyhow::ensure!(length <= LONGEST, "{length} characters, {LONGEST} are the most: shorten it");
-        self.keep(Answer::Sentence(text))
+        self.keep(Answer::Sentence(annotations::check_sentence(text)?))
     }
 
     /// Says of the span that it is no meaningful task, and goes to the next.
@@ -123,6 +118,7 @@ pub(crate) fn answers(lines: Vec<SpanAnnotation>) -> HashMap<SpanKey, Answer> {
 mod tests {
     use super::super::testing;
     use super::*;
+    use crate::language::instruction;
 
     #[test]
     fn a_person_writes_skips_goes_back_and_goes_on_later() {
@@ -157,7 +153,7 @@ mod tests {
     fn what_is_no_sentence_is_refused_and_the_span_stays() {
         let folder = testing::dataset(&["a"], &[]);
         let mut session = AnnotationSession::open(folder.path(), "ann", testing::spans(folder.path())).unwrap();
-        for text in ["", "  \u{200b} ", "...", &"a".repeat(LONGEST + 1)] {
+        for text in ["", "  \u{200b} ", "...", &"a".repeat(instruction::LONGEST + 1)] {
             assert!(session.write(text).is_err(), "{text:?}");
         }
         assert_eq!(session.place(), (0, 3));
