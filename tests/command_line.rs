@@ -79,6 +79,40 @@ fn embed_refuses_a_line_that_is_not_text_and_a_folder_that_is_not_there() {
 }
 
 #[test]
+fn a_number_that_nothing_can_be_done_with_is_refused_before_anything_is_written() {
+    let home = tempfile::tempdir().unwrap();
+    for line in [
+        "collect out --episodes 0",
+        "collect out --episodes 18446744073709551615",
+        "collect out --annotations 18446744073709551615",
+        "collect out --noise nan",
+        "pretrain none --preset l-bc --out out --parts 0",
+        "pretrain none --preset l-bc --out out --parts 18446744073709551615",
+        "relabel none --with rules --sample 0",
+        "eval --tasks none --policy random --out out --seeds 0",
+    ] {
+        let output = sprint(home.path()).args(line.split(' ')).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(matches!(output.status.code(), Some(1 | 2)) && !said.contains("panicked"), "{line}: {said}");
+        let number = line.rsplit(' ').next().unwrap().to_lowercase();
+        assert!(said.to_lowercase().contains(&number), "{line}: {said}");
+        assert!(!home.path().join("out").exists(), "{line}");
+    }
+}
+
+#[test]
+fn standard_output_that_takes_nothing_is_named() {
+    let home = tempfile::tempdir().unwrap();
+    for line in ["man", "completions bash", "schema tasks", "doctor", "explore --print-config"] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = sprint(home.path()).args(line.split(' ')).stdout(full).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains("cannot write to standard output"), "{line}: {said}");
+    }
+}
+
+#[test]
 fn shells_and_man_get_their_pages() {
     let home = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish"] {

@@ -145,7 +145,7 @@ impl Annotate {
         let spans = draw(&dataset, &selection)?;
         let mut session = AnnotationSession::open(&self.data, &person, spans)?;
         if self.plain {
-            let (input, out) = (std::io::stdin().lock(), Printable::new(std::io::stdout().lock()));
+            let (input, out) = (std::io::stdin().lock(), Printable::new(streams::StandardOutput::lock()));
             plain::run(&mut session, input, out)?;
             return Ok(ExitStatus::Ok);
         }

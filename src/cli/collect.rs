@@ -29,8 +29,8 @@ pub(crate) struct Collect {
     #[arg(long, value_name = "TASKS", conflicts_with_all = ["scenes", "episodes", "lengths", "annotations"])]
     tasks: Option<PathBuf>,
     /// How many demonstrations
-    #[arg(long, default_value_t = 1000)]
-    episodes: usize,
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    episodes: u32,
     /// Drives houses, tasks, words and chance
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -47,8 +47,8 @@ pub(crate) struct Collect {
     #[arg(long, default_value_t = 0.08)]
     noise: f64,
     /// Phrasings of each demonstration
-    #[arg(long, default_value_t = 4)]
-    annotations: usize,
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=100))]
+    annotations: u8,
     /// A checkpoint that acts, while the demonstrator only says what it would do: its folder, its name among checkpoints/, or
     /// ORG/NAME[@REVISION] on the Hub
     #[arg(long, value_name = "DIR|NAME")]
@@ -77,9 +77,11 @@ impl Collect {
                 let set = taskset::read(&file)?.value;
                 TaskSource::Tasks { scenes: Scenes::of(&file, &set), tasks: set.tasks }
             }
-            None => {
-                TaskSource::Generated { episodes: self.episodes, lengths: self.lengths, annotations: self.annotations }
-            }
+            None => TaskSource::Generated {
+                episodes: self.episodes as usize,
+                lengths: self.lengths,
+                annotations: self.annotations.into(),
+            },
         };
         let turn_timing = if self.prompt { TurnTiming::Early } else { TurnTiming::Late };
         let settings = DemonstrationSettings { expert: self.demonstrator, turn_timing, noise: self.noise };

@@ -40,7 +40,7 @@ impl EmbedArgs {
             streams::say(&format!("settings of the sentence encoder that are not read: {settings}"));
         }
         let mut lines = BufReader::with_capacity(1 << 16, std::io::stdin());
-        let mut out = std::io::stdout().lock();
+        let mut out = streams::StandardOutput::lock();
         let mut number = 0;
         while let Some(first) = next_line(&mut lines, &mut number)? {
             let mut texts = vec![first];

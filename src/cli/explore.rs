@@ -14,6 +14,7 @@ pub(crate) use self::origin::Origin;
 use super::checkpoint;
 use super::exit_status::ExitStatus;
 use super::policy_name::{ExternalPolicyOptions, PolicyName, PolicyNameParser};
+use super::streams::StandardOutput;
 use crate::agent::registry::PolicyKind;
 use crate::tui::config::ExplorerConfig;
 
@@ -41,7 +42,7 @@ impl Explore {
     /// When what it should start in cannot be opened, or there is no terminal.
     pub(crate) fn run(self) -> anyhow::Result<ExitStatus> {
         if self.print_config {
-            write!(std::io::stdout(), "{}", ExplorerConfig::commented())?;
+            write!(StandardOutput::lock(), "{}", ExplorerConfig::commented())?;
             return Ok(ExitStatus::Ok);
         }
         let manual = matches!(self.policy, Some(PolicyName::Manual));

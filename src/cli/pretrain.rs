@@ -97,6 +97,10 @@ impl Pretrain {
             VisualBackbone::House => preset.visual_encoder.features(),
             VisualBackbone::ResNet18 => resnet18::FEATURES,
         };
+        if let Some(parts) = self.parts {
+            preset.parts = parts;
+            preset.check_parts()?;
+        }
         let (parts, told) = memory_need::plan(&preset, features, device, self.parts.or(begun))?;
         preset.parts = parts;
         preset.check_parts()?;

@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit_status::ExitStatus;
+use super::streams::{Printable, StandardOutput};
 use super::wish_reader::WishReaderArgs;
 use crate::data::{dataset, text_file};
 use crate::domain::{Class, Room};
@@ -79,7 +80,7 @@ impl ReadArgs {
         });
         let served = self.reader.open()?;
         let reader = Reader::shipped().map_err(|error| anyhow!("{error}"))?;
-        let mut out = std::io::stdout().lock();
+        let mut out = Printable::new(StandardOutput::lock());
         for (number, text) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
             let text = text.with_context(|| format!("line {number} is not UTF-8 text"))?;
             let text = text_file::line(&text);
@@ -132,7 +133,7 @@ fn house(name: &str) -> anyhow::Result<House> {
 fn print_features(words: &Path) -> anyhow::Result<ExitStatus> {
     let known = text_file::read(words).with_context(|| words.display().to_string())?;
     let spelling = Spelling::of(known.lines().map(str::to_string));
-    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut out = std::io::BufWriter::new(StandardOutput::lock());
     for (number, line) in (1..).zip(BufReader::new(std::io::stdin()).lines()) {
         let line = line.with_context(|| format!("line {number} is not UTF-8 text"))?;
         let Example { text, object, place } =

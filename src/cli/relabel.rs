@@ -30,8 +30,8 @@ pub(crate) struct Relabel {
     #[command(flatten)]
     language_model: LanguageModelArgs,
     /// Label only so many passages, chosen by chance; a larger sample holds a smaller one
-    #[arg(long, value_name = "N")]
-    sample: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    sample: Option<u32>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -55,7 +55,8 @@ impl Relabel {
         let stop = stop::on_signals()?;
         let summarizer = self.summarizer(&stop)?;
         let mut progress = Progress::new();
-        let found = relabel(&self.data, summarizer.as_ref(), self.sample, &mut progress, &stop)?;
+        let found =
+            relabel(&self.data, summarizer.as_ref(), self.sample.map(|sample| sample as usize), &mut progress, &stop)?;
         progress.end();
         let malformed = match found.malformed {
             0 => String::new(),

@@ -6,6 +6,7 @@ use clap::{Args, Command};
 use clap_complete::Shell;
 
 use super::exit_status::ExitStatus;
+use super::streams::StandardOutput;
 use crate::explore::verb;
 
 /// Prints a completion script.
@@ -23,7 +24,7 @@ impl Completions {
     pub(crate) fn run(self, mut program: Command) -> anyhow::Result<ExitStatus> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut program, "sprint", &mut script);
-        std::io::stdout().write_all(&script)?;
+        StandardOutput::lock().write_all(&script)?;
         Ok(ExitStatus::Ok)
     }
 }
@@ -40,6 +41,6 @@ pub(crate) fn man(mut program: Command) -> anyhow::Result<ExitStatus> {
         clap_mangen::Man::new(command.clone()).render(&mut page)?;
     }
     page.extend(verb::man_section().into_bytes());
-    std::io::stdout().write_all(&page)?;
+    StandardOutput::lock().write_all(&page)?;
     Ok(ExitStatus::Ok)
 }

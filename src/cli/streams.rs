@@ -1,7 +1,7 @@
 //! Standard output and standard error, whose readers may leave (`| head`) without anything being lost by it. What is printed may
 //! come from somebody's file: nothing of it steers the terminal.
 
-use std::io::{ErrorKind, Result, StdoutLock, Write, stderr, stdout};
+use std::io::{Error, ErrorKind, Result, StdoutLock, Write, stderr, stdout};
 
 use crate::language::instruction::is_control;
 
@@ -10,7 +10,7 @@ pub(crate) type Out = Printable<UntilLeft>;
 
 /// Standard output, for one command.
 pub(crate) fn out() -> Out {
-    Printable::new(UntilLeft(stdout().lock()))
+    Printable::new(UntilLeft(StandardOutput::lock()))
 }
 
 /// Says a line on standard error, if anybody listens.
@@ -18,8 +18,32 @@ pub(crate) fn say(line: &str) {
     let _ = writeln!(stderr(), "{}", printable(line));
 }
 
+/// Standard output, whose errors say that they are of it.
+pub(crate) struct StandardOutput(StdoutLock<'static>);
+
+impl StandardOutput {
+    /// For one command.
+    pub(crate) fn lock() -> StandardOutput {
+        StandardOutput(stdout().lock())
+    }
+}
+
+fn named(error: Error) -> Error {
+    Error::new(error.kind(), format!("cannot write to standard output: {error}"))
+}
+
+impl Write for StandardOutput {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.0.write(bytes).map_err(named)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.0.flush().map_err(named)
+    }
+}
+
 /// Standard output that does not mind when nobody reads it any more.
-pub(crate) struct UntilLeft(StdoutLock<'static>);
+pub(crate) struct UntilLeft(StandardOutput);
 
 fn unless_left<T>(done: Result<T>, otherwise: T) -> Result<T> {
     match done {

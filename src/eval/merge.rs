@@ -8,6 +8,7 @@ use anyhow::{Context, bail, ensure};
 use super::evaluation::finish;
 use super::tasks::scene_folder;
 use crate::episode::record::EpisodeKey;
+use crate::language::count::counted;
 use crate::report::summary::RunSummary;
 use crate::run_dir::episode_spec::episode_specs;
 use crate::run_dir::layout::TASKS;
@@ -23,11 +24,15 @@ use crate::run_dir::writer::RunWriter;
 /// When there are none, or the folder cannot be read.
 pub(crate) fn shares_in(run: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let folder = run.join(Shard::FOLDER);
+    let none = || format!("{} holds no shares; eval --shard writes them", folder.display());
+    if !folder.exists() {
+        bail!(none());
+    }
     let entries = std::fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let mut found: Vec<PathBuf> =
         entries.filter_map(Result::ok).map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
     found.sort();
-    ensure!(!found.is_empty(), "{} holds no shares; eval --shard writes them", folder.display());
+    ensure!(!found.is_empty(), none());
     Ok(found)
 }
 
@@ -76,11 +81,12 @@ pub(crate) fn merge(shares: &[PathBuf], into: &Path) -> anyhow::Result<RunSummar
         let (found, wanted) = (run.episodes.len(), run.episode_specs().len());
         ensure!(
             found == wanted,
-            "{} has {found} of its {wanted} episodes; the same eval command with --shard completes it",
-            run.path.display()
+            "{} has {found} of its {}; the same eval command with --shard completes it",
+            run.path.display(),
+            counted(wanted, "episode")
         );
     }
-    ensure!(episodes == all.len(), "the shares hold {episodes} episodes, the run has {}", all.len());
+    ensure!(episodes == all.len(), "the shares hold {}, the run has {}", counted(episodes, "episode"), all.len());
     let mut folder = RunWriter::open(into, &manifest)?;
     policy_places::write(into, &first.places)?;
     folder.write_tasks(&scene_folder::as_seen_from(&set, &set.tasks, &file, into)?)?;

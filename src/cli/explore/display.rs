@@ -11,7 +11,7 @@ use crate::agent::policy_source::PolicySource;
 use crate::agent::registry::PolicyKind;
 use crate::cli::exit_status::ExitStatus;
 use crate::cli::logging;
-use crate::cli::streams::Printable;
+use crate::cli::streams::{Printable, StandardOutput};
 use crate::data::text_file;
 use crate::explore::exploration::Exploration;
 use crate::explore::plain;
@@ -54,7 +54,7 @@ impl Display {
     ) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, control) = PlainInput::steered(BufReader::new(std::io::stdin()))?;
-            let out = Printable::new(std::io::stdout().lock());
+            let out = Printable::new(StandardOutput::lock());
             let _listens = control.listen();
             // At a terminal a person has seen what was refused; of a script nobody may have.
             let obeyed = plain::run(open()?, input, &control, out)? || std::io::stdin().is_terminal();
@@ -70,7 +70,7 @@ impl Display {
     pub(crate) fn show_remote(self, manual: bool, open: OpenRemote, agent: PolicySource) -> anyhow::Result<ExitStatus> {
         if self.plain {
             let (input, control) = PlainInput::steered(BufReader::new(std::io::stdin()))?;
-            let out = Printable::new(std::io::stdout().lock());
+            let out = Printable::new(StandardOutput::lock());
             let _listens = control.listen();
             let obeyed = remote::plain::run(open()?, &agent, input, &control, out)? || std::io::stdin().is_terminal();
             return Ok(if obeyed { ExitStatus::Ok } else { ExitStatus::SomeFailed });

@@ -204,7 +204,11 @@ impl Preset {
         }
         let Some(chaining) = &self.chaining else { return Ok(()) };
         anyhow::ensure!(self.critic.is_some(), "chaining needs a critic");
-        anyhow::ensure!(chaining.batch_size > 0, "chaining.batch_size is 0");
+        let pairs = chaining.batch_size;
+        anyhow::ensure!(
+            (1..=65_536).contains(&pairs),
+            "chaining.batch_size is {pairs}, which is not between 1 and 65536"
+        );
         for (field, value) in [
             ("chaining.loss_weight", chaining.loss_weight),
             ("chaining.chain_weight", chaining.chain_weight),
