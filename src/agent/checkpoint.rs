@@ -127,9 +127,11 @@ impl Networks {
     /// Writes a checkpoint: the weights first, the configuration last.
     ///
     /// # Errors
-    /// When the folder cannot be written to.
+    /// When a weight is no number, or the folder cannot be written to.
     pub fn save(&self, folder: &Path, config: &CheckpointConfig) -> anyhow::Result<()> {
-        weights::write(&folder.join("model.safetensors"), &self.tensors(), &BTreeMap::new())?;
+        let (path, tensors) = (folder.join("model.safetensors"), self.tensors());
+        weights::check_finite(&path, &tensors)?;
+        weights::write(&path, &tensors, &BTreeMap::new())?;
         json::write_pretty(&folder.join("config.json"), config)
     }
 }
@@ -200,6 +202,19 @@ mod tests {
             let config = CheckpointConfig::read(&folder).unwrap();
             assert_eq!(Networks::load(&folder, &config, Device::Cpu).unwrap().critic.is_some(), has_critic);
         }
+    }
+
+    #[test]
+    fn weights_that_are_no_numbers_are_not_written_over_good_ones() {
+        let _chance = crate::nets::testing::chance();
+        let (folder, config) = saved();
+        let path = folder.path().join("model.safetensors");
+        let good = std::fs::read(&path).unwrap();
+        let networks = Networks::load(folder.path(), &config, Device::Cpu).unwrap();
+        let _ = tch::no_grad(|| networks.policy_store.trainable_variables()[0].fill_(f64::NAN));
+        let error = networks.save(folder.path(), &config).unwrap_err().to_string();
+        assert!(error.contains("model.safetensors") && error.contains("NaN"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), good);
     }
 
     #[test]

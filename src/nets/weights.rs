@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tch::{Kind, Tensor, nn};
 
-use crate::data::atomic_file;
+use crate::data::{atomic_file, plain_file};
 
 use super::weights_error::Misshapen;
 pub use super::weights_error::{Differences, TensorSpec, WeightsError};
@@ -30,7 +30,7 @@ pub fn read(path: &Path) -> Result<Tensors, WeightsError> {
 /// # Errors
 /// [`WeightsError::Unreadable`], [`WeightsError::Malformed`] or [`WeightsError::NotFinite`].
 pub fn read_with_metadata(path: &Path) -> Result<(Tensors, BTreeMap<String, String>), WeightsError> {
-    let bytes = std::fs::read(path).map_err(|source| WeightsError::Unreadable { path: path.into(), source })?;
+    let bytes = plain_file::read(path).map_err(|source| WeightsError::Unreadable { path: path.into(), source })?;
     let read = parse(&bytes).map_err(|reason| WeightsError::Malformed { path: path.into(), reason })?;
     check_finite(path, &read.0)?;
     Ok(read)
@@ -40,7 +40,7 @@ pub fn read_with_metadata(path: &Path) -> Result<(Tensors, BTreeMap<String, Stri
 ///
 /// # Errors
 /// [`WeightsError::NotFinite`], which names the file and the tensor.
-pub(super) fn check_finite(path: &Path, tensors: &Tensors) -> Result<(), WeightsError> {
+pub(crate) fn check_finite(path: &Path, tensors: &Tensors) -> Result<(), WeightsError> {
     let mut found = tensors.iter().filter_map(|(name, tensor)| Some((name, not_a_weight(name, tensor)?)));
     let Some((name, what)) = found.next() else { return Ok(()) };
     Err(WeightsError::NotFinite { path: path.into(), name: name.clone(), what, others: found.count() })

@@ -184,13 +184,14 @@ impl MemoryNetworks {
     /// Writes a checkpoint: the weights first, the configuration last. A critic that the configuration does not name is left out.
     ///
     /// # Errors
-    /// When the folder cannot be written to.
+    /// When a weight is no number, or the folder cannot be written to.
     pub(crate) fn save(&self, folder: &Path, config: &MemoryConfig) -> anyhow::Result<()> {
-        let mut tensors = self.tensors();
+        let (path, mut tensors) = (folder.join("model.safetensors"), self.tensors());
         if config.critic.is_none() {
             tensors.retain(|name, _| !name.starts_with("critic."));
         }
-        weights::write(&folder.join("model.safetensors"), &tensors, &BTreeMap::new())?;
+        weights::check_finite(&path, &tensors)?;
+        weights::write(&path, &tensors, &BTreeMap::new())?;
         json::write_pretty(&folder.join("config.json"), config)
     }
 }
