@@ -111,6 +111,23 @@ impl Episode {
         self.trace.first().is_some_and(|step| step.author.is_some())
     }
 
+    /// What its record says of it that its own steps deny. A person who explored was told several things.
+    pub(crate) fn contradiction(&self) -> Option<String> {
+        if let Some(failure) = self.failure.filter(|_| self.success || self.error.is_some()) {
+            let ended = if self.success { "a success" } else { "an error" };
+            return Some(format!("failure: {}, of {ended}", failure.words()));
+        }
+        if self.trace.is_empty() || self.is_explored() {
+            return None;
+        }
+        let own = self.trace.get(self.prefix_steps as usize..).unwrap_or_default();
+        if self.steps as usize != own.len() {
+            return Some(format!("steps: {}, but its trace has {}", self.steps, own.len()));
+        }
+        let completed = TraceStep::completed(own);
+        (self.completed != completed).then(|| format!("completed: {}, but its trace says {completed}", self.completed))
+    }
+
     /// Whether its own record makes it a success, where that word ended it.
     pub(crate) fn is_success(&self, ended_by: EndedBy) -> bool {
         let is_complete = self.error.is_none() && self.of > 0 && self.completed == self.of;

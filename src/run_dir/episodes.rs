@@ -1,23 +1,22 @@
 //! A run's `episodes.jsonl`, read back.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use anyhow::{Context, bail};
 
-use crate::data::text_file;
+use crate::data::{plain_file, text_file};
 use crate::episode::record::{Episode, EpisodeKey};
 
 /// Reads a run's episodes, with the length in bytes of its whole lines. A torn last line is left out; where an episode was
 /// begun anew after an error, its last record counts.
 ///
 /// # Errors
-/// When a line before the last is not an episode, or one is there twice; names file and line.
+/// When a line before the last is not an episode, contradicts itself, or is there twice; names file and line.
 pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> {
     let name = path.display();
-    let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
+    let file = plain_file::open(path).with_context(|| format!("cannot read {name}"))?;
     let mut reader = BufReader::new(file);
     let (mut episodes, mut places) = (Vec::<Episode>::new(), BTreeMap::<EpisodeKey, (usize, usize)>::new());
     let (mut line, mut whole) = (Vec::new(), 0);
@@ -31,6 +30,12 @@ pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> 
         let context = || format!("{name}: line {number} is not an episode");
         let text = text_file::content(&line).with_context(context)?;
         let episode: Episode = serde_json::from_slice(text).with_context(context)?;
+        if let Some(contradiction) = episode.contradiction() {
+            bail!(
+                "{name}: line {number} contradicts itself: {contradiction}; delete it, and the same command plays its \
+                 episode anew"
+            );
+        }
         let key = episode.key();
         match places.get(&key) {
             Some(&(place, _)) if episodes[place].error.is_some() && episodes[place].attempts < episode.attempts => {
@@ -48,8 +53,12 @@ pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> 
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use serde_json::json;
+
     use super::*;
     use crate::data::json;
+    use crate::episode::failure::Failure;
+    use crate::episode::record::TraceStep;
     use crate::run_dir::manifest::RunManifest;
     use crate::run_dir::manifest::tests::manifest;
 
@@ -65,6 +74,37 @@ pub(crate) mod tests {
             steps: 9,
             attempts: 1,
             ..Episode::default()
+        }
+    }
+
+    /// Spoils a record.
+    type Change<'a> = &'a dyn Fn(&mut Episode);
+
+    #[test]
+    fn a_record_that_its_own_steps_deny_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("episodes.jsonl");
+        let plain = json!({"action": "LookUp", "outcome": "done"});
+        let completing = json!({"action": "LookUp", "outcome": "done", "subtask": 0});
+        let trace: Vec<TraceStep> = serde_json::from_value(json!([plain, completing, plain])).unwrap();
+        let good = Episode { steps: 3, failure: Some(Failure::Stuck), trace, ..episode("a") };
+        let read = |change: &dyn Fn(&mut Episode)| {
+            let mut episode = good.clone();
+            change(&mut episode);
+            std::fs::write(&path, serde_json::to_string(&episode).unwrap() + "\n").unwrap();
+            read_episodes(&path).map(drop).map_err(|error| format!("{error:#}"))
+        };
+        assert_eq!(read(&|_| ()), Ok(()));
+        assert_eq!(read(&|it| it.trace.clear()), Ok(()), "a trace may have been left out");
+        let faults: [(Change<'_>, &str); 4] = [
+            (&|it| it.steps = 2, "line 1 contradicts itself: steps: 2, but its trace has 3"),
+            (&|it| it.prefix_steps = 2, "steps: 3, but its trace has 1"),
+            (&|it| it.completed = 0, "completed: 0, but its trace says 1"),
+            (&|it| it.success = true, "failure: "),
+        ];
+        for (change, told) in faults {
+            let said = read(change).unwrap_err();
+            assert!(said.contains(told), "{told}: {said}");
         }
     }
 
