@@ -36,16 +36,20 @@ pub fn read(folder: &Path) -> anyhow::Result<Curves> {
     let mut curves = Curves::new();
     let lines: Vec<&str> = text.lines().collect();
     for (number, line) in lines.iter().enumerate() {
+        let place = || format!("{}: line {}", path.display(), number + 1);
         let value: serde_json::Map<String, serde_json::Value> = match serde_json::from_str(line) {
             Ok(value) => value,
-            Err(_) if number + 1 == lines.len() => break,
-            Err(error) => return Err(error).with_context(|| format!("{}: line {}", path.display(), number + 1)),
+            Err(_) if number + 1 == lines.len() && !text.ends_with('\n') => break,
+            Err(error) => return Err(error).with_context(place),
         };
         let stage = value.get("stage").and_then(serde_json::Value::as_str).unwrap_or("training").to_string();
-        let Some(step) = value.get("step").and_then(serde_json::Value::as_u64) else { continue };
-        for (name, number) in value {
-            if let (false, Some(number)) = (["stage", "step", "of"].contains(&name.as_str()), number.as_f64()) {
-                curves.entry(format!("{stage}/{name}")).or_default().insert(step, number);
+        let step = value.get("step").and_then(serde_json::Value::as_u64);
+        let step = step.context("step: missing, or no whole number").with_context(place)?;
+        for (name, number) in value.into_iter().filter(|(name, _)| !["stage", "step", "of"].contains(&name.as_str())) {
+            // A number that is none is kept as null.
+            if !number.is_null() {
+                let number = number.as_f64().with_context(|| format!("{name}: {number} is no number"));
+                curves.entry(format!("{stage}/{name}")).or_default().insert(step, number.with_context(place)?);
             }
         }
     }
@@ -140,6 +144,25 @@ mod tests {
         let curves = training().1;
         assert_eq!(curves["policy/q_loss"], [(50, 0.5), (100, 0.3)].into());
         assert_eq!(curves.len(), 2);
+    }
+
+    #[test]
+    fn a_whole_line_that_tells_no_step_or_no_numbers_is_named() {
+        let (folder, _) = training();
+        let path = folder.path().join("training/progress.jsonl");
+        let good = r#"{"stage":"policy","step":50,"of":200,"q_loss":null,"v_mean":0.1}"#;
+        for (line, told) in [
+            (r#"{"stage":"policy","step":-1,"q_loss":0.5}"#, "step"),
+            (r#"{"stage":"policy","q_loss":0.5}"#, "step"),
+            (r#"{"stage":"policy","step":1,"q_loss":"0.5"}"#, "q_loss"),
+            (r#"{"stage":"policy","st"#, "EOF"),
+        ] {
+            std::fs::write(&path, format!("{good}\n{line}\n")).unwrap();
+            let error = format!("{:#}", read(folder.path()).unwrap_err());
+            assert!(error.contains("progress.jsonl: line 2") && error.contains(told), "{error}");
+        }
+        std::fs::write(&path, format!("{good}\n")).unwrap();
+        assert_eq!(read(folder.path()).unwrap().len(), 1, "a number that is none is left out");
     }
 
     #[test]
