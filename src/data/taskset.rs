@@ -9,6 +9,7 @@ use super::json::{self, Document};
 use crate::domain::task::SceneRef;
 use crate::domain::{Class, EnvironmentName, Role, SkillKind, Subtask, Task, TaskSet};
 use crate::house::validate::Misfit;
+use crate::language::count::counted;
 use crate::language::instruction;
 
 /// The longest horizon that is taken, in steps.
@@ -37,7 +38,9 @@ pub fn read_told(path: &Path) -> anyhow::Result<Document<TaskSet>> {
 }
 
 fn filled(path: &Path) -> anyhow::Result<Document<TaskSet>> {
-    let Document { value, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    let Document { mut value, digest } = json::read::<TaskSet>(path, TaskSet::FORMAT)?;
+    // It comes to stand in tables, pages and drawings.
+    value.name = instruction::visible(&value.name);
     Ok(Document { value: value.filled(), digest })
 }
 
@@ -111,7 +114,7 @@ pub(crate) fn misfits_told(task: &Task) -> Vec<Misfit> {
 /// Everything that is wrong with a task by itself.
 pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
     let mut found = Vec::new();
-    if task.id.trim().is_empty() || task.id.chars().any(char::is_control) || task.id.chars().count() > 200 {
+    if task.id.trim().is_empty() || task.id.chars().any(instruction::is_control) || task.id.chars().count() > 200 {
         found.push(Misfit::new("id", "empty, too long, or with control characters"));
     }
     if let Some(env) = &task.env {
@@ -132,7 +135,10 @@ pub(crate) fn misfits(task: &Task) -> Vec<Misfit> {
     }
     let (sentences, subtasks) = (task.sentences.len(), task.subtasks.len());
     if sentences != 0 && sentences != subtasks {
-        found.push(Misfit::new("sentences", format!("{sentences} sentences for {subtasks} subtasks")));
+        found.push(Misfit::new(
+            "sentences",
+            format!("{} for {}", counted(sentences, "sentence"), counted(subtasks, "subtask")),
+        ));
     }
     if !(1..=MOST_SUBTASKS).contains(&subtasks) {
         found.push(Misfit::new("subtasks", format!("{subtasks} are not 1 to {MOST_SUBTASKS}")));
@@ -279,6 +285,18 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_name_is_read_without_what_steers_a_terminal_and_an_id_of_that_kind_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tasks.json");
+        let mut set = TaskSet { name: "mine\u{1b}[2J\u{202e}".into(), ..sample_set() };
+        json::write(&path, &set).unwrap();
+        assert_eq!(read(&path).unwrap().value.name, "mine[2J");
+        set.tasks[0].id = "a\u{202e}b".into();
+        json::write(&path, &set).unwrap();
+        assert!(format!("{:#}", read(&path).err().unwrap()).contains("tasks[0].id"));
+    }
+
+    #[test]
     fn a_set_that_was_written_reads_back_the_same() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("set.json");
@@ -311,7 +329,7 @@ pub(crate) mod tests {
             complaint(|set| set.tasks[0].instruction = "  ".into())
                 .contains("tasks[0].instruction: the instruction is empty")
         );
-        assert!(complaint(|set| set.tasks[0].sentences.truncate(1)).contains("1 sentences for 2 subtasks"));
+        assert!(complaint(|set| set.tasks[0].sentences.truncate(1)).contains("1 sentence for 2 subtasks"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].object = 9).contains("tasks[0].subtasks[1].object: 9, but"));
         assert!(complaint(|set| set.tasks[0].subtasks[1].receptacle = None).contains("subtasks[1].receptacle"));
         assert!(complaint(|set| set.tasks[0].subtasks[0].skill = SkillKind::Toggle).contains("subtasks[0].object"));

@@ -10,6 +10,7 @@ use embedded_graphics::primitives::{Circle, Polyline, PrimitiveStyle};
 use embedded_graphics::text::{Alignment, Text};
 
 use crate::data::atomic_file;
+use crate::language::instruction::is_control;
 use crate::report::pixmap::{Pixmap, RgbColour, rgb888};
 
 /// How a text lies about its point.
@@ -154,12 +155,19 @@ impl From<Anchor> for Alignment {
 
 /// Text as it stands in SVG and HTML.
 pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    // XML has no way to write a control character.
+    let plain: String = text.chars().filter(|&c| matches!(c, '\n' | '\t') || !is_control(c)).collect();
+    plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_or_is_no_xml_does_not_come_into_a_drawing() {
+        assert_eq!(escape("a\u{1b}[31m\u{7}\u{202e}\n<b>"), "a[31m\n&lt;b&gt;");
+    }
 
     #[test]
     fn a_drawing_shows_the_same_in_both_forms() {
