@@ -13,6 +13,7 @@ use crate::domain::{Scene, Task, World};
 use crate::house::grading::describe;
 use crate::house::view::Frame;
 use crate::house::{House, Outcome};
+use crate::language::count::counted;
 use crate::language::instruction;
 
 /// An episode with the state after every step.
@@ -142,9 +143,9 @@ impl FrameSequence {
         let result = match (episode.success, episode.of) {
             (true, _) => "success".to_string(),
             (false, 0) => "not graded".to_string(),
-            (false, of) => format!("{} of {of} subtasks", episode.completed),
+            (false, of) => format!("{} of {}", episode.completed, counted(of, "subtask")),
         };
-        let title = format!("{} in {}, {} steps: {result}", episode.task, setting.scene.name, episode.steps);
+        let title = format!("{} in {}, {}: {result}", episode.task, setting.scene.name, counted(episode.steps, "step"));
         let row = |wish: &Wish| format!("at step {}: {} {}", wish.began, wish.instruction, wish.verdict_in_words());
         let is_told = episode.wishes.iter().any(Wish::is_told);
         let wishes = if is_told { episode.wishes.iter().map(row).collect() } else { Vec::new() };

@@ -14,6 +14,7 @@ use crate::env::observation::Picture;
 use crate::env::remote::{RemoteEnvironment, RemoteSettings, Sessions};
 use crate::house::House;
 use crate::house::view::Frame;
+use crate::language::count::counted;
 
 impl FrameSequence {
     /// Takes the steps of an episode again where it was played.
@@ -54,7 +55,7 @@ impl FrameSequence {
             });
         }
         let result = if episode.success { "success" } else { "no success" };
-        let title = format!("{} in {name}, {} steps: {result}", episode.task, episode.steps);
+        let title = format!("{} in {name}, {}: {result}", episode.task, counted(episode.steps, "step"));
         let subtasks = rollout.env.own().map_or(Vec::new(), |view| subtasks(&view));
         Ok(FrameSequence { title, scene: None, subtasks, wishes: Vec::new(), shots })
     }

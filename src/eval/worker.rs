@@ -16,6 +16,7 @@ use crate::env::{Environment, HouseEnvironment};
 use crate::episode::record::{Episode, TraceStep};
 use crate::episode::rollout::{AfterEach, Rollout, decide_all};
 use crate::house::House;
+use crate::language::count::counted;
 use crate::run_dir::episode_spec::{EpisodeSpec, policy_seed};
 
 /// An episode under way in whatever environment it plays.
@@ -308,8 +309,8 @@ fn lead(rollout: &mut AnyRollout, from: u32, episode: &mut Episode) -> anyhow::R
     rollout.run(&mut expert, &mut record).with_context(|| format!("the expert could not lead to subtask {from}"))?;
     anyhow::ensure!(
         reached(rollout),
-        "the expert did not come to subtask {from} within the task's {} steps",
-        rollout.steps()
+        "the expert did not come to subtask {from} within the task's {}",
+        counted(rollout.steps(), "step")
     );
     Ok(())
 }

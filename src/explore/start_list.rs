@@ -9,7 +9,9 @@ use nucleo_matcher::{Config, Matcher, Utf32Str};
 use super::kept_session::KeptSession;
 use super::session_file;
 use crate::data::dataset::Dataset;
+use crate::data::plain_file;
 use crate::domain::Room;
+use crate::language::count::counted;
 use crate::run_dir::layout::MANIFEST;
 use crate::run_dir::manifest::RunManifest;
 
@@ -174,7 +176,7 @@ fn task_files(folder: &Path) -> Vec<StartEntry> {
 fn holds_tasks(path: &Path) -> bool {
     use std::io::Read;
     let mut beginning = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(400).read_to_end(&mut beginning));
+    let read = plain_file::open(path).and_then(|file| file.take(400).read_to_end(&mut beginning));
     let text = String::from_utf8_lossy(&beginning);
     read.is_ok() && text.contains("\"format_version\"") && text.contains("\"tasks\"")
 }
@@ -186,7 +188,7 @@ fn runs(folder: &Path) -> Vec<(SystemTime, StartEntry)> {
         .filter(|path| path.join(MANIFEST).exists())
         .filter_map(|path| {
             let manifest = RunManifest::read(&path.join(MANIFEST)).ok()?;
-            let note = format!("{} · {}, {} tasks", manifest.policy, manifest.task_set, manifest.tasks);
+            let note = format!("{} · {}, {}", manifest.policy, manifest.task_set, counted(manifest.tasks, "task"));
             let when = modified(&path.join(MANIFEST));
             Some((when, StartEntry::of(Start::Run { folder: path.clone(), number: 1 }, file_name(&path), note)))
         })

@@ -16,6 +16,7 @@ use crate::data::{json, taskset};
 use crate::domain::{Task, TaskSet};
 use crate::episode::record::{Author, Episode, EpisodeKey};
 use crate::episode::scenes::{Scenes, Setting};
+use crate::language::count::counted;
 
 /// A run as it lies on the disk.
 pub struct RecordedRun {
@@ -180,9 +181,9 @@ fn tasks_of(run: &Path, manifest: &RunManifest, file: Option<&Path>) -> anyhow::
     }
     ensure!(
         set.tasks.len() == manifest.tasks,
-        "{}: {} tasks, but the run's manifest says {}",
+        "{}: {}, but the run's manifest says {}",
         path.display(),
-        set.tasks.len(),
+        counted(set.tasks.len(), "task"),
         manifest.tasks
     );
     let scenes = Scenes::of(path, &set);

@@ -7,6 +7,7 @@ use super::manifest::RunManifest;
 use crate::data::taskset::LONGEST_HORIZON;
 use crate::domain::Task;
 use crate::episode::record::{Episode, EpisodeKey};
+use crate::language::count::counted;
 
 /// What the records of a run can be.
 pub(crate) struct RecordCheck<'a> {
@@ -49,7 +50,8 @@ impl<'a> RecordCheck<'a> {
         let starts = if self.manifest.all_start_subtasks { length } else { 1 };
         let horizon = if explored { LONGEST_HORIZON } else { task.horizon };
         if episode.seed >= self.manifest.seeds {
-            return Some(format!("seed: the run's seeds are 0 to {}", self.manifest.seeds.saturating_sub(1)));
+            let seeds = self.manifest.seeds;
+            return Some(format!("seed: {}, but the run has {} from 0 on", episode.seed, counted(seeds, "seed")));
         }
         if !(episode.variant.is_original() || self.manifest.instruction_variants) {
             return Some("variant: the run plays the tasks' own instructions only".into());
@@ -61,10 +63,10 @@ impl<'a> RecordCheck<'a> {
             return Some("it belongs to another share of the run".into());
         }
         if !(explored || untold) && of != length - start_subtask {
-            return Some(format!("of: {of}, but the task asks {} subtasks", length - start_subtask));
+            return Some(format!("of: {of}, but the task asks {}", counted(length - start_subtask, "subtask")));
         }
         if completed > of {
-            return Some(format!("completed: {completed} subtasks of {of}"));
+            return Some(format!("completed: {completed} of {}", counted(of, "subtask")));
         }
         if steps > horizon {
             return Some(format!("steps: {steps}, but its horizon is {horizon}"));
@@ -76,7 +78,11 @@ impl<'a> RecordCheck<'a> {
         let is_success = episode.is_success(self.manifest.end);
         if episode.success && !is_success || is_success && !episode.success && !explored {
             let error = if episode.error.is_some() { " and an error" } else { "" };
-            return Some(format!("success: {}, with {completed} subtasks of {of}{error}", episode.success));
+            return Some(format!(
+                "success: {}, with {completed} of {}{error}",
+                episode.success,
+                counted(of, "subtask")
+            ));
         }
         None
     }

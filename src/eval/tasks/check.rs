@@ -173,7 +173,9 @@ mod tests {
         set.tasks[0].subtasks[1].receptacle = None;
         set.tasks[0].sentences.pop();
         let told = of(&serde_json::to_string(&set).unwrap()).join("\n");
-        for part in ["tasks[0].sentences: 1 sentences", "subtasks[0].object: 9, but", "subtasks[1].receptacle: a Put"] {
+        for part in
+            ["tasks[0].sentences: 1 sentence for", "subtasks[0].object: 9, but", "subtasks[1].receptacle: a Put"]
+        {
             assert!(told.contains(part), "{part} in {told}");
         }
     }

@@ -16,6 +16,7 @@ use crate::data::alfred::span_task::span_task;
 use crate::domain::task::SceneRef;
 use crate::domain::{Room, Task, TaskSet, Trajectory};
 use crate::house::{generate, validate};
+use crate::language::count::counted;
 use crate::language::phrases;
 
 /// The seeds of sampled tasks' houses lie from here on, those of collected demonstrations far below: no task is played in a
@@ -125,7 +126,11 @@ pub(crate) fn balanced(
 
 /// A dataset holds fewer spans than were asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{folder} holds {there} spans of {length} subtasks that fit; ask for at most that many tasks")]
+#[error(
+    "{folder} holds {} of {} that fit; ask for at most that many tasks",
+    counted(*there, "span"),
+    counted(*length, "subtask")
+)]
 pub(crate) struct TooFew {
     folder: String,
     there: usize,
@@ -150,7 +155,7 @@ pub fn sample_generated(spec: &SampleSpec, done: &(dyn Fn() + Sync)) -> anyhow::
                 return Ok(Task { id: format!("{}-{place}", scene.name), ..task });
             }
         }
-        bail!("no task of {} subtasks was found in {ATTEMPTS} houses; ask for shorter ones", spec.length)
+        bail!("no task of {} was found in {ATTEMPTS} houses; ask for shorter ones", counted(spec.length, "subtask"))
     };
     let tasks = (0..spec.count).into_par_iter().map(task).collect::<anyhow::Result<Vec<_>>>()?;
     Ok(TaskSet { format_version: TaskSet::FORMAT, name: spec.name.clone(), scenes: None, tasks })
@@ -377,7 +382,7 @@ mod tests {
             Scenes::of(&folder.path().join("set.json"), &set).check(&set.tasks).unwrap();
         }
         let error = sample(1, 3, Phrasing::Grammar).unwrap_err().to_string();
-        assert!(error.contains("2 spans of 1 subtasks"), "{error}");
+        assert!(error.contains("2 spans of 1 subtask "), "{error}");
     }
 
     #[test]
@@ -399,7 +404,7 @@ mod tests {
             let wholes = SampleSpec { wholes: true, ..spec(length, 1, 5) };
             sample_dataset(&wholes, dataset, None, Phrasing::Annotators, folder.path())
         };
-        assert!(sample(&dataset, 1).unwrap_err().to_string().contains("holds 0 spans of 1 subtasks"));
+        assert!(sample(&dataset, 1).unwrap_err().to_string().contains("holds 0 spans of 1 subtask "));
         let set = sample(&dataset, 2).unwrap();
         assert_eq!(set.tasks[0].instruction, "Set the table.");
         let (demonstration, first) = set.tasks[0].source.clone().unwrap();
@@ -419,7 +424,7 @@ mod tests {
         let lengths: Vec<usize> = set.tasks.iter().map(|task| task.subtasks.len()).collect();
         assert_eq!(lengths, [2, 1, 1]);
         taskset::check(&set).unwrap();
-        assert!(balanced(&spec(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtasks"));
+        assert!(balanced(&spec(1, 9, 0), &[1, 2], &sample).unwrap_err().to_string().contains("2 spans of 1 subtask "));
         let long = balanced(&spec(1, 2, 0), &[1, 2, 7], &sample).unwrap();
         assert_eq!(long.tasks.len(), 2);
     }

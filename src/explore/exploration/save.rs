@@ -13,6 +13,7 @@ use crate::episode::scenes::Setting;
 use crate::episode::wish::WishGrading;
 use crate::explore::session_export;
 use crate::explore::session_export::SessionExport;
+use crate::language::count::counted;
 use crate::report::export;
 use crate::run_dir::default_path;
 
@@ -100,7 +101,7 @@ impl Exploration {
         let (task, scene) = self.as_task()?;
         let steps = task.expert_steps;
         let (id, many) = session_export::add_task(path, task, &scene)?;
-        Ok(format!("{id} is task {} of {} (expert: {steps} steps)", many, path.display()))
+        Ok(format!("{id} is task {} of {} (expert: {})", many, path.display(), counted(steps, "step")))
     }
 
     /// Writes the branch in hand in the form that the file's ending asks for.

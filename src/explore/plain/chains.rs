@@ -6,6 +6,7 @@ use crate::analysis::chain::{ChainRun, LinkRate, LinkSuccess};
 use crate::analysis::value_map::ValueMap;
 use crate::domain::Heading;
 use crate::explore::chain_report::ChainReport;
+use crate::language::count::counted;
 
 /// The cells that are worth most.
 pub(super) fn values(map: &ValueMap, heading: Option<Heading>, out: &mut impl Write) -> anyhow::Result<()> {
@@ -26,7 +27,7 @@ pub(super) fn chains(followed: &[ChainReport], out: &mut impl Write) -> anyhow::
         Some(outcome) => match outcome.done {
             Some(true) => format!("done in {}", outcome.steps),
             Some(false) => format!("failed after {}", outcome.steps),
-            None => format!("{} steps", outcome.steps),
+            None => counted(outcome.steps, "step"),
         },
         None => "-".into(),
     };

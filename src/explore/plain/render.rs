@@ -11,6 +11,7 @@ use crate::explore::exploration::{SessionSnapshot, StepTaken};
 use crate::explore::inspect;
 use crate::explore::inspect::state;
 use crate::explore::timeline::{BranchPosition, Divergence, Timeline};
+use crate::language::count::counted;
 
 /// How what was told is understood, and what is open.
 pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
@@ -31,7 +32,7 @@ pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
             writeln!(out, "not graded: {why}; {meant}say `done` or `failed` when it is")?;
         }
         None => {
-            let expert = wish.expert_steps.map_or("sees no way".into(), |steps| format!("{steps} steps"));
+            let expert = wish.expert_steps.map_or("sees no way".into(), |steps| counted(steps, "step"));
             let limit = wish.limit().map_or(String::new(), |limit| format!(", at most {limit}"));
             writeln!(out, "graded: {} (expert: {expert}{limit})", wish.subtasks_in_words().join("; "))?;
         }
@@ -44,7 +45,7 @@ pub(super) fn reading(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
 
 /// What a wish came to, in a line or two.
 pub(super) fn verdict(wish: &Wish, out: &mut impl Write) -> anyhow::Result<()> {
-    writeln!(out, "wish: {} | {}, {} steps", wish.instruction, wish.verdict_in_words(), wish.steps)?;
+    writeln!(out, "wish: {} | {}, {}", wish.instruction, wish.verdict_in_words(), counted(wish.steps, "step"))?;
     if let Some(advice) = &wish.advice {
         writeln!(out, "why: {advice}")?;
     }
@@ -63,14 +64,15 @@ pub(super) fn branches(time: &Timeline, out: &mut impl Write) -> anyhow::Result<
         let mark = if at == time.branch { '*' } else { ' ' };
         let left = branch.left.and_then(|(from, step)| Some((&time.branches.get(from)?.name, step)));
         let left = left.map_or(String::new(), |(from, step)| format!(", from {from} at step {step}"));
-        writeln!(out, "{mark} {}: {}, {} steps{left}: {}", at + 1, branch.name, branch.last, branch.why)?;
+        let steps = counted(branch.last, "step");
+        writeln!(out, "{mark} {}: {}, {steps}{left}: {}", at + 1, branch.name, branch.why)?;
     }
     Ok(())
 }
 
 pub(super) fn divergence(divergence: &Divergence, out: &mut impl Write) -> anyhow::Result<()> {
     let [one, other] = &divergence.names;
-    writeln!(out, "{one} and {other} share {} steps", divergence.shared)?;
+    writeln!(out, "{one} and {other} share {}", counted(divergence.shared, "step"))?;
     for row in &divergence.rows {
         let [left, right] = row.sides.each_ref().map(|side| side.as_deref().unwrap_or("over"));
         writeln!(out, "step {}: {left} | {right}{}", row.step, if row.same { " | same world" } else { "" })?;
@@ -160,7 +162,7 @@ pub(super) fn opening(now: &SessionSnapshot, out: &mut impl Write) -> anyhow::Re
     writeln!(out, "instruction: {}", now.instruction)?;
     match &now.progress {
         Some(progress) => {
-            let limit = now.horizon.map_or(String::new(), |horizon| format!(" (at most {horizon} steps)"));
+            let limit = now.horizon.map_or(String::new(), |horizon| format!(" (at most {})", counted(horizon, "step")));
             writeln!(out, "task: {}{limit}", progress.subtasks.join("; "))?;
         }
         None => writeln!(out, "task: none; the instruction is not graded")?,

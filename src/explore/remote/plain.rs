@@ -10,6 +10,7 @@ use crate::control::Order;
 use crate::data::text_file;
 use crate::explore::plain_input::{Asked, PlainInput};
 use crate::explore::steering::ExplorerControl;
+use crate::language::count::counted;
 
 /// The most steps of a run that nothing stops.
 const MOST: u32 = 100_000;
@@ -129,9 +130,9 @@ impl<W: Write> Plain<'_, W> {
                     let mark = if place == tree.branch() + 1 { "*" } else { " " };
                     writeln!(
                         self.out,
-                        "{mark} {place} {}: {} steps, {}",
+                        "{mark} {place} {}: {}, {}",
                         branch.name,
-                        tree.state(branch.tip).step,
+                        counted(tree.state(branch.tip).step, "step"),
                         branch.why
                     )?;
                 }

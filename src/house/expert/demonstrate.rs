@@ -4,6 +4,7 @@ use super::Expert;
 use super::no_way::NoWay;
 use crate::house::grading::Grader;
 use crate::house::session::House;
+use crate::language::count::counted;
 
 /// Why the expert did not finish.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -12,7 +13,7 @@ pub(crate) enum Unfinished {
     #[error(transparent)]
     NoWay(#[from] NoWay),
     /// It took too long.
-    #[error("did not get there in {limit} steps: {waits_for}")]
+    #[error("did not get there in {}: {waits_for}", counted(*limit, "step"))]
     TooLong {
         /// The most steps it had.
         limit: usize,

@@ -105,6 +105,7 @@ impl PairedComparison {
         let lost = match (self.unpaired, self.start_mismatches) {
             (0, _) => String::new(),
             (1, 0) => " 1 episode has no counterpart and is left out.".into(),
+            (1, _) => " 1 episode has no counterpart and is left out, for another start.".into(),
             (n, 0) => format!(" {n} episodes have no counterpart and are left out."),
             (n, m) => format!(" {n} episodes have no counterpart and are left out, {m} of them for another start."),
         };

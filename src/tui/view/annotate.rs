@@ -11,6 +11,7 @@ use super::annotate_layout::{AnnotateLayout, lines_of};
 use super::frame::legend;
 use super::panel::{fit, put, wrap};
 use crate::explore::annotation::session::Answer;
+use crate::report::shell_word::shell_word;
 use crate::tui::annotate::KEYS;
 use crate::tui::annotate::state::{AnnotatePage, AnnotateState};
 use crate::tui::theme::THEME;
@@ -217,7 +218,7 @@ fn end(state: &AnnotateState, area: Rect, buf: &mut Buffer) {
     put(buf, area, 1, title, THEME.title);
     let mut text = state.agreement.clone();
     text.push(String::new());
-    let data = state.dataset.display();
+    let data = shell_word(&state.dataset.display().to_string());
     text.push(format!("As labels: sprint annotate {data} --labels"));
     text.push(format!("As tasks: sprint annotate {data} --tasks FILE"));
     lines(&text, area, 3, buf);

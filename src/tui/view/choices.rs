@@ -12,6 +12,7 @@ use crate::domain::Class;
 use crate::explore::choices::{Choice, choices};
 use crate::explore::exploration::SessionSnapshot;
 use crate::explore::timeline::TimelineStep;
+use crate::language::count::counted;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 
@@ -82,9 +83,11 @@ impl ChoicesView<'_> {
     fn reading(&self, now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
         let words = now.instruction.split_whitespace().count();
         let right = match &now.reading {
-            Some(reading) if reading.cut > 0 => format!("{} tokens, {} more are cut off", reading.tokens, reading.cut),
-            Some(reading) => format!("{} tokens", reading.tokens),
-            None => format!("{words} words"),
+            Some(reading) if reading.cut > 0 => {
+                format!("{}, {} cut off", counted(reading.tokens, "token"), reading.cut)
+            }
+            Some(reading) => counted(reading.tokens, "token"),
+            None => counted(words, "word"),
         };
         let inner = panel(buf, area, "Reads", &right);
         for (row, line) in (0..inner.height).zip(wrap(&now.instruction, usize::from(inner.width), "")) {
@@ -129,7 +132,7 @@ fn line(choice: &Choice, width: usize) -> Line<'static> {
 /// The curves over the branch: what is low, what is high, and where subtasks were done.
 fn curves(now: &SessionSnapshot, area: Rect, buf: &mut Buffer) {
     let steps = &now.time.steps;
-    let inner = panel(buf, area, "Over the branch", &format!("{} steps; digits mark subtasks", steps.len()));
+    let inner = panel(buf, area, "Over the branch", &format!("{}; digits mark subtasks", counted(steps.len(), "step")));
     let has_values = steps.iter().any(|beat| beat.value.is_some());
     let entropy = |beat: &TimelineStep| beat.entropy;
     let chosen = |beat: &TimelineStep| beat.chosen;

@@ -10,6 +10,7 @@ use super::log::tone;
 use super::panel::{fit, fit_parts};
 use crate::explore::session::{RunMode, SessionCommand};
 use crate::explore::verb::{ExplorerPage, Verb};
+use crate::language::count::counted;
 use crate::tui::app::App;
 use crate::tui::keys::Mode;
 use crate::tui::log::Tone;
@@ -44,7 +45,7 @@ impl Widget for HeaderRow<'_> {
         let (state, style) = match (&app.session.busy, app.session.run_mode) {
             (Some(busy), _) => (format!("{busy} ..."), THEME.note),
             (None, Some(RunMode::Policy)) => (format!("running {}", app.session.rate.name()), THEME.good),
-            (None, Some(RunMode::Steps(left))) => (format!("{left} steps to go"), THEME.good),
+            (None, Some(RunMode::Steps(left))) => (format!("{} to go", counted(left, "step")), THEME.good),
             (None, Some(RunMode::Replay)) => (format!("replaying {}", app.session.rate.name()), THEME.good),
             (None, None) if app.session.working.is_some() => {
                 (app.session.working.clone().unwrap_or_default(), THEME.note)

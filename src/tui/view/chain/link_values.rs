@@ -8,6 +8,7 @@ use ratatui::widgets::Widget;
 
 use crate::analysis::chain::ChainRun;
 use crate::explore::chain_report::ChainReport;
+use crate::language::count::counted;
 use crate::tui::theme::THEME;
 use crate::tui::view::panel::{fit, unsigned_zero};
 use crate::tui::view::panel::{panel, put};
@@ -38,8 +39,12 @@ impl Widget for LinkValueStrips<'_> {
                 panel(buf, place, &title(side), "waits");
                 continue;
             };
-            let inner =
-                panel(buf, place, &title(side), &format!("{} · {} steps", measure(play), play.link_values.len()));
+            let inner = panel(
+                buf,
+                place,
+                &title(side),
+                &format!("{} · {}", measure(play), counted(play.link_values.len(), "step")),
+            );
             let (low, high) = range(self.sides.iter().filter_map(|side| side.by_link.as_ref()), play.by_value);
             let rows = usize::from(inner.height);
             let first = (self.selected + 1).saturating_sub(rows).min(side.links.len().saturating_sub(rows));

@@ -8,6 +8,7 @@ use ratatui::widgets::Widget;
 
 use crate::analysis::chain::{ChainRun, Handover, LinkOutcome, LinkRate, LinkSuccess};
 use crate::explore::chain_report::ChainReport;
+use crate::language::count::counted;
 use crate::tui::app::App;
 use crate::tui::theme::THEME;
 use crate::tui::view::panel::{fit, unsigned_zero};
@@ -158,7 +159,7 @@ fn outcome(play: Option<&ChainRun>, at: usize) -> Span<'static> {
         Some(LinkOutcome { reached: false, .. }) => ("not reached".into(), THEME.quiet),
         Some(LinkOutcome { done: Some(true), steps, .. }) => (format!("done in {steps}"), THEME.good),
         Some(LinkOutcome { done: Some(false), steps, .. }) => (format!("failed, {steps}"), THEME.bad),
-        Some(LinkOutcome { done: None, steps, .. }) => (format!("{steps} steps"), Style::new()),
+        Some(LinkOutcome { done: None, steps, .. }) => (counted(*steps, "step"), Style::new()),
     };
     Span::styled(format!("{:<OUTCOME$}", fit(&text, OUTCOME - 1)), style)
 }
