@@ -32,7 +32,7 @@ pub(crate) fn read_episodes(path: &Path) -> anyhow::Result<(Vec<Episode>, u64)> 
         let episode: Episode = serde_json::from_slice(text).with_context(context)?;
         if let Some(contradiction) = episode.contradiction() {
             bail!(
-                "{name}: line {number} contradicts itself: {contradiction}; delete it, and the same command plays its \
+                "{name}: line {number} contradicts itself: {contradiction}; delete it, and the run's eval command plays its \
                  episode anew"
             );
         }
