@@ -307,7 +307,7 @@ mod tests {
             "at step 1 of 3 on main",
             "branch b1: ",
             "* 2: left, 3 steps, from main at step 1",
-            "left and main share 1 steps",
+            "left and main share 1 step\nstep 2",
             "at step 3 of 3 on main",
             "at step 0 of 3 on main: the start",
         ] {
