@@ -30,7 +30,7 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
 }
 
 #[test]
-fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
+fn without_options_the_agent_with_a_memory_acts_and_its_critic_is_shown_as_another_ones_is() {
     if encoder_home().is_none() {
         return;
     }
@@ -38,8 +38,10 @@ fn without_options_the_agent_with_a_memory_acts_and_another_one_has_a_critic() {
     session.see("· sprint-memory");
     session.see("running");
     session.press(" M");
-    session.see("no critic");
+    session.see("agent · V 0.");
+    session.see("advantage");
     session.press(":checkpoint alfred\r");
+    session.see("alfred acts");
     session.see("by probability");
     session.miss("this checkpoint");
     session.leave();

@@ -77,7 +77,7 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Join the shares of a run that several machines played
     Merge(merge::MergeArgs),
-    /// Draw a run's plots and write it as one HTML page; draw a training's curves
+    /// Draw a run's plots and write it as one HTML page
     Report(report::ReportArgs),
     /// Print the JSON Schema of a file that the program reads or writes
     Schema(schema::Schema),

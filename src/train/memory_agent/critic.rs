@@ -223,6 +223,7 @@ fn measure(
     let moment = |a: usize, b: usize| mean(&|pair| (pair[a] - means[a]) * (pair[b] - means[b]));
     let spread = (moment(0, 0) * moment(1, 1)).sqrt();
     scalars.set("held_out_value_error", mean(&|[value, won]| (value - won).abs()));
+    scalars.set("held_out_value_bias", means[0] - means[1]);
     scalars.set("held_out_value_correlation", if spread > 0.0 { moment(0, 1) / spread } else { 0.0 });
     Ok(())
 }
