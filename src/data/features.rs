@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 
+use super::locked_file::LockedFile;
 use super::{folder, plain_file};
 
 /// What a feature file holds; its first line.
@@ -164,7 +165,7 @@ fn not_finite(bytes: &[u8], width: usize) -> Option<usize> {
 pub struct FeatureWriter {
     header: FeatureHeader,
     folder: PathBuf,
-    file: File,
+    file: LockedFile,
     /// Bytes before the first map.
     offset: u64,
     maps: u64,
@@ -184,15 +185,14 @@ impl FeatureWriter {
         let context = || format!("{} cannot be written", path.display());
         folder::make(folder).with_context(context)?;
         let options = plain_file::change(&path);
-        let mut file = options.with_context(context)?;
-        match file.try_lock() {
+        let mut file = match LockedFile::lock(options.with_context(context)?) {
             Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
             Err(TryLockError::Error(error)) => return Err(error).with_context(context),
-            Ok(()) => {}
-        }
+            Ok(file) => file,
+        };
         let line = header.line()?;
         let mut found = Vec::new();
-        BufReader::new(&file).read_until(b'\n', &mut found).with_context(context)?;
+        BufReader::new(&*file).read_until(b'\n', &mut found).with_context(context)?;
         let offset = line.len() as u64;
         if found != line {
             file.set_len(0).with_context(context)?;

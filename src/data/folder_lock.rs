@@ -1,17 +1,18 @@
 //! One process at a time writes a folder: the later of two would undo what the earlier one did.
 
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 
 use super::folder;
+use super::locked_file::LockedFile;
 
 /// A folder that no other process may write, for as long as this lives. Nothing is left in it; a killed process leaves no lock.
 #[must_use]
 pub(crate) struct FolderLock {
     folder: PathBuf,
-    _held: File,
+    _held: LockedFile,
 }
 
 impl FolderLock {
@@ -23,13 +24,9 @@ impl FolderLock {
         let name = folder.display();
         folder::make(folder).with_context(|| format!("cannot make {name}"))?;
         let held = File::open(folder).with_context(|| format!("cannot read {name}"))?;
-        match held.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                bail!("{name}: another process is writing this folder; wait for it to end, or name another folder")
-            }
-            // A file system without locks: the user has to see to it.
-            Err(TryLockError::Error(_)) | Ok(()) => {}
-        }
+        let held = LockedFile::lock_where_possible(held).with_context(|| {
+            format!("{name}: another process is writing this folder; wait for it to end, or name another folder")
+        })?;
         Ok(FolderLock { folder: folder.to_owned(), _held: held })
     }
 

@@ -1,6 +1,6 @@
 //! Files of JSON lines that are only ever added to: a line is there whole, or, after a kill, not at all.
 
-use std::fs::{File, TryLockError};
+use std::fs::TryLockError;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,7 @@ use anyhow::{Context, bail, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::locked_file::LockedFile;
 use super::{folder, plain_file, text_file};
 
 /// The file's first line.
@@ -49,7 +50,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, format: u32) -> anyhow::Res
 /// Such a file, opened to be added to. One process at a time.
 pub struct LineLog {
     path: PathBuf,
-    file: File,
+    file: LockedFile,
     /// The length of its whole lines.
     whole: u64,
 }
@@ -65,11 +66,11 @@ impl LineLog {
             folder::make(folder).with_context(context)?;
         }
         let file = plain_file::append(path).with_context(context)?;
-        match file.try_lock() {
+        let file = match LockedFile::lock(file) {
             Err(TryLockError::WouldBlock) => bail!("{}: another process is writing to it", path.display()),
             Err(TryLockError::Error(error)) => return Err(error).with_context(context),
-            Ok(()) => {}
-        }
+            Ok(file) => file,
+        };
         let (lines, whole) = read(path, format)?;
         file.set_len(whole as u64).with_context(context)?;
         let mut log = LineLog { path: path.to_owned(), file, whole: whole as u64 };

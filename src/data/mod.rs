@@ -13,6 +13,7 @@ pub(crate) mod hub;
 pub mod items;
 pub mod json;
 pub(crate) mod line_log;
+pub(crate) mod locked_file;
 pub(crate) mod plain_file;
 pub(crate) mod ranked_chains;
 pub mod schema;

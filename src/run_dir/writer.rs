@@ -1,7 +1,6 @@
 //! Writing a run folder: a manifest, then an episode a line as they come.
 
 use std::collections::BTreeMap;
-use std::fs::{File, TryLockError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +11,7 @@ use super::episodes::read_episodes;
 use super::layout::{EPISODES, MANIFEST, TASKS};
 use super::manifest::RunManifest;
 use super::shard::Shard;
+use crate::data::locked_file::LockedFile;
 use crate::data::{atomic_file, folder, json, plain_file};
 use crate::domain::TaskSet;
 use crate::episode::record::{Episode, EpisodeKey};
@@ -19,7 +19,7 @@ use crate::episode::record::{Episode, EpisodeKey};
 /// An open run folder, which no other process writes to.
 pub struct RunWriter {
     path: PathBuf,
-    episodes: File,
+    episodes: LockedFile,
     /// The episodes that were there when it was opened, without their traces.
     pub(crate) earlier: Vec<Episode>,
 }
@@ -40,12 +40,8 @@ impl RunWriter {
         let episodes_path = path.join(EPISODES);
         let context = || format!("cannot write {}", episodes_path.display());
         let episodes = plain_file::append(&episodes_path).with_context(context)?;
-        match episodes.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => bail!("{name}: another process is writing this run; wait for it to end"),
-            // A file system without locks: the user has to see to it.
-            Err(TryLockError::Error(_)) => {}
-        }
+        let episodes = LockedFile::lock_where_possible(episodes)
+            .with_context(|| format!("{name}: another process is writing this run; wait for it to end"))?;
         if manifest_path.exists() {
             let found = RunManifest::read(&manifest_path)?;
             let differences = found.differences(manifest);
