@@ -19,9 +19,9 @@ use proptest::prelude::*;
 /// A skill with its object and receptacle.
 type Step = (SkillKind, Option<Class>, Option<Class>);
 
-/// The form in which readings are compared, that of what the steps come to: without the pickups that another step of the same
-/// thing implies, without the knife where something is sliced and without a put before the slicing of the same thing; a thing
-/// goes into another before that is put somewhere, is in the hand before the lamp goes on, and is sliced once.
+/// The form in which readings are compared, that of what the steps come to: without the pickups that a later step of the
+/// same thing implies, without the knife where something is sliced and without a put before the slicing of the same thing; a
+/// thing goes into another before that is put somewhere, and is sliced once.
 fn canonical(steps: &[Step]) -> Vec<Step> {
     let cuts = steps.iter().any(|step| step.0 == SkillKind::Slice);
     let is_knife = |step: &Step| step.1.is_some_and(Class::is_knife);
@@ -31,7 +31,9 @@ fn canonical(steps: &[Step]) -> Vec<Step> {
     let mut kept: Vec<Step> = Vec::new();
     for (at, step) in steps.iter().enumerate() {
         let implied = step.0 == SkillKind::Pickup
-            && steps.iter().any(|other| !matches!(other.0, SkillKind::Pickup | SkillKind::Slice) && other.1 == step.1);
+            && steps[at + 1..]
+                .iter()
+                .any(|other| !matches!(other.0, SkillKind::Pickup | SkillKind::Slice) && other.1 == step.1);
         let knife = cuts && is_knife(step) && steps.len() > 1;
         let aside = step.0 == SkillKind::Put && follows(at, SkillKind::Slice, step.1);
         let again = step.0 == SkillKind::Slice && kept.contains(step);
@@ -41,9 +43,7 @@ fn canonical(steps: &[Step]) -> Vec<Step> {
     }
     for at in 1..kept.len() {
         let (first, second) = (kept[at - 1], kept[at]);
-        let stacked =
-            first.0 == SkillKind::Put && second.0 == SkillKind::Put && second.2 == first.1 && first.1 != second.1;
-        if stacked || first.0 == SkillKind::Toggle && second.0 == SkillKind::Pickup {
+        if first.0 == SkillKind::Put && second.0 == SkillKind::Put && second.2 == first.1 && first.1 != second.1 {
             kept.swap(at - 1, at);
         }
     }
@@ -127,6 +127,18 @@ fn what_lies_where_the_text_says_is_meant() {
     };
     for knife in ["Knife", "ButterKnife"] {
         assert_eq!(read(&[(class(knife), class("CounterTop"))]), Some(class(knife)));
+    }
+}
+
+#[test]
+fn what_is_asked_for_after_a_put_or_a_lamp_comes_after_it() {
+    for (text, expected) in [
+        ("put the mug in the cupboard, then grab me another mug", "put a mug in the cabinet, pick up a mug"),
+        ("stick the pencil in the mug and bring me the mug", "put a pencil in the mug, pick up a mug"),
+        ("switch the desk lamp on, then take the phone", "switch on a desk lamp, pick up a cell phone"),
+        ("slice the apple, then lay the knife on the counter", "slice an apple, put a knife on the counter"),
+    ] {
+        assert_eq!(reader().read(text, &Context::default()).words(), expected);
     }
 }
 
@@ -344,4 +356,4 @@ fn what_annotators_wrote_is_read_as_measured() {
 }
 
 /// What was measured, less a small margin.
-const LEAST: [f64; 5] = [0.76, 0.845, 0.87, 0.72, 0.75];
+const LEAST: [f64; 5] = [0.76, 0.84, 0.865, 0.715, 0.74];

@@ -32,52 +32,58 @@ SHAPES = ["Pickup", "Put", "Slice", "Toggle", "Clean", "Heat", "Cool", "Look", "
 KNIVES = ("Knife", "ButterKnife")
 
 
+def skills_of(roles, subtasks):
+    """Skills as (skill, class, slice, receptacle class)."""
+    place = lambda one: roles[one["receptacle"]]["class"] if one.get("receptacle") is not None else None
+    role = lambda one: roles[one["object"]]
+    return [(one["skill"], role(one)["class"], role(one)["slice"], place(one)) for one in subtasks]
+
+
 def trajectories(folder):
-    """Trajectories of the training split: id, skills as (skill, class, slice, receptacle class), annotations."""
+    """Trajectories of the training split, or the tasks of a task file: id, skills, annotations, and whether the sentence for
+    the whole is a person's outline, as ALFRED's are."""
+    if folder.endswith(".json"):
+        for one in json.loads(Path(folder).read_text())["tasks"]:
+            told = {"goal": one["instruction"], "steps": one["sentences"]}
+            yield one["id"], skills_of(one["roles"], one["subtasks"]), [told], False
+        return
     reader = zstandard.ZstdDecompressor()
     with open(Path(folder) / "trajectories.jsonl.zst", "rb") as file:
         for line in io.TextIOWrapper(reader.stream_reader(file), encoding="utf-8"):
             one = json.loads(line)
             if one["split"] != "train":
                 continue
-            roles = one["roles"]
-            skills = []
-            for skill in one["skills"]:
-                role = roles[skill["object"]]
-                place = roles[skill["receptacle"]]["class"] if skill.get("receptacle") is not None else None
-                skills.append((skill["skill"], role["class"], role["slice"], place))
-            yield one["id"], skills, one["annotations"], one.get("goal")
+            yield one["id"], skills_of(one["roles"], one["skills"]), one["annotations"], one.get("goal") is not None
 
 
 def is_held_out(name):
     return hashlib.sha256(name.encode()).digest()[0] % 10 == 0
 
 
-def canonical(skills):
-    """What some skills come to: as `canonical` in tests/reader.rs."""
+def canonical(skills, is_outline=False):
+    """What some skills come to: as `canonical` in tests/reader.rs. An outline does not say where the knife is left."""
     cuts = any(skill[0] == "Slice" for skill in skills)
     kept = []
     for at, skill in enumerate(skills):
         implied = skill[0] == "Pickup" and any(
-            other[0] not in ("Pickup", "Slice") and other[1] == skill[1] for other in skills)
-        knife = cuts and skill[1] in KNIVES and len(skills) > 1
+            other[0] not in ("Pickup", "Slice") and other[1] == skill[1] for other in skills[at + 1:])
+        knife = cuts and skill[1] in KNIVES and len(skills) > 1 and (is_outline or skill[0] == "Pickup")
         aside = skill[0] == "Put" and any(other[0] == "Slice" and other[1] == skill[1] for other in skills[at + 1:])
         again = skill[0] == "Slice" and any(other[0] == "Slice" and other[1] == skill[1] for other in kept)
         if not (implied or knife or aside or again):
             kept.append(skill)
     for at in range(1, len(kept)):
         first, second = kept[at - 1], kept[at]
-        stacked = first[0] == second[0] == "Put" and second[3] == first[1] != second[1]
-        if stacked or first[0] == "Toggle" and second[0] == "Pickup":
+        if first[0] == second[0] == "Put" and second[3] == first[1] != second[1]:
             kept[at - 1], kept[at] = second, first
     return kept
 
 
-def label(skills):
+def label(skills, is_outline=False):
     """The shape of some skills, with slots: shape, slice, object, place, movable; None is "not asked"."""
     if not skills:
         return "Many", None, None, None, None
-    steps = canonical(skills)
+    steps = canonical(skills, is_outline)
     kinds = [step[0] for step in steps]
     sliced = None
     if len(steps) > 1 and kinds[0] == "Slice" and all(step[1] == steps[0][1] for step in steps[1:2]):
@@ -118,10 +124,10 @@ def after(skill):
 def examples(folder, chance):
     """(held out, kind, text, before, label)."""
     pool = []
-    for name, skills, annotations, _ in trajectories(folder):
+    for name, skills, annotations, is_outlined in trajectories(folder):
         held = is_held_out(name)
         for told in annotations:
-            yield held, "goal", told["goal"], {}, label(skills)
+            yield held, "goal", told["goal"], {}, label(skills, is_outlined)
             steps = told["steps"]
             if len(steps) != len(skills):
                 continue
@@ -303,7 +309,7 @@ def text_bytes(text):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("data", nargs="+", help="dataset folders: ALFRED's, and generated houses for the grammar's own words")
+    parser.add_argument("data", nargs="+", help="dataset folders and task files: ALFRED's, and generated houses for the grammar's own words")
     parser.add_argument("--sprint", default=str(ROOT / "target/release/sprint"))
     parser.add_argument("--features", default="read --features", help=argparse.SUPPRESS)
     parser.add_argument("--out", default=str(ROOT / "assets/reader/model.bin"))
