@@ -239,7 +239,7 @@ mod tests {
     fn a_plain_wish_is_graded_with_the_experts_steps() {
         let wish = told("Pick up the mug.");
         assert_eq!((wish.grading, wish.subtasks_in_words()), (WishGrading::Read, vec!["pick up the mug".to_string()]));
-        assert!(wish.expert_steps.is_some_and(|steps| steps > 0) && wish.limit().is_some_and(|limit| limit >= 20));
+        assert!(wish.expert_steps.is_some_and(|steps| steps > 0) && wish.limit().is_some_and(|limit| limit >= 60));
         assert_eq!((wish.began, wish.understood.as_str()), (3, "pick up a mug"));
     }
 

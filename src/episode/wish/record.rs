@@ -87,7 +87,7 @@ pub struct Wish {
     /// Why the language model that was to read it did not, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) unasked: Option<String>,
-    /// Why nobody grades it, in words.
+    /// Why it is not graded, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) ungraded: Option<String>,
     /// Words that nothing was made of.
@@ -180,10 +180,11 @@ impl Wish {
         })
     }
 
-    /// How many steps it may take: as many as its task gives it, else twice the expert's.
+    /// How many steps it may take: as many as its task gives it. A person waits longer than that: until the agent had time to
+    /// search for what the expert knows the place of.
     pub(crate) fn limit(&self) -> Option<u32> {
-        let expert = || (2 * self.expert_steps.unwrap_or(UNKNOWN)).max(LEAST);
-        (self.grading == WishGrading::Read).then(|| self.horizon.unwrap_or_else(expert))
+        let of_person = || (PATIENCE * self.expert_steps.unwrap_or(UNKNOWN)).max(LEAST);
+        (self.grading == WishGrading::Read).then(|| self.horizon.unwrap_or_else(of_person))
     }
 
     /// What it was read as, in the words of the subtasks.
@@ -228,8 +229,10 @@ impl Wish {
 
 /// Why nobody grades what an episode without a task begins with.
 pub(crate) const NOTHING_ASKED: &str = "nothing was asked yet";
-/// The fewest steps that a wish may take.
-const LEAST: u32 = 20;
+/// The limit of a person's wish, as a multiple of the expert's steps.
+const PATIENCE: u32 = 4;
+/// The least limit of a person's wish.
+const LEAST: u32 = 60;
 /// What an expert might take where it knows no way.
 const UNKNOWN: u32 = 50;
 
