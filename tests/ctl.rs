@@ -174,7 +174,7 @@ fn an_explorer_is_told_run_paused_and_ended_from_another_terminal() {
     session.see("step 0");
     let ctl = |words: &[&str]| ctl_beside(state.path(), words);
     ctl(&["instruct", "pick up the quince"]);
-    session.see("told: Pick up the quince.");
+    session.see("instruction: Pick up the quince.");
     session.see("Instruction > Pick up the quince.");
     ctl(&["resume", "--of", "explore"]);
     session.miss("step 0");
@@ -206,7 +206,7 @@ fn a_training_that_was_paused_ends_with_the_same_bytes() {
     let after = status()["progress"]["done"].as_u64().unwrap();
     assert!(after <= before + 1 && after < 120, "{before} {after}: no more than the step under way");
     assert!(paused.try_wait().unwrap().is_none());
-    assert!(sprint.run("ctl instruct Hello").stderr.contains("a training is told nothing"));
+    assert!(sprint.run("ctl instruct Hello").stderr.contains("a training takes no instructions"));
     done(&sprint, "ctl resume --of paused");
     assert!(paused.wait().unwrap().success());
     done(&sprint, "pretrain D --preset longer.toml --out whole");
@@ -281,7 +281,7 @@ fn an_explorer_of_another_environment_without_a_screen_is_steered_too() {
     let shown = printed(child);
     drop(input);
     assert!(tail.wait().unwrap().success());
-    assert!(shown.contains("told: Home.") && shown.contains("over: done"), "{shown}");
+    assert!(shown.contains("instruction: Home.") && shown.contains("over: done"), "{shown}");
 }
 
 #[test]
@@ -294,7 +294,7 @@ fn the_screen_of_another_environment_is_steered_too() {
     session.see("asked: go to the right end");
     let ctl = |words: &[&str]| ctl_beside(state.path(), words);
     ctl(&["instruct", "go home"]);
-    session.see("told: Go home.");
+    session.see("instruction: Go home.");
     ctl(&["resume"]);
     session.see("over: done");
     wait_for(|| serde_json::from_str::<Value>(&ctl(&["status", "--json"])).unwrap()["state"] == "paused");

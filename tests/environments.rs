@@ -155,7 +155,9 @@ fn an_environment_is_explored_saved_verified_and_opened_without_a_screen() {
     let lines = "step 3\nback\nact left\ninstruct go home\nact left\nsave run\nlook\n";
     let explored = piped(&sprint, "explore --env gym:no-snapshot --policy random --seed 4 --plain", lines);
     assert_eq!(explored.code, Some(0), "{}", explored.stdout);
-    for told in ["told: go to the right end", "branch 2 begins", "told: Go home.", "going back: exact so far"] {
+    for told in
+        ["instruction: go to the right end", "branch 2 begins", "instruction: Go home.", "going back: exact so far"]
+    {
         assert!(explored.stdout.contains(told), "{told}: {}", explored.stdout);
     }
     let verified = with_child(&sprint, "verify run");
@@ -198,7 +200,7 @@ fn a_served_environment_is_explored_on_a_screen() {
     session.press("h");
     session.see("step 1/2");
     session.press("igo home\r");
-    session.see("told: Go home.");
+    session.see("instruction: Go home.");
     session.press("Bgo away\r");
     session.see("compared");
     session.press("\x1b");

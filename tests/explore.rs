@@ -13,7 +13,7 @@ fn an_instruction_is_typed_applied_and_stepped_and_the_terminal_is_given_back() 
     session.press("pick up the quince");
     session.see("now: ");
     session.press("\r");
-    session.see("told: Pick up the quince.");
+    session.see("instruction: Pick up the quince.");
     session.see("Instruction > Pick up the quince.");
     session.see("(was: ");
     session.press("n");

@@ -79,7 +79,7 @@ fn after_a_kill_the_last_session_comes_first_and_has_every_step_and_branch() {
     session.see("b1 1/1");
     session.press("m");
     session.press("ifind the quince\r");
-    session.see("told: Find the quince.");
+    session.see("instruction: Find the quince.");
     session.press("n");
     session.see("b1 2/2");
     // The question comes first: nothing is left by a slip.

@@ -30,7 +30,7 @@ fn another_instruction_seed_and_policy_fork_and_the_tree_says_why() {
     session.press("hh");
     session.see("main 1/3");
     session.press("iopen the fridge\r");
-    session.see("told: Open the fridge.");
+    session.see("instruction: Open the fridge.");
     session.press("n");
     session.see("b1 2/2");
     session.press(":branch main\r");
@@ -47,7 +47,7 @@ fn another_instruction_seed_and_policy_fork_and_the_tree_says_why() {
     session.see("b3 2/2");
     session.press("t");
     session.see("4 in all");
-    session.see("told: Open the fridge.");
+    session.see("instruction: Open the fridge.");
     session.see("random, drawn with seed 99 acts");
     // Both frames stand beside the steps, each under its branch and step.
     session.press("k");
@@ -190,7 +190,7 @@ fn a_newcomer_is_greeted_once_and_instructions_are_remembered() {
     session.press("i");
     session.see("now: ");
     session.press("find the quince\r");
-    session.see("told: Find the quince.");
+    session.see("instruction: Find the quince.");
     session.miss("New here?");
     leave(session);
     let mut session = Session::open(state.path(), (120, 36), "explore", &RANDOM);

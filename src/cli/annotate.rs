@@ -138,7 +138,7 @@ impl Annotate {
             bail!("annotating needs a terminal; with --plain it reads a sentence a line from standard input");
         }
         let named = || ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
-        let person = self.person.or_else(named).context("nobody knows who annotates: give a name by --as NAME")?;
+        let person = self.person.or_else(named).context("the annotator has no name: give one by --as NAME")?;
         let dataset = Dataset::open(&self.data)?;
         let count = self.count as usize;
         let selection = SpanSelection { lengths: self.length.0, count, split: self.split, seed: self.seed };
@@ -171,6 +171,8 @@ impl Annotate {
 fn left_out(stale: usize) -> String {
     match stale {
         0 => String::new(),
-        stale => format!("; left out: {}, which the dataset does not hold as it was told", counted(stale, "span")),
+        stale => {
+            format!("; left out: {}, which the dataset no longer holds as it was described", counted(stale, "span"))
+        }
     }
 }

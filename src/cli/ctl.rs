@@ -121,7 +121,7 @@ fn print_status(status: &Status, json: bool) -> anyhow::Result<()> {
 fn in_words(status: &Status) -> String {
     let progress = &status.progress;
     let of = progress.of.map_or(String::new(), |of| format!("/{of}"));
-    let told = status.instruction.as_ref().map_or(String::new(), |told| format!("  told {told:?}"));
+    let told = status.instruction.as_ref().map_or(String::new(), |told| format!("  instruction {told:?}"));
     let Status { pid, kind, what, state, .. } = status;
     let line = format!(
         "{} {pid}  {what}  {}  {} {}{of}  {}{told}",

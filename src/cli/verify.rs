@@ -67,7 +67,7 @@ impl Verify {
                 writeln!(out, "episode {episode} ({task}), step {step}: {what} was {recorded}, is {found}")?;
             }
             if let Some(told) = verdict.summarised.filter(|&told| told != verdict.plain) {
-                writeln!(out, "episodes: the summary tells of {told}, there are {}", verdict.plain)?;
+                writeln!(out, "episodes: the summary counts {told}, there are {}", verdict.plain)?;
             }
             writeln!(out, "{}", if verdict.is_equal() { "equal" } else { "different" })?;
         }

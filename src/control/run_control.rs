@@ -74,8 +74,8 @@ impl Controlled for RunControl {
             }
             Order::Instruct(_) => {
                 let told = match self.kind {
-                    Kind::Eval => "what an evaluation tells the agent is its tasks': start another with other tasks",
-                    _ => "a training is told nothing; instruct an explorer",
+                    Kind::Eval => "an evaluation's instructions are its tasks': start another with other tasks",
+                    _ => "a training takes no instructions; instruct an explorer",
                 };
                 return Err(told.into());
             }

@@ -60,7 +60,7 @@ impl ArgumentList {
             None => {
                 ensure!(self.is_open, "{value} is none of the values of {:?}", self.name);
                 ensure!(value.is_string(), "{value} is no text, which {:?} takes", self.name);
-                ensure!(values.len() < MOST, "more texts were said than can be told apart");
+                ensure!(values.len() < MOST, "more texts were said than can be distinguished");
                 values.push(value.clone());
                 values.len() - 1
             }

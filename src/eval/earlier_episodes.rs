@@ -35,7 +35,7 @@ pub(super) fn check_earlier(plan: &EvaluationPlan, manifest: &RunManifest, folde
             let begun = !episode.start_hash.is_empty();
             misfit = match () {
                 () if episode.instruction != told && !(is_remote && tasks[at].instruction.is_empty()) => {
-                    Some("instruction: not what the run tells")
+                    Some("instruction: not the one that the run gives")
                 }
                 () if begun && episode.start_hash != start => Some("start_hash: not the task's start"),
                 () => None,

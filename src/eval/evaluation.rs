@@ -203,7 +203,7 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
     if options.step_by_step
         && let Some(i) = tasks.iter().position(|task| task.sentences.is_empty())
     {
-        anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be told step by step", tasks[i].id);
+        anyhow::bail!("tasks[{i}].sentences: missing, so the task {:?} cannot be given step by step", tasks[i].id);
     }
     if let Some(i) = tasks.iter().position(|task| task.env.is_some())
         && options.every_start
@@ -226,9 +226,7 @@ fn check(tasks: &[Task], options: Options) -> anyhow::Result<()> {
         }
     }
     if options.language && !instruction_variant::can_swap(tasks, options.step_by_step) {
-        anyhow::bail!(
-            "tasks: all are told the same, so no instruction can be swapped for another; leave out --language"
-        );
+        anyhow::bail!("tasks: all have the same instruction, so none can be swapped for another; leave out --language");
     }
     Ok(())
 }

@@ -74,9 +74,9 @@ pub(crate) fn ungraded(scene: SceneRef) -> Task {
 /// What is left of a task from the present state of a rollout; things that were chosen for earlier subtasks stay chosen.
 ///
 /// # Errors
-/// When nobody grades it, nothing is left, or the expert cannot do it.
+/// When it is not graded, nothing is left, or the expert cannot do it.
 pub(crate) fn rest_of(task: Task, rollout: &Rollout) -> anyhow::Result<Task> {
-    let grader = rollout.env.grader.as_ref().context("nobody grades this instruction, so it cannot be a task")?;
+    let grader = rollout.env.grader.as_ref().context("this instruction is not graded, so it cannot be a task")?;
     let done = grader.completed();
     let subtasks = grader.subtasks().get(done..).unwrap_or_default().to_vec();
     ensure!(!subtasks.is_empty(), "every subtask is done here; go back to a step where something is left to do");

@@ -81,7 +81,7 @@ impl ExplorerControl {
             }
             SessionEvent::Instructed { new, .. } => {
                 self.seen().instruction = Some(new.clone());
-                self.say(format!("told: {new}"));
+                self.say(format!("instruction: {new}"));
             }
             SessionEvent::Stopped(why) => self.say(format!("stopped: {why}")),
             SessionEvent::Refused(why) | SessionEvent::Failed(why) => self.say(format!("problem: {why}")),
@@ -112,7 +112,7 @@ impl Controlled for ExplorerControl {
         let done = match order {
             Order::Pause => "pauses",
             Order::Resume => "goes on",
-            Order::Instruct(_) => "tells the agent so",
+            Order::Instruct(_) => "gives the agent that instruction",
             Order::Stop if (self.end)() => return Ok("ends, as when it is left".into()),
             Order::Stop => return Err("it is busy".into()),
         };

@@ -156,7 +156,8 @@ impl ActionLine {
 
     /// In one line, with its number, and with what was told and by whom it was chosen where that is another than before.
     pub(crate) fn line(&self, step: usize, before: Option<&ActionLine>) -> String {
-        let told = before.is_none_or(|before| before.told != self.told).then(|| format!("  told: {}", self.told));
+        let told =
+            before.is_none_or(|before| before.told != self.told).then(|| format!("  instruction: {}", self.told));
         let by = before.is_none_or(|before| before.by != self.by).then(|| format!("  by {}", self.by));
         format!("{step:>4} {:<38}{}{}", self.words, by.unwrap_or_default(), told.unwrap_or_default())
     }
@@ -271,11 +272,11 @@ mod tests {
         let texts: Vec<String> = (0..3).map(|at| lines[at].line(at + 1, before(at))).collect();
         assert!(
             texts[0].starts_with("   1 RotateLeft (you)")
-                && texts[0].ends_with("by you  told: put the mug in the sink"),
+                && texts[0].ends_with("by you  instruction: put the mug in the sink"),
             "{texts:?}"
         );
         assert_eq!(texts[1].trim_end(), "   2 LookUp (you)");
-        assert!(texts[2].ends_with("told: Dance."), "{texts:?}");
+        assert!(texts[2].ends_with("instruction: Dance."), "{texts:?}");
     }
 
     #[test]

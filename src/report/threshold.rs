@@ -32,7 +32,7 @@ impl Threshold {
             Some((_, length)) => of_length(&summary.progress_by_length, length),
         };
         let measured =
-            measured.ok_or_else(|| anyhow::anyhow!("no episode tells {}: no task is that long", self.metric))?;
+            measured.ok_or_else(|| anyhow::anyhow!("no episode has {}: no task is that long", self.metric))?;
         Ok((measured < self.least).then_some(measured))
     }
 }

@@ -12,7 +12,7 @@ pub(super) fn page(path: &str) -> Option<Value> {
         "/schema" => Some(schemas()),
         "/metadata" => Some(json!({
             "name": "House",
-            "description": "Household tasks told in words, in generated and imported floor plans",
+            "description": "Household tasks described in words, in generated and imported floor plans",
             "version": env!("CARGO_PKG_VERSION"),
         })),
         _ => None,

@@ -157,7 +157,7 @@ pub(crate) fn memory_card(name: &str, config: &MemoryConfig, report: &Validation
         Sight::Detector => format!(
             "It finds things with a detector ({detector_steps} steps on datasets `{detector_dataset}`) in a frame with depth"
         ),
-        Sight::Simulator => "It is told by the simulator what is in view: an ablation".into(),
+        Sight::Simulator => "The simulator says what is in view: an ablation".into(),
     };
     let text = format!(
         "# {name}\n\n\

@@ -19,7 +19,7 @@ CHARACTERS = "".join(map(chr, [*range(0x20, 0x7F), *range(0xA0, 0x180)]))
 
 
 class HouseEnv(gymnasium.Env):
-    """Household tasks told in words.
+    """Household tasks described in words.
 
     An action is the place of one of 12 low-level actions and that of an object class (0 for the five that move the agent): the
     nearest thing of that class is acted on. An action that is impossible changes nothing but takes a step. The reward is 1 for

@@ -85,7 +85,7 @@ pub(crate) fn trials(
     visit: &mut dyn FnMut(&LinkSuccess),
 ) -> anyhow::Result<LinkSuccess> {
     let entries = chain.expert().ok_or_else(|| {
-        anyhow::anyhow!("nobody grades these links, or the expert cannot follow them: use a task's own chain")
+        anyhow::anyhow!("these links are not graded, or the expert cannot follow them: use a task's own chain")
     })?;
     let links = chain.links.len();
     let mut found = LinkSuccess { expert: vec![LinkRate::default(); links], own: vec![LinkRate::default(); links] };

@@ -17,7 +17,7 @@ use crate::house::Outcome;
 pub(crate) struct LinkOutcome {
     /// It was reached: the links before it were done.
     pub(crate) reached: bool,
-    /// It was done; `None` where nobody grades it.
+    /// It was done; `None` where it is not graded.
     pub(crate) done: Option<bool>,
     pub(crate) steps: u32,
     /// What was done for it, and what came of that.

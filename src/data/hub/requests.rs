@@ -113,8 +113,8 @@ impl Hub {
             };
             let content = found.lfs.as_ref().map(|large| large.sha256.clone()).or_else(|| found.blob_id.clone());
             let content = content.filter(|content| git_name::is_one(content));
-            let content = content.with_context(|| format!("the digest of its {wanted} is not told"))?;
-            Ok(HubFile { name: wanted, size: found.size.context("its size is not told")?, content })
+            let content = content.with_context(|| format!("the digest of its {wanted} is not given"))?;
+            Ok(HubFile { name: wanted, size: found.size.context("its size is not given")?, content })
         };
         let files = FILES.into_iter().map(file).collect::<anyhow::Result<_>>()?;
         Ok(Revision { commit: said.sha, files })
@@ -137,9 +137,9 @@ impl Hub {
         let mut kept = atomic_file::begin(&path).with_context(|| format!("cannot write {}", path.display()))?;
         let mut body = response.into_body().into_with_config().limit(file.size + 1).reader().take(file.size + 1);
         let size = io::copy(&mut body, &mut kept).with_context(|| format!("{} broke off", file.name))?;
-        ensure!(size == file.size, "{}: {} bytes were told, {size} or more came", file.name, file.size);
+        ensure!(size == file.size, "{}: {} bytes were announced, {size} or more came", file.name, file.size);
         let found = git_name::of(kept.path(), &file.content)?;
-        ensure!(found == file.content, "{}: its digest is {found}, and {} was told", file.name, file.content);
+        ensure!(found == file.content, "{}: its digest is {found}, and {} was announced", file.name, file.content);
         atomic_file::keep(kept, &path).with_context(|| format!("cannot write {}", path.display()))
     }
 }

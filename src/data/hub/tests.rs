@@ -111,10 +111,10 @@ fn a_checkpoint_is_fetched_once_checked_and_then_found_without_the_hub() {
 }
 
 #[test]
-fn what_is_not_what_the_hub_told_is_not_kept() {
+fn what_is_not_what_the_hub_announced_is_not_kept() {
     for (fault, told) in [
         (Fault::OtherWeights, "its digest is"),
-        (Fault::LongWeights, "5 bytes were told, 6 or more came"),
+        (Fault::LongWeights, "5 bytes were announced, 6 or more came"),
         (Fault::Pickled, "weights in other formats are not read"),
     ] {
         let base = tempfile::tempdir().unwrap();

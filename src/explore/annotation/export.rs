@@ -141,7 +141,7 @@ pub(crate) fn tasks(folder: &Path, file: &Path) -> anyhow::Result<Exported> {
             }
         }
     }
-    ensure!(!tasks.is_empty(), "{}: nobody wrote a sentence that could become a task", folder.display());
+    ensure!(!tasks.is_empty(), "{}: no annotation can become a task", folder.display());
     let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     folder::make(parent).with_context(|| format!("cannot make {}", parent.display()))?;
     let named = tasks.iter().any(|task| matches!(task.scene, SceneRef::Named(_)));
@@ -208,11 +208,11 @@ mod tests {
         assert_eq!(task.sentences, spans[0].sentences());
         assert!(task.instruction.ends_with("mug."));
         let empty = testing::dataset(&["a"], &[]);
-        assert!(tasks(empty.path(), &file).unwrap_err().to_string().contains("nobody wrote"));
+        assert!(tasks(empty.path(), &file).unwrap_err().to_string().contains("no annotation can become a task"));
     }
 
     #[test]
-    fn what_was_told_of_other_words_is_stale() {
+    fn an_annotation_of_other_words_is_stale() {
         let (folder, _) = annotated();
         let kept = folder.path().join("annotations");
         let other = testing::dataset(&["b"], &[]);

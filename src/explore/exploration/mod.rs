@@ -309,7 +309,7 @@ mod tests {
         exploration.switch(0).unwrap();
         exploration.seek(2);
         exploration.instruct("dance").unwrap();
-        assert!(exploration.step().unwrap().forked.unwrap().contains("told: Dance."));
+        assert!(exploration.step().unwrap().forked.unwrap().contains("instruction: Dance."));
         exploration.switch(0).unwrap();
         exploration.seek(1);
         assert!(exploration.rollout.env.grader.is_some(), "the task is back where it applied");

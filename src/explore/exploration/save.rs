@@ -149,7 +149,7 @@ mod tests {
         assert_eq!((verdict.episodes, verdict.steps, verdict.choices), (2, 6 + 5, 6 + 4));
 
         let tasks = folder.path().join("tasks.json");
-        assert!(exploration.keep_task(&tasks).unwrap_err().to_string().contains("nobody grades"));
+        assert!(exploration.keep_task(&tasks).unwrap_err().to_string().contains("is not graded"));
         exploration.switch(0).unwrap();
         exploration.seek(4);
         exploration.keep_task(&tasks).unwrap();

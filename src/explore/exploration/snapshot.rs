@@ -42,7 +42,7 @@ pub struct SessionSnapshot {
     pub(crate) progress: Option<TaskProgress>,
     /// What was told on the way here, the wish in force last.
     pub(crate) wishes: Wishes,
-    /// How many subtasks of the wish in force are done, and of how many; nothing where nobody grades it.
+    /// How many subtasks of the wish in force are done, and of how many; nothing where it is not graded.
     pub(crate) graded: Option<(usize, usize)>,
     /// How much of the task is done while something else was told, and of how much.
     pub(crate) task_beside: Option<(usize, usize)>,
@@ -119,7 +119,7 @@ impl Exploration {
         }
     }
 
-    /// How many subtasks the grader of the wish in force has done, and of how many; nothing where nobody grades it.
+    /// How many subtasks the grader of the wish in force has done, and of how many; nothing where it is not graded.
     pub(crate) fn graded(&self) -> Option<(usize, usize)> {
         let is_graded = self.wish().is_some_and(|wish| wish.grading != WishGrading::Nobody);
         let grader = self.rollout.env.grader.as_ref().filter(|_| is_graded)?;

@@ -131,7 +131,7 @@ impl Exploration {
             _ => next.instruction != taken.instruction,
         };
         if another {
-            format!("told: {}", taken.instruction)
+            format!("instruction: {}", taken.instruction)
         } else if next.decision.action != taken.decision.action {
             format!("{words} ({})", who(&taken.author))
         } else {

@@ -133,7 +133,7 @@ impl Exploration {
     /// When they are no instruction.
     pub(super) fn tell_ungraded(&mut self, text: &str) -> anyhow::Result<()> {
         let text = instruction::parse(text)?;
-        self.begin(Wish::ungraded(&text, self.tree.at(), "nobody graded it when it was told"));
+        self.begin(Wish::ungraded(&text, self.tree.at(), "it was not graded when it was given"));
         Ok(())
     }
 
@@ -142,7 +142,7 @@ impl Exploration {
     /// # Errors
     /// When there is none such.
     pub(crate) fn mean(&mut self, wanted: Option<usize>) -> anyhow::Result<()> {
-        let wish = self.wish().cloned().ok_or_else(|| anyhow::anyhow!("nothing was told yet"))?;
+        let wish = self.wish().cloned().ok_or_else(|| anyhow::anyhow!("no instruction was given yet"))?;
         let is_choice = wish.readings.len() > 1 || wish.is_unsure();
         anyhow::ensure!(is_choice, "there is no other reading of {:?}", wish.instruction);
         let picked = match wanted {
@@ -248,7 +248,7 @@ impl Exploration {
     /// # Errors
     /// When there is none.
     pub(crate) fn say(&mut self, is_fulfilled: bool) -> anyhow::Result<Arc<Wish>> {
-        let wish = self.wishes.last_mut().ok_or_else(|| anyhow::anyhow!("nothing was told yet"))?;
+        let wish = self.wishes.last_mut().ok_or_else(|| anyhow::anyhow!("no instruction was given yet"))?;
         let wish = Arc::make_mut(wish);
         wish.verdict = Some(if is_fulfilled { WishVerdict::SaidDone } else { WishVerdict::SaidFailed });
         (wish.failure, wish.advice) = (None, None);
@@ -256,7 +256,7 @@ impl Exploration {
             self.explain(None);
         }
         self.tree.judge(&self.wishes);
-        self.wish().cloned().ok_or_else(|| anyhow::anyhow!("nothing was told yet"))
+        self.wish().cloned().ok_or_else(|| anyhow::anyhow!("no instruction was given yet"))
     }
 
     /// Hears what the agent's own end says in the present state.

@@ -182,7 +182,7 @@ impl<W: Write> Plain<'_, W> {
     /// The present state.
     fn state(&mut self) -> anyhow::Result<SessionSnapshot> {
         self.ask_quietly(SessionCommand::Show)?;
-        self.state.take().map(|now| *now).ok_or_else(|| anyhow::anyhow!("the state was not told"))
+        self.state.take().map(|now| *now).ok_or_else(|| anyhow::anyhow!("no state was received"))
     }
 
     /// What the policy would do now, unless that failed and was told.
@@ -222,7 +222,7 @@ impl<W: Write> Plain<'_, W> {
             }
             SessionEvent::AlreadyOver(_) => {
                 (*answer, self.refused) = (Answer::Refused, true);
-                writeln!(out, "error: the wish is over; `instruct` tells the next one, or `back`, `reset`, `next`")?;
+                writeln!(out, "error: the wish is over; `instruct` gives the next one, or `back`, `reset`, `next`")?;
             }
             SessionEvent::State(now) => self.state = Some(now),
             SessionEvent::Decided(decision, words, values) => self.decided = Some((decision, words, values)),
@@ -265,7 +265,7 @@ impl<W: Write> Plain<'_, W> {
             SessionEvent::Read(wish) => reading(&wish, out)?,
             SessionEvent::AgentDone { likely, graded, .. } => {
                 let grader =
-                    graded.map_or("nobody grades it".into(), |(done, of)| format!("the grader: {done} of {of}"));
+                    graded.map_or("it is not graded".into(), |(done, of)| format!("the grader: {done} of {of}"));
                 writeln!(out, "the agent says that it is done ({likely:.2}); {grader}")?;
             }
             SessionEvent::Ended(wish) => verdict(&wish, out)?,
@@ -335,7 +335,10 @@ mod tests {
         assert!(text.contains("instruction: Open the fridge. (was: "), "{text}");
         assert!(text.contains("B: Put the mug in the sink."), "what was in force is the other one now:\n{text}");
         let text = say("step 2\npage actions\nseek 9999\nterms\n");
-        assert!(text.contains("\n   1 ") && text.contains("\n   2 ") && text.contains("  by random  told: "), "{text}");
+        assert!(
+            text.contains("\n   1 ") && text.contains("\n   2 ") && text.contains("  by random  instruction: "),
+            "{text}"
+        );
         assert!(text.contains("there is no step 9999: the branch ends at 2"), "{text}");
         assert!(text.contains("\nadvantage      Q less V"), "{text}");
         let text = say("page mind\nsort\npage mind\npage world\npage chain\npage branches\npage panels\n");

@@ -40,7 +40,7 @@ pub(crate) fn run(
     let mut plain = Plain { agent, input, control, out, leaves: false };
     let mut obeyed = true;
     writeln!(plain.out, "{}, seed {}", exploration.name(), exploration.seed())?;
-    writeln!(plain.out, "told: {}", exploration.instruction())?;
+    writeln!(plain.out, "instruction: {}", exploration.instruction())?;
     while !plain.leaves {
         plain.out.flush()?;
         plain.note(&exploration, false);
@@ -97,12 +97,12 @@ impl<W: Write> Plain<'_, W> {
             }
             RemoteCommand::Instruct(text) => {
                 exploration.instruct(&text)?;
-                writeln!(self.out, "told: {}", exploration.instruction())?;
-                self.control.say(format!("told: {}", exploration.instruction()));
+                writeln!(self.out, "instruction: {}", exploration.instruction())?;
+                self.control.say(format!("instruction: {}", exploration.instruction()));
             }
             RemoteCommand::Compare(text) => {
                 for (told, choices) in exploration.compared(&text)? {
-                    writeln!(self.out, "told: {told}")?;
+                    writeln!(self.out, "instruction: {told}")?;
                     list(&choices, &mut self.out)?;
                 }
             }
@@ -218,7 +218,7 @@ impl<W: Write> Plain<'_, W> {
 
 fn begin(exploration: &mut RemoteExploration, seed: u64, out: &mut impl Write) -> anyhow::Result<()> {
     exploration.begin(seed)?;
-    writeln!(out, "seed {seed}; told: {}", exploration.instruction())?;
+    writeln!(out, "seed {seed}; instruction: {}", exploration.instruction())?;
     Ok(())
 }
 
@@ -284,7 +284,7 @@ mod tests {
             told(Fault::None, "act right\nact right\nback\nact left\nbranches\nbranch 1\ngoto 9\nlook\n");
         assert!(obeyed, "{told}");
         for wanted in [
-            "told: go to the right end",
+            "instruction: go to the right end",
             "step 2: right: ok",
             "at step 1 of 2, branch 1",
             "step 2: left: ok; branch 2 begins",

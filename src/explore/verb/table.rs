@@ -40,7 +40,7 @@ pub(crate) const VERBS: &[VerbEntry] = &[
     verb("failed", "", "the wish failed, you say", |_| ask(Command::Say { fulfilled: false })),
     verb("examples", "", "a few wishes that can be fulfilled in this house", |_| ask(Command::Examples))
         .on(&[key(Watch, "w", &["w"], "wishes for this house", "")]),
-    verb("wishes", "", "what was told, and what came of it", |_| Ok(Verb::Wishes)),
+    verb("wishes", "", "the instructions so far, and what became of each", |_| Ok(Verb::Wishes)),
     verb("back", "[N]", "N steps back (1)", |line| Ok(Verb::Back(line.count()?)))
         .on(&[
             key(Common, "h l", &["h"], "a step back, forward", ""),

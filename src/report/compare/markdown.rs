@@ -126,7 +126,7 @@ impl PairedComparison {
             if !changes.is_empty() {
                 text += &format!(
                     "\n### {title}\n\n{}",
-                    table(["task", "seed", "completed", "told", "open"], changes.iter().map(change_row))
+                    table(["task", "seed", "completed", "instruction", "open"], changes.iter().map(change_row))
                 );
             }
         }

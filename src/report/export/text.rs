@@ -18,7 +18,7 @@ pub(crate) fn write(recording: &FrameSequence) -> String {
     for shot in &recording.shots[1.min(recording.shots.len())..] {
         if shot.told != told {
             told.clone_from(&shot.told);
-            let _ = writeln!(text, "      told: {told}");
+            let _ = writeln!(text, "      instruction: {told}");
         }
         let done = shot.done.as_ref().map_or(String::new(), |done| format!(" · done: {done}"));
         let _ = writeln!(text, "{:>4}  {}{done}", shot.step, shot.words());

@@ -30,7 +30,7 @@ pub(super) fn heard_by(control: &ExplorerControl, event: &RemoteEvent) {
         seen.acts = format!("{}, {}", shown.name, shown.policy);
     });
     if told.is_some_and(|told| told != shown.instruction) {
-        control.say(format!("told: {}", shown.instruction));
+        control.say(format!("instruction: {}", shown.instruction));
     }
     if let Some(taken) = shown.taken.as_ref().filter(|_| step != shown.step) {
         control.say(taken.in_words());

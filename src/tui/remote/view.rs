@@ -107,7 +107,7 @@ impl RemoteApp {
             self.editor.area().render(Rect { x: area.x + area.width - typed, width: typed, ..area }, buf);
             return;
         }
-        let label = if shown.is_told { "told: " } else { "asked: " };
+        let label = if shown.is_told { "instruction: " } else { "asked: " };
         let words = if shown.instruction.is_empty() { "nothing" } else { &shown.instruction };
         let words = fit(words, usize::from(area.width).saturating_sub(label.len()));
         line(buf, area, vec![Span::styled(label, THEME.quiet), Span::styled(words, THEME.instruction)]);
@@ -204,7 +204,7 @@ fn compared(both: &[(String, Vec<RemoteChoice>)], area: Rect, buf: &mut Buffer) 
     let half = area.height / 2;
     for (i, (told, choices)) in both.iter().enumerate() {
         let area = Rect { y: area.y + half * i as u16, height: half, ..area };
-        let inside = panel(buf, area, if i == 0 { "told" } else { "compared" }, "esc");
+        let inside = panel(buf, area, if i == 0 { "given" } else { "compared" }, "esc");
         let mut rows = inside.rows();
         if let Some(row) = rows.next() {
             line(buf, row, vec![Span::styled(fit(told, usize::from(row.width)), THEME.instruction)]);

@@ -250,7 +250,7 @@ mod tests {
         update(&mut app, Msg::Session(SessionEvent::Actions(lines)));
         let text = testing::screen(&mut app);
         assert!(text.contains("1 MoveAhead") && text.contains("2 Pickup Mug · too far"), "{text}");
-        assert!(text.contains("by first  told: Dance."), "{text}");
+        assert!(text.contains("by first  instruction: Dance."), "{text}");
         press(&mut app, KeyCode::Char('j'));
         assert_eq!(press(&mut app, KeyCode::Enter), [Effect::Send(SessionCommand::Seek(2))]);
     }

@@ -85,7 +85,7 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
         }
         SessionEvent::Instructed { old, new, note } => {
             app.input.editor.remember(&new);
-            app.note(Tone::Note, format!("told: {new} ({note})"));
+            app.note(Tone::Note, format!("instruction: {new} ({note})"));
             app.session.decision = None;
             let effects = vec![Effect::Remember(new.clone())];
             app.session.replaced = (old != new).then_some(old);
@@ -104,7 +104,7 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
         }
         SessionEvent::AgentDone { likely, graded, .. } => {
             let grader = match graded {
-                None => "nobody grades it: :done or :failed".to_string(),
+                None => "it is not graded: :done or :failed".to_string(),
                 Some((done, of)) => format!("the grader has {done} of {of}"),
             };
             app.note(Tone::Note, format!("the agent says done ({likely:.2}); {grader}"));
@@ -113,7 +113,7 @@ pub(crate) fn on_event(app: &mut App, event: SessionEvent) -> Vec<Effect> {
         SessionEvent::Ended(wish) | SessionEvent::AlreadyOver(wish) => {
             let good = wish.verdict.is_some_and(WishVerdict::is_fulfilled);
             let tone = if good { Tone::Good } else { Tone::Bad };
-            app.note(tone, format!("{}; i tells it the next thing", wish.verdict_in_words()));
+            app.note(tone, format!("{}; i gives the next instruction", wish.verdict_in_words()));
             if let Some(advice) = &wish.advice {
                 app.note(Tone::Note, with_keys(advice));
             }

@@ -50,7 +50,7 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
     }
     if let Some(agent) = wish.agent_in_words() {
         let grader = match graded {
-            None => "; nobody grades it".to_string(),
+            None => "; it is not graded".to_string(),
             Some((done, of)) => format!("; the grader: {done} of {of}"),
         };
         let next = "; space goes on, :done or :failed ends it";
@@ -60,7 +60,7 @@ fn parts(wish: &Wish, graded: Option<(usize, usize)>) -> Vec<(String, Style)> {
         return vec![("  the task's own words".into(), THEME.quiet)];
     }
     if let Some(why) = &wish.ungraded {
-        let judge = if wish.is_told() { "; :done or :failed when it is" } else { ": i tells it something" };
+        let judge = if wish.is_told() { "; :done or :failed when it is" } else { ": i gives an instruction" };
         let style = if wish.is_told() { THEME.bad } else { THEME.quiet };
         let head = if wish.is_told() { "  not graded: " } else { "  " };
         let mut parts = vec![(format!("{head}{why}"), style)];

@@ -27,7 +27,7 @@ impl Widget for SuggestionsOverlay<'_> {
     fn render(self, page: Rect, buf: &mut Buffer) {
         let found = self.0.completions();
         let title =
-            if self.0.input.editor.text().is_empty() { " Told before, or sensible here " } else { " Tab completes " };
+            if self.0.input.editor.text().is_empty() { " Given before, or sensible here " } else { " Tab completes " };
         let Some(area) = place(self.0, page) else { return };
         Clear.render(area, buf);
         let block = Block::bordered().title(Line::styled(title, THEME.title)).padding(Padding::horizontal(1));

@@ -31,7 +31,7 @@ impl Widget for TaskPanel<'_> {
             let inner = panel(buf, area, title, &format!("{}{beside}", verdict.unwrap_or("not graded")));
             let why = wish.and_then(|wish| wish.ungraded.as_deref()).unwrap_or_default();
             let text = match verdict {
-                Some(_) => "i tells it the next thing, from here on".to_string(),
+                Some(_) => "i gives the next instruction, from here on".to_string(),
                 None => format!("{why}. It goes on until you say :done or :failed."),
             };
             for (row, line) in (0..).zip(wrap(&text, width, "")) {

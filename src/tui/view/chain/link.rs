@@ -25,7 +25,7 @@ pub(super) struct LinkPanel<'a> {
 impl Widget for LinkPanel<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let at = self.app.chain.selected.min(self.sides[0].links.len().saturating_sub(1));
-        let inner = panel(buf, area, &format!("Link {}", at + 1), "entry and exit, told link by link");
+        let inner = panel(buf, area, &format!("Link {}", at + 1), "entry and exit, link by link");
         let (Some(now), Some(link)) = (&self.app.session.now, self.sides[0].links.get(at)) else { return };
         put(buf, inner, 0, link.as_str(), THEME.instruction);
         let many = self.sides.len() as u16;

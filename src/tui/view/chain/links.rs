@@ -30,7 +30,7 @@ const LINK: usize = 19;
 impl Widget for Links<'_> {
     fn render(self, area: Rect, buf: &mut Buffer) {
         let own = self.sides[0];
-        let graded = if own.graded { "graded by the task" } else { "nobody grades these links" };
+        let graded = if own.graded { "graded by the task" } else { "these links are not graded" };
         let inner = panel(buf, area, "Chain", graded);
         let columns = Columns::fitting(usize::from(inner.width), self.sides);
         for (row, line) in (0..).zip(columns.head(self.sides)) {
