@@ -142,7 +142,7 @@ fn whoever_reads_may_leave_and_the_verdict_is_the_same() {
     std::fs::write(sprint.path("run/episodes.jsonl"), episodes.lines().next().unwrap().to_owned() + "\n").unwrap();
     assert_eq!(unread("verify run"), Some(3));
     let said = sprint.run("verify run").stdout;
-    assert!(said.contains("the summary tells of 2, there are 1") && said.ends_with("different\n"), "{said}");
+    assert!(said.contains("the summary counts 2, there are 1") && said.ends_with("different\n"), "{said}");
 }
 
 #[test]
@@ -235,7 +235,7 @@ fn a_bad_task_file_is_one_clear_error() {
 #[test]
 fn the_pages_task_by_hand_is_sound_and_the_expert_solves_it() {
     let page = include_str!("../assets/docs/evaluation.md");
-    let (_, after) = page.split_once("by number:\n\n  ```json\n").expect("the page has a task by hand");
+    let (_, after) = page.split_once("by number, from 0:\n\n  ```json\n").expect("the page has a task by hand");
     let (task, _) = after.split_once("```").unwrap();
     let sprint = Sprint::new();
     std::fs::write(sprint.path("mine.json"), task).unwrap();

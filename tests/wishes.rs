@@ -83,7 +83,7 @@ fn what_cannot_be_read_is_refused_with_the_reason_and_a_person_judges_it() {
     session.press(":done\r");
     session.see("done, you say, after 1 step");
     session.press("n");
-    session.see("done, you say; i tells");
+    session.see("done, you say; i gives");
     tell(&mut session, "pick up the baseball bat", "Pick up the baseball bat.");
     session.see("not graded: this house has no baseball bat");
     session.press("t");

@@ -360,7 +360,7 @@ mod tests {
         for step in 0..6 {
             let values = policy.values(0, &mut asked.observation()).unwrap().unwrap();
             let decision = play(&mut policy, &mut asked, 0, 1).remove(0);
-            assert_eq!(play(&mut policy, &mut unasked, 1, 1), [decision.clone()], "step {step}");
+            assert_eq!(play(&mut policy, &mut unasked, 1, 1), std::slice::from_ref(&decision), "step {step}");
             assert_eq!(decision.values, None);
             assert!(values.state.is_finite());
             assert!(values.choices.iter().any(|choice| choice.kind == decision.action.kind && choice.q.is_finite()));
